@@ -1,0 +1,70 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# Every target sets up what it needs first; where all is set up already that costs no time.
+
+# Only these plugins: a machine's own (launch_testing, coverage) have no say in our tests.
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD = 1
+PYTEST = -m pytest -p xdist -p timeout -p hypothesispytest
+
+# Unit tests see nothing of ROS, even in a shell where it is sourced.
+WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PATH \
+	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo run test lint types unit ros build clean
+
+help: ## list the targets
+	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+
+setup: ## set up .venv, and build into install
+	@tools/setup
+
+demo: setup ## a short ride: driver and simulated drive, from enable to stop
+	@tools/run python -m nfo_sinus_driver.node.demo
+
+run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
+	@tools/run python -m nfo_sinus_driver.node.make_run
+
+test: setup ## lint, types, unit, ros, until the first one fails
+	@for stage in lint types unit ros; do \
+		$(MAKE) --no-print-directory $$stage || exit; \
+	done
+
+lint: setup ## ruff
+	@echo '== lint: ruff'
+	@.venv/bin/ruff check
+
+types: setup ## mypy, on all that is not ROS
+	@echo '== types: mypy --strict'
+	@.venv/bin/mypy
+
+unit: setup ## tests without ROS, with the current and with the oldest pymodbus
+	@echo '== unit: without ROS'
+	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n auto test/unit
+	@echo '== unit again: without rclpy, with the oldest pymodbus'
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto test/unit
+
+ros: setup ## end-to-end tests with rclpy
+	@echo '== ros: driver, simulated drive and clients, each a process of its own'
+	@tools/run python $(PYTEST) -n 2 test/ros
+
+build: ## build both packages again
+	@rm -rf build install
+	@tools/setup
+
+clean: ## remove all that was set up, built or cached
+	rm -rf .venv build install log .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

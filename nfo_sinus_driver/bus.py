@@ -1,0 +1,543 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Who talks next on one line.
+
+One worker thread owns the link. What has to be said in several steps is a coroutine
+(``async def``) that awaits :meth:`Bus.read`, :meth:`Bus.write` and :meth:`Bus.sleep`; the worker
+steps all of them and sends one transaction at a time, the most urgent first. So the state that
+coroutines share is only ever touched by the worker, a stop waits for one transaction at most,
+and nothing that a coroutine raises can end the worker.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Coroutine
+from collections.abc import Generator
+from concurrent.futures import Future
+import ctypes
+import enum
+import functools
+import heapq
+import itertools
+import logging
+import threading
+import time
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Link
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.statistics import Recorder
+from nfo_sinus_driver.statistics import Statistics
+
+_log = logging.getLogger(__name__)
+_T = TypeVar('_T')
+
+#: How often a lost port is tried again, s.
+REOPEN_PERIOD = 0.5
+#: The share of the time that TELEMETRY and REFRESH get when everything above asks for more.
+BACKGROUND_SHARE = 0.2
+#: How much unused share may be saved up, s: so little that a set-point never waits for two.
+_MOST_CREDIT = 0.005
+
+_PR_SET_TIMERSLACK = 29
+
+
+class Priority(enum.IntEnum):
+    """How urgent a transaction is; the least goes first."""
+
+    STOP = 0
+    SETPOINT = 1
+    SERVICE = 2
+    POLL = 3
+    TELEMETRY = 4
+    REFRESH = 5
+
+
+_FOREGROUND = (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
+
+
+class Cancelled(Exception):
+    """Raised inside a coroutine whose task was cancelled."""
+
+
+class Transfer:
+    """One transaction that a coroutine awaits: a read, or a write if ``words`` is given."""
+
+    __slots__ = ('address', 'priority', 'unit', 'words')
+
+    def __init__(
+        self, unit: int, address: Address, priority: Priority, words: Words | None = None
+    ) -> None:
+        self.unit = unit
+        self.address = address
+        self.priority = priority
+        self.words = words
+
+    def __await__(self) -> Generator[Transfer, Reply, Reply]:
+        return (yield self)
+
+
+class _Pause:
+    """A wait until a moment, or until the task is woken."""
+
+    __slots__ = ('until',)
+
+    def __init__(self, until: float) -> None:
+        self.until = until
+
+    def __await__(self) -> Generator[_Pause, None, None]:
+        yield self
+
+
+class Task:
+    """A coroutine on the bus; :attr:`future` has its result."""
+
+    def __init__(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+        self._coroutine = coroutine
+        self.future: Future[Any] = Future()
+        self.cancelled = False
+        #: Tells timers of earlier pauses from that of the present one.
+        self.pause = 0
+        self.asleep = False
+        #: Tasks that wait for the end of this one.
+        self.joiners: list[Task] = []
+        # nobody may cancel the future behind the worker's back
+        self.future.set_running_or_notify_cancel()
+
+    def step(self, value: Any, error: BaseException | None) -> Transfer | _Pause | None:
+        """Run it up to what it awaits next; ``None`` when it has ended."""
+        try:
+            if error is not None:
+                awaited = self._coroutine.throw(error)
+            else:
+                awaited = self._coroutine.send(value)
+        except StopIteration as end:
+            self.future.set_result(end.value)
+        except BaseException as failure:  # noqa: BLE001 - nothing may end the worker
+            self.future.set_exception(failure)
+        else:
+            assert isinstance(awaited, (Transfer, _Pause))
+            return awaited
+        return None
+
+
+class Slot:
+    """
+    A place for one pending write of which only the latest counts, such as a set-point.
+
+    :param make: called by the worker at the moment of sending; returns what to write now, or
+        ``None`` if there is nothing to write any more.
+    :param done: called by the worker with the error, or ``None`` when the unit took it.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Transfer | None],
+        done: Callable[[Transfer, LinkError | None], None],
+    ) -> None:
+        self.make = make
+        self.done = done
+        self.pending = False
+
+
+class Bus:
+    """
+    The line that several drives share.
+
+    :param link: what carries the transactions; the bus opens, closes and re-opens it.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
+        self._awake = threading.Event()
+        self._queues: dict[Priority, deque[tuple[Task, Transfer]]] = {
+            priority: deque() for priority in Priority
+        }
+        self._slots: deque[Slot] = deque()
+        self._timers: list[tuple[float, int, Task, int]] = []
+        self._order = itertools.count()
+        self._credit = 0.0
+        #: What shares the guaranteed time, the one that is next in front.
+        self._background = deque((Priority.TELEMETRY, Priority.REFRESH))
+        self._is_open = False
+        self._reopen_at = 0.0
+        self._port_error = PortError('the port is not open yet')
+        self._stopping = False
+        self._recorder = Recorder()
+        self._current: Task | None = None
+        self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
+
+    # --- for every thread ---------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the worker; it opens the port and keeps trying if that fails."""
+        self._thread.start()
+
+    def close(self, timeout: float = 5.0) -> None:
+        """End the worker after its present transaction and close the port."""
+        self._stopping = True
+        self._awake.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout)
+
+    def run(self, coroutine: Coroutine[Any, Any, _T]) -> Future[_T]:
+        """
+        Run a coroutine on the worker.
+
+        :returns: a future with its result; a :class:`LinkError` that it does not catch is the
+            future's exception.
+        """
+        task = Task(coroutine)
+        self._enter(task)
+        return task.future
+
+    def call(self, function: Callable[[], None]) -> None:
+        """Have the worker call a short function between two transactions."""
+        self._enter(function)
+
+    def request(self, slot: Slot) -> None:
+        """Ask for a slot to be written; asking again before it is written changes nothing."""
+        if not slot.pending:
+            slot.pending = True
+            self._enter(slot)
+
+    def statistics(self) -> Statistics:
+        """Return the counters and times of the line."""
+        return self._recorder.statistics()
+
+    @property
+    def port_error(self) -> PortError | None:
+        """Why the port is not open, or ``None`` when it is."""
+        return None if self._is_open else self._port_error
+
+    def use_probes(self, unit: int, probes: tuple[Address, ...]) -> None:
+        """Tell the link which parameters of a unit it may read to find out if it hears it."""
+        self.call(lambda: self._link.use_probes(unit, probes))
+
+    # --- for coroutines on the worker ---------------------------------------------------------
+
+    def read(self, unit: int, address: Address, priority: Priority) -> Transfer:
+        """
+        Read one parameter (to be awaited).
+
+        :raises LinkError: as the link does.
+        """
+        return Transfer(unit, address, priority)
+
+    def write(self, unit: int, address: Address, words: Words, priority: Priority) -> Transfer:
+        """
+        Write one parameter (to be awaited).
+
+        :raises LinkError: as the link does.
+        """
+        return Transfer(unit, address, priority, words)
+
+    def sleep(self, seconds: float) -> _Pause:
+        """Let time pass (to be awaited)."""
+        return _Pause(time.monotonic() + seconds)
+
+    @property
+    def current(self) -> Task:
+        """The task that is being stepped."""
+        assert self._current is not None, 'only for coroutines on the bus'
+        return self._current
+
+    @property
+    def current_or_none(self) -> Task | None:
+        """The task that is being stepped, or ``None`` between two."""
+        return self._current
+
+    async def join(self, task: Task, timeout: float) -> bool:
+        """Wait for the end of another task (to be awaited); false when the time is over."""
+        if not task.future.done():
+            task.joiners.append(self.current)
+            await self.sleep(timeout)
+        return task.future.done()
+
+    def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
+        """Start a coroutine beside the present one; errors nobody expects are logged."""
+        task = Task(coroutine)
+        task.future.add_done_callback(_log_unexpected)
+        self._advance(task, None, None)
+        return task
+
+    def cancel(self, task: Task) -> None:
+        """
+        End a task: what it waits to send is never sent.
+
+        The task sees :class:`Cancelled` where it stands.
+        """
+        if task.future.done() or task.cancelled:
+            return
+        task.cancelled = True
+        for queue in self._queues.values():
+            for entry in [entry for entry in queue if entry[0] is task]:
+                queue.remove(entry)
+        task.asleep = False
+        task.pause += 1
+        self._advance(task, None, Cancelled())
+
+    def wake(self, task: Task) -> None:
+        """End the pause of a task early; harmless if it is not in one."""
+        if task.asleep:
+            self._end_pause(task)
+
+    def note_cycle(self, unit: int, seconds: float) -> None:
+        """Record how long one round of polling took for a unit."""
+        self._recorder.cycle(unit, seconds)
+
+    def forget_cycle(self, unit: int) -> None:
+        """Take a unit that is no longer polled out of the statistics."""
+        self._recorder.forget_cycle(unit)
+
+    def note_retry(self) -> None:
+        """Count a request that is sent again."""
+        self._recorder.retries += 1
+
+    # --- the worker ---------------------------------------------------------------------------
+
+    def _enter(self, item: Task | Slot | Callable[[], None]) -> None:
+        self._inbox.append(item)
+        self._awake.set()
+
+    def _work(self) -> None:
+        _tighten_timers()
+        while not self._stopping:
+            try:
+                self._work_once()
+            except Exception:
+                # a mistake in a callback must not take every drive on the line with it
+                _log.exception('error in the bus worker; it goes on')
+        self._link.close()
+        self._fail_all(PortError('the bus is closed'))
+
+    def _work_once(self) -> None:
+        self._awake.clear()
+        self._take_in()
+        self._ring_timers()
+        if not self._is_open:
+            self._open_when_due()
+            if not self._is_open:
+                self._fail_all(self._port_error)
+                self._rest()
+                return
+        if not self._send_next():
+            self._rest()
+
+    def _take_in(self) -> None:
+        while self._inbox:
+            item = self._inbox.popleft()
+            if isinstance(item, Task):
+                self._advance(item, None, None)
+            elif isinstance(item, Slot):
+                self._slots.append(item)
+            else:
+                item()
+
+    def _ring_timers(self) -> None:
+        now = time.monotonic()
+        while self._timers and self._timers[0][0] <= now:
+            _, _, task, pause = heapq.heappop(self._timers)
+            if task.asleep and task.pause == pause:
+                self._end_pause(task)
+
+    def _end_pause(self, task: Task) -> None:
+        task.asleep = False
+        task.pause += 1
+        self._advance(task, None, None)
+
+    def _rest(self) -> None:
+        """Sleep until something is asked for or a timer rings."""
+        if self._inbox or self._stopping:
+            return
+        moments = [self._timers[0][0]] if self._timers else []
+        if not self._is_open:
+            moments.append(self._reopen_at)
+        wait = max(0.0, min(moments) - time.monotonic()) if moments else None
+        self._awake.wait(wait)
+
+    def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
+        """Step a task and file what it awaits next."""
+        caller, self._current = self._current, task
+        awaited = task.step(value, error)
+        self._current = caller
+        if awaited is None:
+            for joiner in task.joiners:
+                self.wake(joiner)
+            return
+        if isinstance(awaited, Transfer):
+            self._queues[awaited.priority].append((task, awaited))
+        else:
+            task.asleep = True
+            heapq.heappush(self._timers, (awaited.until, next(self._order), task, task.pause))
+
+    def _send_next(self) -> bool:
+        """Send what is most urgent; false if there is nothing to send."""
+        background_due = self._credit > 0 and any(
+            self._queues[priority] for priority in self._background
+        )
+        if self._send_from(Priority.STOP):
+            return True
+        if not background_due and (
+            self._write_slot() or any(self._send_from(priority) for priority in _FOREGROUND)
+        ):
+            return True
+        return any(self._send_from(priority) for priority in tuple(self._background))
+
+    def _send_from(self, priority: Priority) -> bool:
+        queue = self._queues[priority]
+        if not queue:
+            return False
+        self._exchange(*queue.popleft())
+        return True
+
+    def _write_slot(self) -> bool:
+        while self._slots:
+            slot = self._slots.popleft()
+            slot.pending = False
+            transfer = slot.make()
+            if transfer is None:
+                continue
+            try:
+                self._transact(transfer)
+            except NotReady as error:
+                self._later(error.until, functools.partial(self.request, slot))
+            except LinkError as error:
+                slot.done(transfer, error)
+            else:
+                slot.done(transfer, None)
+            return True
+        return False
+
+    def _exchange(self, task: Task, transfer: Transfer) -> None:
+        try:
+            reply = self._transact(transfer)
+        except NotReady as error:
+            self._later(error.until, functools.partial(self._resume, task, transfer))
+        except LinkError as error:
+            self._advance(task, None, error)
+        else:
+            self._advance(task, reply, None)
+
+    def _resume(self, task: Task, transfer: Transfer) -> None:
+        if not task.cancelled:
+            self._queues[transfer.priority].append((task, transfer))
+
+    def _later(self, until: float, function: Callable[[], None]) -> None:
+        async def wait() -> None:
+            await _Pause(until)
+            function()
+
+        self.spawn(wait())
+
+    def _transact(self, transfer: Transfer) -> Reply:
+        started = time.monotonic()
+        try:
+            if transfer.words is None:
+                reply = self._link.read(transfer.unit, transfer.address)
+            else:
+                reply = self._link.write(transfer.unit, transfer.address, transfer.words)
+        except NotReady:
+            raise
+        except LinkError as error:
+            self._account(transfer, started, error)
+            raise
+        except Exception as error:
+            # a mistake in the link must reach the one who asked, not leave him waiting
+            _log.exception('error in the link')
+            raise LinkError(f'error in the link: {error}') from error
+        self._account(transfer, started, None)
+        return reply
+
+    def _account(self, transfer: Transfer, started: float, error: LinkError | None) -> None:
+        now = time.monotonic()
+        took = now - started
+        if transfer.priority in self._background:
+            # no debt beyond this one transaction, for what is sent on an idle line harms nobody
+            self._credit = max(self._credit - took, -took)
+            self._background.rotate()
+        else:
+            earned = took * BACKGROUND_SHARE / (1 - BACKGROUND_SHARE)
+            self._credit = min(self._credit + earned, _MOST_CREDIT)
+        recorder = self._recorder
+        if isinstance(error, PortError):
+            self._lose_port(error)
+            return
+        recorder.busy(now, took)
+        if error is None or isinstance(error, Refused):
+            recorder.answered(took)
+        recorder.timeouts += isinstance(error, NoAnswer)
+        recorder.damaged += isinstance(error, DamagedAnswer)
+        recorder.refused += isinstance(error, Refused)
+
+    def _open_when_due(self) -> None:
+        now = time.monotonic()
+        if now < self._reopen_at:
+            return
+        try:
+            self._link.open()
+        except PortError as error:
+            self._lose_port(error)
+        else:
+            self._is_open = True
+            self._recorder.opened()
+
+    def _lose_port(self, error: PortError) -> None:
+        self._link.close()
+        self._is_open = False
+        self._port_error = error
+        self._reopen_at = time.monotonic() + REOPEN_PERIOD
+
+    def _fail_all(self, error: PortError) -> None:
+        """Tell everyone who waits that the port is not there."""
+        while self._slots:
+            slot = self._slots.popleft()
+            slot.pending = False
+            transfer = slot.make()
+            if transfer is not None:
+                slot.done(transfer, error)
+        waiting = [entry for queue in self._queues.values() for entry in queue]
+        for queue in self._queues.values():
+            queue.clear()
+        for task, _ in waiting:
+            self._advance(task, None, error)
+
+
+def _log_unexpected(future: Future[Any]) -> None:
+    error = future.exception()
+    if error is not None and not isinstance(error, (Cancelled, LinkError)):
+        _log.error('a job on the bus failed', exc_info=error)
+
+
+def _tighten_timers() -> None:
+    """Have this thread woken when it asked to be, not 50 microseconds later."""
+    try:
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    except (OSError, AttributeError):
+        # only a little precision is lost
+        return

@@ -1,0 +1,146 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Control and status words of the drive, and the codes of MODE and SCMD [M0 §7.1, §7.2]."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Mode(enum.IntEnum):
+    """Who controls the drive [M0 table 17]."""
+
+    INHIBIT = 0
+    STOP = 1
+    #: Never written: with RUN active it starts the motor [C43, C51].
+    EXT = 2
+    BUS = 3
+
+
+class Scmd(enum.IntEnum):
+    """Start and stop commands under MODE = Bus [M0 table 18]."""
+
+    STOP = 0x00
+    ANALOG_F = 0x03
+    ANALOG_R = 0x05
+    FIX_1_F = 0x0B
+    FIX_1_R = 0x0D
+    FIX_2_F = 0x13
+    FIX_2_R = 0x15
+    FIX_3_F = 0x1B
+    FIX_3_R = 0x1D
+    FIX_4_F = 0x23
+    FIX_4_R = 0x25
+    FIX_5_F = 0x2B
+    FIX_5_R = 0x2D
+    FIX_6_F = 0x33
+    FIX_6_R = 0x35
+    FIX_7_F = 0x3B
+    FIX_7_R = 0x3D
+    OP_MODE = 0x41
+    TERMINAL = 0x81
+    FIELDBUS = 0x101
+    FULL_TUNING = 0x201
+    BASIC_TUNING = 0x301
+    RS_MEASURE = 0x401
+    PAR_CALC = 0x501
+    ERASE_E_LOG = 0x800
+    RESET_E_OUT = 0x900
+
+
+class Control(enum.IntFlag):
+    """DriveControl, the control word of the generic state machine [M0 table 14]."""
+
+    SWITCH_ON = 1 << 0
+    ENABLE_VOLTAGE = 1 << 1
+    DISABLE_QUICK_STOP = 1 << 2
+    ENABLE_OP = 1 << 3
+    ENABLE_RFG = 1 << 4
+    UNLOCK_RFG = 1 << 5
+    USE_REF_FOR_RFG = 1 << 6
+    RESET_MALFUNCTION = 1 << 7
+    EVENT_TRIGGERED_OP = 1 << 10
+    OVERRIDE_COAST = 1 << 11
+    AUTO_INIT = 1 << 12
+    ENABLE_REV_OP = 1 << 13
+    NET_CTRL = 1 << 14
+    NET_REF = 1 << 15
+
+
+class Status(enum.IntFlag):
+    """DriveStatus, the status word of the generic state machine [M0 table 15]."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    SWITCHED_ON = 1 << 1
+    OP_ENABLED = 1 << 2
+    FAULTED = 1 << 3
+    VOLTAGE_ENABLED = 1 << 4
+    QUICK_STOP_DISABLED = 1 << 5
+    SWITCH_ON_DISABLED = 1 << 6
+    REF_FROM_NET = 1 << 8
+    CTRL_FROM_NET = 1 << 9
+    SETPOINT_REACHED = 1 << 10
+    LIMIT_ACTIVE = 1 << 11
+    REV_OP_ENABLED = 1 << 14
+    STOPPING = 1 << 15
+
+
+class State(enum.Enum):
+    """States of the generic state machine [M0 table 16]."""
+
+    UNKNOWN = 0
+    NOT_READY_TO_SWITCH_ON = 1
+    SWITCH_ON_DISABLED = 2
+    READY_TO_SWITCH_ON = 3
+    SWITCHED_ON = 4
+    OPERATION_ENABLED = 5
+    #: DISABLE or SHUTDOWN: the status word does not tell them apart [C37].
+    STOPPING = 6
+    QUICK_STOP = 7
+    FAULT_REACTION_ACTIVE = 8
+    FAULTED = 9
+
+
+def state_of(word: int) -> State:
+    """Return the state that a DriveStatus word shows; UNKNOWN for a pattern not in table 16."""
+    for mask, pattern, state in _STATES:
+        if word & mask == pattern:
+            return state
+    return State.UNKNOWN
+
+
+def _pattern(printed: str, state: State) -> tuple[int, int, State]:
+    """Turn a pattern as the manual prints it into a mask and what stands under it."""
+    bits = printed.replace(' ', '')
+    mask = int(''.join('0' if bit == 'X' else '1' for bit in bits), 2)
+    return mask, int(bits.replace('X', '0'), 2), state
+
+
+#: The patterns of [M0 table 16], forward and reverse.
+_STATES = (
+    _pattern('00XX XXXX X0XX 0000', State.NOT_READY_TO_SWITCH_ON),
+    _pattern('00XX XXXX X1XX 0000', State.SWITCH_ON_DISABLED),
+    _pattern('00XX XXXX X01X 0001', State.READY_TO_SWITCH_ON),
+    _pattern('00XX XXXX X01X 0011', State.SWITCHED_ON),
+    _pattern('00XX XXXX X01X 0111', State.OPERATION_ENABLED),
+    _pattern('01XX XXXX X01X 0011', State.OPERATION_ENABLED),
+    _pattern('10XX XXXX X01X 0111', State.STOPPING),
+    _pattern('11XX XXXX X01X 0011', State.STOPPING),
+    _pattern('10XX XXXX X00X 0111', State.QUICK_STOP),
+    _pattern('11XX XXXX X00X 0011', State.QUICK_STOP),
+    _pattern('10XX XXXX X0XX 1111', State.FAULT_REACTION_ACTIVE),
+    _pattern('11XX XXXX X0XX 1011', State.FAULT_REACTION_ACTIVE),
+    _pattern('00XX XXXX X0XX 1000', State.FAULTED),
+)

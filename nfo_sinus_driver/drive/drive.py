@@ -1,0 +1,400 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One drive on a bus: connected, polled, commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from concurrent.futures import Future
+import dataclasses
+import time
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.drive.drive_timeout import set_drive_timeout
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Identity
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.mode_scmd import ModeScmd
+from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.snapshot import Snapshot
+from nfo_sinus_driver.drive.telemetry import watch_telemetry
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+
+_T = TypeVar('_T')
+
+#: How often a drive is looked at while its node is not active, s.
+_IDLE_PERIOD = 0.5
+#: How often the control mode is read; it can only change while the motor stands, s.
+_MODE_PERIOD = 1.0
+#: How often a drive that does not answer is tried again, s.
+_RECONNECT_PERIOD = 1.0
+#: The bus is silent for no more than this share of the drive's own time-out.
+_KEEP_ALIVE_SHARE = 1 / 3
+#: The value that is polled beside frequency and speed, by control mode.
+_ACTUAL_KEYS = {'Torque': 'status.trq_act', 'PI-Reg': 'status.reg_act'}
+
+_SILENCE_ADVICE = (
+    'check in this order: BusType in the drive (MbusRtu; NFO is the factory setting), '
+    'jumper S5 (RS232 or RS485), the address, baud rate and parity'
+)
+_MONITOR = 'control_method is monitor: this driver only reads; set control_method to mode_scmd'
+
+
+class Drive:
+    """
+    One inverter on a bus.
+
+    All public methods may be called from any thread. Those that take time return a future; its
+    exception is a :class:`DriveError` whose message says what is wrong and what to do.
+
+    :param listener: told about every poll and event, on the worker of the bus.
+    """
+
+    def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
+        self._bus = bus
+        self._unit = settings.address
+        self._listener = listener
+        model = load_model(settings.model)
+        self._registers = Registers(bus, self._unit, model, settings.retries)
+        self._inverter = Inverter(model, self._registers, listener, settings)
+        self._setpoint = Setpoint(
+            bus,
+            self._unit,
+            self._registers,
+            listener,
+            lambda: self._inverter.settings,
+            lambda reason: self._motion.secure(reason) if self._motion else None,
+        )
+        self._motion: Motion | None = None
+        if settings.control_method != 'monitor':
+            method = ModeScmd(self._registers)
+            self._motion = Motion(bus, self._inverter, method, self._setpoint)
+        self._active = False
+        self._misses = 0
+        #: When the control mode was last read.
+        self._mode_read_at = 0.0
+        self._complaint = ''
+        self._poll_task: Task | None = None
+        self._telemetry_task: Task | None = None
+        self._snapshot = self._take_snapshot(None)
+
+    # --- any thread ---------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> DriveSettings:
+        """How the drive is treated; address, model and control method never change."""
+        return self._inverter.settings
+
+    @settings.setter
+    def settings(self, settings: DriveSettings) -> None:
+        self._inverter.settings = settings
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest poll."""
+        return self._snapshot
+
+    @property
+    def identity(self) -> Identity | None:
+        """Who answered, or ``None`` if nobody did yet."""
+        return self._inverter.identity
+
+    @property
+    def armed(self) -> bool:
+        """The motor follows set-points."""
+        return self._setpoint.armed
+
+    @property
+    def stop_unconfirmed(self) -> bool:
+        """A stop was asked for that the drive has not confirmed yet."""
+        return self._motion is not None and self._motion.stopping
+
+    def connect(self) -> Future[str]:
+        """Identify the drive, make sure that nothing runs unasked, and watch it from then on."""
+        return self._run(self._connect_first())
+
+    def disconnect(self, timeout: float) -> Future[str]:
+        """
+        Stop the motor, give control back and leave the drive alone.
+
+        :param timeout: how long the motor may take to stand before it is left to its ramp, s.
+        """
+        return self._run(self._disconnect(timeout))
+
+    def activate(self) -> None:
+        """Poll at full rate and measure."""
+        self._bus.call(lambda: self._set_active(True))
+
+    def deactivate(self) -> Future[str]:
+        """Stop the motor and only keep watch."""
+        return self._run(self._deactivate())
+
+    def enable(self) -> Future[str]:
+        """Take control and run at set-point 0, then follow set-points that come in."""
+        return self._run(self._command(lambda motion: motion.enable(), connected=True))
+
+    def stop(self) -> Future[str]:
+        """Stop as the drive's StMode says; control is kept."""
+        return self._run(self._command(lambda motion: motion.stop()))
+
+    def quick_stop(self) -> Future[str]:
+        """Release the motor at once: it coasts."""
+        return self._run(self._command(lambda motion: motion.quick_stop()))
+
+    def acknowledge(self) -> Future[str]:
+        """Acknowledge a fault."""
+        return self._run(self._command(lambda motion: motion.acknowledge(), connected=True))
+
+    def set_drive_timeout(self, seconds: float) -> Future[str]:
+        """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
+        return self._run(self._set_drive_timeout(seconds))
+
+    def set_setpoint(self, value: float) -> None:
+        """
+        Ask for a set-point in the unit of the control mode; it counts only while armed.
+
+        :raises ValueError: not finite.
+        """
+        self._setpoint.request(value)
+
+    # --- on the bus ---------------------------------------------------------------------------
+
+    def _run(self, coroutine: Coroutine[Any, Any, str]) -> Future[str]:
+        return self._bus.run(self._explained(coroutine))
+
+    async def _explained(self, coroutine: Coroutine[Any, Any, str]) -> str:
+        try:
+            return await coroutine
+        except LinkError as error:
+            raise DriveError(self._explain(error)) from error
+
+    def _explain(self, error: LinkError) -> str:
+        if isinstance(error, (PortError, Refused)):
+            return str(error)
+        if isinstance(error, NoAnswer) and self._inverter.identity is None:
+            return f'nobody answers at address {self._unit}: {_SILENCE_ADVICE}'
+        if self._inverter.identity is None:
+            return (
+                f'what comes from address {self._unit} is no answer ({error}): check baud rate '
+                'and parity, that no other master is on the line, and the wiring'
+            )
+        return f'{error}: check the cable and that the drive has power'
+
+    async def _command(self, command: Any, *, connected: bool = False) -> str:
+        if self._motion is None:
+            raise DriveError(_MONITOR)
+        if connected and not self._inverter.connected:
+            raise DriveError(f'the drive at address {self._unit} does not answer')
+        answer: str = await command(self._motion)
+        return answer
+
+    async def _connect_first(self) -> str:
+        if self._poll_task is None:
+            await self._connect()
+            self._poll_task = self._bus.spawn(self._poll_for_ever())
+        return str(self._inverter.identity)
+
+    async def _connect(self) -> None:
+        inverter = self._inverter
+        identity = await inverter.identify()
+        await inverter.read_control_mode()
+        inverter.sio_tot = await inverter.read_number('serial.sio_tot')
+        await inverter.look(Priority.SERVICE)
+        if self._motion is not None:
+            await self._motion.connected()
+            if inverter.settings.drive_timeout:
+                await self._set_drive_timeout(inverter.settings.drive_timeout)
+        self._misses = 0
+        self._complaint = ''
+        inverter.connected = True
+        inverter.tell(Severity.INFO, f'connected: {inverter.model.name}, {identity}')
+        self._warn_of_missing_timeout()
+
+    def _warn_of_missing_timeout(self) -> None:
+        if self._motion is not None and not self._inverter.sio_tot:
+            self._inverter.tell(
+                Severity.WARNING,
+                'the drive has no time-out of its own (SioTot is 0): if this driver is killed or '
+                'the cable is cut, the motor runs on; set drive_timeout',
+            )
+
+    async def _disconnect(self, timeout: float) -> str:
+        try:
+            if self._motion is None:
+                return 'only watched'
+            return await self._motion.release(timeout)
+        finally:
+            self._set_active(False)
+            if self._poll_task is not None:
+                task, self._poll_task = self._poll_task, None
+                self._bus.cancel(task)
+            self._inverter.connected = False
+            self._bus.forget_cycle(self._unit)
+            self._publish(None)
+
+    async def _deactivate(self) -> str:
+        self._set_active(False)
+        if self._motion is None or not self._inverter.connected:
+            return 'only watched'
+        if self._inverter.seen is not None and not self._inverter.seen.from_bus:
+            return 'the bus has no control of this drive'
+        return await self._motion.stop()
+
+    async def _set_drive_timeout(self, seconds: float) -> str:
+        if self._motion is None:
+            raise DriveError(_MONITOR)
+        answer = await set_drive_timeout(self._registers, seconds)
+        self._inverter.sio_tot = seconds or self._inverter.sio_tot
+        if answer:
+            self._inverter.tell(Severity.INFO, answer)
+        return answer
+
+    def _set_active(self, active: bool) -> None:
+        self._active = active
+        if self._telemetry_task is not None:
+            self._bus.cancel(self._telemetry_task)
+            self._telemetry_task = None
+        if active:
+            self._telemetry_task = self._bus.spawn(
+                watch_telemetry(self._bus, self._inverter, self._registers, self._listener)
+            )
+            if self._poll_task is not None:
+                self._bus.wake(self._poll_task)
+
+    async def _poll_for_ever(self) -> None:
+        while True:
+            started = time.monotonic()
+            try:
+                if self._inverter.connected:
+                    await self._poll()
+                    self._misses = 0
+                else:
+                    await self._connect()
+            except (LinkError, DriveError) as error:
+                self._miss(error)
+            took = time.monotonic() - started
+            if self._inverter.connected and self._active:
+                self._bus.note_cycle(self._unit, took)
+            await self._bus.sleep(self._period - took)
+
+    @property
+    def _period(self) -> float:
+        """The time from one poll to the next, s."""
+        inverter = self._inverter
+        if not inverter.connected:
+            return _RECONNECT_PERIOD
+        if not self._active:
+            period = _IDLE_PERIOD
+        else:
+            rate = inverter.settings.poll_rate
+            period = 1 / rate if rate else 0.0
+        if inverter.sio_tot:
+            period = min(period, inverter.sio_tot * _KEEP_ALIVE_SHARE)
+        return period
+
+    async def _poll(self) -> None:
+        inverter = self._inverter
+        seen = await inverter.look(Priority.POLL)
+        if time.monotonic() - self._mode_read_at > _MODE_PERIOD:
+            self._mode_read_at = time.monotonic()
+            await inverter.read_control_mode(Priority.POLL)
+        if self._motion is not None:
+            self._motion.watch(seen)
+        read = self._registers.read_number
+        frequency = await read('status.frq_act', Priority.POLL)
+        speed = await read('status.spd_act', Priority.POLL)
+        actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
+        if inverter.control_mode in _ACTUAL_KEYS:
+            actual = await read(_ACTUAL_KEYS[inverter.control_mode], Priority.POLL)
+        self._publish(seen, frequency=frequency, speed=speed, actual=actual)
+
+    def _miss(self, error: LinkError | DriveError) -> None:
+        """Count a failed poll; too many in a row and the drive is lost."""
+        inverter = self._inverter
+        self._misses += 1
+        if inverter.connected and (
+            self._misses > inverter.settings.retries or isinstance(error, PortError)
+        ):
+            inverter.connected = False
+            explained = self._explain(error) if isinstance(error, LinkError) else str(error)
+            inverter.tell(Severity.ERROR, f'lost: {explained}; trying again for ever')
+            self._bus.forget_cycle(self._unit)
+            if self._motion is not None:
+                self._motion.lost()
+        elif not inverter.connected and isinstance(error, DriveError):
+            self._complain(str(error))
+        if not inverter.connected:
+            self._publish(None)
+
+    def _complain(self, text: str) -> None:
+        """Say what keeps the drive from being used, once."""
+        if text != self._complaint:
+            self._complaint = text
+            self._inverter.tell(Severity.ERROR, text)
+
+    def _publish(self, seen: InverterStatus | None, **values: float) -> None:
+        self._snapshot = self._take_snapshot(seen, **values)
+        self._listener.on_snapshot(self._snapshot)
+
+    def _take_snapshot(
+        self,
+        seen: InverterStatus | None,
+        frequency: float = NAN,
+        speed: float = NAN,
+        actual: float = NAN,
+    ) -> Snapshot:
+        inverter = self._inverter
+        snapshot = Snapshot(
+            at=time.monotonic(),
+            connected=inverter.connected,
+            enabled=self.armed,
+            control_method=inverter.settings.control_method,
+        )
+        if seen is None:
+            return snapshot
+        code = inverter.model.inv_st(seen.code)
+        return dataclasses.replace(
+            snapshot,
+            at=seen.at,
+            status=seen,
+            control_mode=inverter.control_mode,
+            unit=inverter.unit,
+            setpoint=self._setpoint.commanded,
+            setpoint_age=self._setpoint.age,
+            setpoint_clamped=self._setpoint.clamped,
+            text=inverter.text,
+            description=code.description,
+            remedy=code.remedy,
+            kind=inverter.kind,
+            requires_ack=code.requires_ack,
+            frequency=frequency,
+            speed=speed,
+            actual=actual,
+        )

@@ -1,0 +1,113 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Control through MODE and SCMD [M0 §7.2 tables 17 and 18].
+
+A control method knows what to write, and nothing of when; `motion` decides that. Every method
+has the shape of this one.
+"""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.link import Refused
+
+#: The register that takes the set-point, and the value reached, by control mode [M0 §8.3].
+SETPOINT_KEYS = {
+    'Freque': 'status.frq_set',
+    'Speed': 'status.spd_set',
+    'Torque': 'status.trq_set',
+    'PI-Reg': 'status.reg_set',
+}
+
+
+class ModeScmd:
+    """Control of one drive through MODE and SCMD; coroutines for the bus."""
+
+    name = 'mode_scmd'
+
+    def __init__(self, registers: Registers) -> None:
+        self._registers = registers
+
+    async def in_control(self, priority: Priority) -> bool:
+        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        return await self._registers.read('fieldbus.mode', priority) == Mode.BUS
+
+    async def take_control(self) -> None:
+        """
+        Put the drive under bus control with no run command standing.
+
+        :raises DriveError: it is tuning.
+        """
+        mode = await self._registers.read('fieldbus.mode', Priority.SERVICE)
+        if mode == Mode.INHIBIT:
+            raise DriveError('the drive lets nobody take control now (MODE is Inhibit: tuning?)')
+        if mode == Mode.BUS:
+            await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.SERVICE)
+        else:
+            await self._registers.write('fieldbus.mode', Mode.BUS, Priority.SERVICE)
+
+    async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
+        """
+        Write set-point 0 in the unit of a control mode, and read it back.
+
+        :raises DriveError: the drive keeps another value.
+        """
+        key = SETPOINT_KEYS[control_mode]
+        await self._registers.write(key, 0, priority)
+        kept = await self._registers.read(key, priority)
+        if kept != 0:
+            raise DriveError(f'the drive keeps a set-point of {kept} where 0 was written')
+
+    async def run(self) -> None:
+        """Give the run command; once, for nobody knows what has happened before a second one."""
+        await self._registers.write('fieldbus.scmd', Scmd.FIELDBUS, Priority.SERVICE, once=True)
+
+    async def stop(self, control_mode: str) -> None:
+        """
+        Take the run command back and write set-point 0, at the head of the bus.
+
+        Does nothing to a drive that is not under bus control.
+
+        :raises LinkError: the drive does not answer, or refuses although the bus has control.
+        """
+        try:
+            await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)
+            if control_mode:
+                await self._registers.write(SETPOINT_KEYS[control_mode], 0, Priority.STOP)
+        except Refused:
+            if await self.in_control(Priority.STOP):
+                raise
+
+    async def quick_stop(self) -> None:
+        """Release the motor at once, as <Stop> on the keypad does; control is given back."""
+        if await self.in_control(Priority.STOP):
+            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.STOP)
+
+    async def release(self) -> None:
+        """Give control back; never by MODE = Ext, which can start the motor [C43]."""
+        if await self.in_control(Priority.SERVICE):
+            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+
+    async def acknowledge(self, code: int) -> None:
+        """Acknowledge a fault; a serial fault is ended by MODE = Stop [M0 §6.1.5], [C42]."""
+        await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+        if code == SIO_FAIL:
+            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)

@@ -1,0 +1,361 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Who may make the motor turn, and how it is made to stop.
+
+The motor follows set-points only while :attr:`Motion.armed`; a person arms it by
+:meth:`Motion.enable`. Whatever happens to the drive, the line or us disarms it, and from then on
+the run command is taken back until the drive says that it stops. All of this runs on the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
+from nfo_sinus_driver.catalog.inv_st import LOCAL
+from nfo_sinus_driver.catalog.inv_st import START_DELAY
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.mode_scmd import ModeScmd
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+#: How long a drive may take to do what it was told, its start delay not counted, s.
+_PATIENCE = 2.0
+#: How often the status is looked at while something is awaited, s.
+_LOOK_PERIOD = 0.02
+#: How often a stop that does not get through is tried again, s.
+_RETRY_PERIOD = 0.2
+#: The same while the drive does not answer, for its neighbours' sake, s.
+_LOST_RETRY_PERIOD = 1.0
+#: How often it is said that a stop is not confirmed, s.
+_COMPLAINT_PERIOD = 5.0
+
+_NO_RUN = (
+    'the drive stays in standby: its RUN input is not active '
+    '(DIN1; strap it to +24 V or close its safety contact)'
+)
+
+
+class Motion:
+    """Arms, stops and watches one drive."""
+
+    def __init__(
+        self, bus: Bus, inverter: Inverter, method: ModeScmd, setpoint: Setpoint
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._method = method
+        self._setpoint = setpoint
+        self._arming: Task | None = None
+        #: What takes the run command back, while there may be one that nobody wants any more.
+        self._withdrawal: Task | None = None
+        self._again = False
+        self._held_by_fault = False
+        self._unconfirmed = ''
+
+    @property
+    def armed(self) -> bool:
+        """The motor follows set-points."""
+        return self._setpoint.armed
+
+    @property
+    def stopping(self) -> bool:
+        """A stop is not confirmed yet."""
+        return self._withdrawal is not None
+
+    # --- what a person asks for ---------------------------------------------------------------
+
+    async def enable(self) -> str:
+        """
+        Take control and run at set-point 0, then follow set-points that arrive from now on.
+
+        :returns: what was done.
+        :raises DriveError: it was not done, and why; the run command is taken back then.
+        """
+        if self.armed:
+            return 'is enabled already'
+        if self._arming is not None:
+            raise DriveError('it is being enabled already')
+        self._arming = self._bus.current
+        try:
+            await self._arm()
+        except Cancelled:
+            raise DriveError('it was stopped while it was being enabled') from None
+        except (DriveError, LinkError) as error:
+            self._withdraw()
+            raise DriveError(str(error)) from error
+        finally:
+            self._arming = None
+        return 'enabled; it follows set-points that arrive from now on'
+
+    async def stop(self) -> str:
+        """
+        Stop as the drive's StMode says; control is kept.
+
+        :returns: whether it ramps or coasts [C97].
+        :raises DriveError: the drive does not confirm the stop; it is tried on and on.
+        """
+        self.disarm()
+        await self._finish_withdrawal(self._withdraw())
+        seen = self._inverter.seen
+        text = self._inverter.describe()
+        if seen is None or not seen.from_bus:
+            return f'the bus has no control of this drive, so there was nothing to stop ({text})'
+        if not seen.driven:
+            return f'stopped ({text})'
+        coasts = await self._inverter.read_label('control.st_mode') == 'Release'
+        return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
+
+    async def quick_stop(self) -> str:
+        """
+        Release the motor at once: it coasts, and control is given back [C96].
+
+        :raises DriveError: the drive does not confirm it; the stop is tried on and on.
+        """
+        self.disarm()
+        try:
+            await self._method.quick_stop()
+            await self._await_status(lambda seen: not seen.driven, Priority.STOP, _PATIENCE)
+        except (DriveError, LinkError) as error:
+            self._withdraw()
+            raise DriveError(f'the quick stop is NOT confirmed: {error}; stopping') from error
+        self._withdraw()
+        return 'released: the motor coasts'
+
+    async def acknowledge(self) -> str:
+        """
+        Acknowledge a fault and take the run command back, so that nothing starts by it.
+
+        :returns: what was acknowledged.
+        :raises DriveError: the fault still stands.
+        """
+        inverter = self._inverter
+        seen = await inverter.look(Priority.SERVICE)
+        fault = inverter.model.inv_st(seen.code)
+        if not seen.faulted and fault.kind is Kind.STATUS:
+            return f'nothing to acknowledge ({inverter.describe()})'
+        self.disarm()
+        name = inverter.describe()
+        await self._method.acknowledge(seen.code)
+        self._withdraw()
+        try:
+            await self._await_status(
+                lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
+            )
+        except DriveError:
+            raise DriveError(
+                f'{inverter.describe()} still stands: {fault.description}. {fault.remedy}'
+            ) from None
+        return f'acknowledged {name}'
+
+    async def release(self, timeout: float) -> str:
+        """
+        Give control back once the motor stands.
+
+        A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
+        time-out of its own it is released, for else that would end the ramp with a fault.
+
+        :raises DriveError: the drive does not confirm that it stops.
+        """
+        if not await self._method.in_control(Priority.SERVICE):
+            return 'control is not ours'
+        stopped = await self.stop()
+        try:
+            await self._await_status(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+        except DriveError:
+            if not await self._inverter.read_number('serial.sio_tot'):
+                return f'{stopped}; it was left to its ramp, under bus control'
+            stopped = 'released to coast, for the time-out of the drive would end the ramp'
+        await self._method.release()
+        return f'{stopped}; control given back'
+
+    # --- what happens by itself ---------------------------------------------------------------
+
+    async def connected(self) -> None:
+        """Make sure that nothing runs under bus control that nobody has enabled since."""
+        if await self._method.in_control(Priority.SERVICE):
+            self._withdraw()
+
+    def lost(self) -> None:
+        """Take note that the drive does not answer any more."""
+        ours = self.armed or self._arming is not None
+        self.disarm()
+        if ours:
+            self._withdraw()
+
+    def watch(self, seen: InverterStatus) -> None:
+        """Judge what the drive says about itself."""
+        self._setpoint.answered()
+        if self.armed:
+            reason = self._why_disarmed(seen)
+            if reason:
+                self.secure(reason)
+        elif self._arming is None and self._withdrawal is None and seen.runs and seen.from_bus:
+            self.secure('it runs under bus control although nobody enabled it')
+
+    def secure(self, reason: str) -> None:
+        """Disarm and stop for a reason that a person should know."""
+        self.disarm()
+        self._withdraw()
+        self._tell(Severity.WARNING, f'stopped: {reason}; call ~/enable to go on')
+
+    def disarm(self) -> None:
+        """Follow set-points no more; end an enable that is on its way."""
+        self._setpoint.disarm()
+        if self._arming is not None and self._arming is not self._bus.current_or_none:
+            self._bus.cancel(self._arming)
+
+    # --- how --------------------------------------------------------------------------------
+
+    async def _arm(self) -> None:
+        inverter = self._inverter
+        seen = await inverter.look(Priority.SERVICE)
+        if seen.faulted:
+            fault = inverter.model.inv_st(seen.code)
+            raise DriveError(
+                f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
+                'then call ~/fault_ack'
+            )
+        control_mode = await inverter.read_control_mode()
+        expected = inverter.settings.expected_control_mode
+        if expected and control_mode != expected:
+            raise DriveError(
+                f'the drive is in control mode {control_mode}, expected is {expected}: '
+                'set control.mode in the drive or expected_control_mode in the driver'
+            )
+        if self._withdrawal is not None:
+            await self._finish_withdrawal(self._withdrawal)
+        await self._method.take_control()
+        await self._await_status(lambda now: now.from_bus, Priority.SERVICE, _PATIENCE)
+        await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await self._method.run()
+        await self._await_run()
+        self._setpoint.arm(control_mode)
+
+    async def _await_run(self) -> None:
+        deadline = time.monotonic() + _PATIENCE
+        delayed = False
+        while True:
+            seen = await self._inverter.look(Priority.SERVICE)
+            if seen.runs:
+                return
+            if seen.faulted:
+                raise DriveError(f'the drive did not start: {self._inverter.describe()}')
+            if seen.code == START_DELAY and not delayed:
+                delayed = True
+                deadline += await self._inverter.read_number('control.run_dly')
+            if time.monotonic() > deadline:
+                standby = seen.code in BUS_STANDBY
+                raise DriveError(
+                    _NO_RUN
+                    if standby
+                    else f'the drive does not start: {self._inverter.describe()}'
+                )
+            await self._bus.sleep(_LOOK_PERIOD)
+
+    def _withdraw(self) -> Task:
+        """Take the run command back, again and again until the drive says that it stops."""
+        if self._withdrawal is None:
+            self._unconfirmed = 'no answer yet'
+            self._withdrawal = self._bus.spawn(self._keep_withdrawing())
+        else:
+            # what was written may be overtaken by now
+            self._again = True
+            self._bus.wake(self._withdrawal)
+        return self._withdrawal
+
+    async def _finish_withdrawal(self, withdrawal: Task) -> None:
+        """Wait until the drive has confirmed that it stops, or stands because of a fault."""
+        deadline = time.monotonic() + _PATIENCE
+        while not await self._bus.join(withdrawal, _LOOK_PERIOD):
+            if self._held_by_fault:
+                return
+            if time.monotonic() > deadline:
+                raise DriveError(
+                    f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
+                )
+
+    async def _keep_withdrawing(self) -> None:
+        complain_at = time.monotonic() + _PATIENCE
+        while not await self._withdrawn():
+            if self._held_by_fault:
+                complain_at = time.monotonic() + _PATIENCE
+            elif time.monotonic() >= complain_at:
+                complain_at = time.monotonic() + _COMPLAINT_PERIOD
+                self._tell(
+                    Severity.ERROR,
+                    f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
+                    'Use the RUN input or the emergency stop if it turns',
+                )
+            if not self._again:
+                connected = self._inverter.connected
+                await self._bus.sleep(_RETRY_PERIOD if connected else _LOST_RETRY_PERIOD)
+        self._withdrawal = None
+        self._held_by_fault = False
+
+    async def _withdrawn(self) -> bool:
+        """Try once; true when the drive took it and says that it stops."""
+        self._again = False
+        refusal = ''
+        try:
+            try:
+                await self._method.stop(self._inverter.control_mode)
+            except Refused as error:
+                refusal = str(error)
+            seen = await self._inverter.look(Priority.STOP)
+        except LinkError as error:
+            self._unconfirmed = str(error)
+            return False
+        # a drive with a fault may refuse everything; it stands, but would go on afterwards
+        self._held_by_fault = bool(refusal) and seen.faulted and not seen.runs
+        self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
+        return not refusal and not seen.runs and not self._again
+
+    async def _await_status(
+        self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float
+    ) -> None:
+        deadline = time.monotonic() + timeout
+        while not wanted(await self._inverter.look(priority)):
+            if time.monotonic() > deadline:
+                raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
+            await self._bus.sleep(_LOOK_PERIOD)
+
+    def _why_disarmed(self, seen: InverterStatus) -> str:
+        control_mode = self._inverter.control_mode
+        if control_mode != self._setpoint.control_mode:
+            return f'the control mode was changed to {control_mode}'
+        if seen.faulted:
+            fault = self._inverter.model.inv_st(seen.code)
+            return f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}'
+        if not seen.from_bus:
+            by = 'keypad or terminals' if seen.code in LOCAL else 'somebody else'
+            return f'{by} took control ({self._inverter.describe()})'
+        if not seen.runs:
+            return f'the drive stopped by itself, RUN input lost? ({self._inverter.describe()})'
+        return ''
+
+    def _tell(self, severity: Severity, text: str) -> None:
+        self._inverter.tell(severity, text)

@@ -1,0 +1,123 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Reads and writes the parameters of one drive by their catalog names, in engineering units."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+
+#: Parameters of different sizes that are safe to read at any time.
+_PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status')
+
+
+class Registers:
+    """
+    The parameters of one drive, for coroutines on the bus.
+
+    :param retries: how often a request that nobody answered is sent again.
+    """
+
+    def __init__(self, bus: Bus, unit: int, model: Model, retries: int) -> None:
+        self.model = model
+        self._bus = bus
+        self._unit = unit
+        self._retries = retries
+        self._protocol = Protocol.MODBUS
+        bus.use_probes(unit, tuple(self.address(key) for key in _PROBES))
+
+    def address(self, key: str) -> Address:
+        """Return where a parameter stands."""
+        place = self.model[key].place(self._protocol)
+        return Address(place.addresses, place.words)
+
+    def words(self, key: str, value: Value) -> Words:
+        """
+        Return the words to write for a value.
+
+        :raises ValueError: out of range, between two steps, or an unknown label.
+        """
+        return self.model[key].encode(value, self._protocol)
+
+    def nearest_words(self, key: str, value: float) -> Words:
+        """
+        Return the words of the drive's step nearest to a set-point.
+
+        :raises ValueError: out of range or not finite.
+        """
+        return self.model[key].quantise(value, self._protocol)
+
+    async def read(self, key: str, priority: Priority, *, once: bool = False) -> Value:
+        """
+        Read a parameter.
+
+        :param once: do not repeat the request when nobody answers.
+        :raises LinkError: as the link does.
+        """
+        return (await self.read_at(key, priority, once=once))[0]
+
+    async def read_at(
+        self, key: str, priority: Priority, *, once: bool = False
+    ) -> tuple[Value, float]:
+        """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
+        parameter = self.model[key]
+        reply = await self._ask(self.address(key), priority, None, once)
+        return parameter.decode(reply.words, self._protocol), reply.arrived
+
+    async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
+        """Read a parameter that is a number."""
+        value = await self.read(key, priority, once=once)
+        assert not isinstance(value, str), key
+        return value
+
+    async def acknowledge(self, key: str, priority: Priority) -> None:
+        """Read a parameter whose reading acknowledges; once, because a person asked for it."""
+        assert self.model[key].access is Access.ACKNOWLEDGE, key
+        await self._ask(self.address(key), priority, None, once=True)
+
+    async def write(
+        self, key: str, value: Value, priority: Priority, *, once: bool = False
+    ) -> None:
+        """
+        Write a parameter.
+
+        :param once: do not repeat the request when nobody answers.
+        :raises LinkError: as the link does.
+        """
+        await self._ask(self.address(key), priority, self.words(key, value), once)
+
+    async def _ask(
+        self, address: Address, priority: Priority, words: Words | None, once: bool
+    ) -> Reply:
+        tries = 1 if once else 1 + self._retries
+        while True:
+            try:
+                if words is None:
+                    return await self._bus.read(self._unit, address, priority)
+                return await self._bus.write(self._unit, address, words, priority)
+            except (NoAnswer, DamagedAnswer):
+                tries -= 1
+                if not tries:
+                    raise
+                self._bus.note_retry()

@@ -1,0 +1,210 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The set-point of one drive: newest wins, clamped, watched for its age."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Slot
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.mode_scmd import SETPOINT_KEYS
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+#: An unchanged set-point is written again when the last write is this old, s.
+_REWRITE_PERIOD = 1.0
+#: The watch looks at least this often, so that a changed time-out takes effect, s.
+_WATCH_PERIOD = 0.25
+
+
+class Setpoint:
+    """
+    What the motor is to follow while the drive is armed.
+
+    :param refused: called when the drive refuses a set-point, with the reason.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        unit: int,
+        registers: Registers,
+        listener: Listener,
+        settings: Callable[[], DriveSettings],
+        refused: Callable[[str], None],
+    ) -> None:
+        self._bus = bus
+        self._unit = unit
+        self._registers = registers
+        self._listener = listener
+        self._settings = settings
+        self._refused = refused
+        self._slot = Slot(self._make, self._done)
+        #: The newest request and when it came in; written by any thread, at once.
+        self._request: tuple[float, float] = (NAN, -math.inf)
+        self.control_mode = ''
+        self._armed_at = math.inf
+        self._asked = 0.0
+        self._written: tuple[int, ...] = ()
+        self._written_at = 0.0
+        self._watch: Task | None = None
+        self._expired = False
+        self._waits_for_answer = False
+        self._clamp_told = False
+        #: What the drive was last given, in the unit of the control mode.
+        self.commanded = NAN
+        self.clamped = False
+
+    def request(self, value: float) -> None:
+        """
+        Ask for a set-point, from any thread; it counts only if the drive is armed.
+
+        :raises ValueError: not finite.
+        """
+        if not math.isfinite(value):
+            raise ValueError(f'a set-point of {value} is no number')
+        self._request = (value, time.monotonic())
+        if self.armed:
+            self._bus.request(self._slot)
+
+    @property
+    def armed(self) -> bool:
+        """The drive follows set-points."""
+        return self._armed_at < math.inf
+
+    @property
+    def age(self) -> float:
+        """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
+        at = self._request[1]
+        return time.monotonic() - at if at > self._armed_at else NAN
+
+    def arm(self, control_mode: str) -> None:
+        """Follow set-points that come in from now on; 0 stands in the drive."""
+        self.control_mode = control_mode
+        self._armed_at = time.monotonic()
+        self._written = self._registers.words(SETPOINT_KEYS[control_mode], 0)
+        self._written_at = self._armed_at
+        self.commanded = 0.0
+        self.clamped = False
+        self._expired = False
+        self._waits_for_answer = False
+        self._watch = self._bus.spawn(self._watch_age())
+
+    def disarm(self) -> None:
+        """Follow nothing any more."""
+        self._armed_at = math.inf
+        self.commanded = NAN
+        self.clamped = False
+        if self._watch is not None:
+            watch, self._watch = self._watch, None
+            self._bus.cancel(watch)
+
+    def answered(self) -> None:
+        """Take note that the drive answers; write what could not be written before."""
+        if self._waits_for_answer:
+            self._waits_for_answer = False
+            self._bus.request(self._slot)
+
+    def _limited(self, value: float) -> float:
+        parameter = self._registers.model[SETPOINT_KEYS[self.control_mode]]
+        assert parameter.maximum is not None, parameter.key
+        most = float(parameter.maximum)
+        if self._settings().setpoint_max:
+            most = min(most, self._settings().setpoint_max)
+        return max(-most, min(most, value))
+
+    def _make(self) -> Transfer | None:
+        value, at = self._request
+        if at <= self._armed_at or self._waits_for_answer:
+            return None
+        limited = self._limited(value)
+        self.clamped = limited != value
+        if self.clamped and not self._clamp_told:
+            self._tell(Severity.WARNING, f'set-point {value:g} is limited to {limited:g}')
+        self._clamp_told = self.clamped
+        if self._expired:
+            self._expired = False
+            self._tell(Severity.INFO, 'set-points arrive again')
+        key = SETPOINT_KEYS[self.control_mode]
+        words = self._registers.nearest_words(key, limited)
+        if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
+            return None
+        self._asked = limited
+        return self._bus.write(
+            self._unit, self._registers.address(key), words, Priority.SETPOINT
+        )
+
+    def _done(self, transfer: Transfer, error: LinkError | None) -> None:
+        if not self.armed:
+            return
+        if error is None:
+            assert transfer.words is not None
+            self._written = transfer.words
+            self._written_at = time.monotonic()
+            self.commanded = self._asked
+        elif isinstance(error, Refused):
+            self._refused(f'it refused set-point {self._asked:g}: {error}')
+        else:
+            # asking a silent drive again at once would starve its neighbours
+            self._waits_for_answer = True
+            self._written = ()
+
+    async def _watch_age(self) -> None:
+        while True:
+            timeout = self._settings().setpoint_timeout
+            last = max(self._request[1], self._armed_at)
+            left = last + timeout - time.monotonic() if timeout else math.inf
+            if left > 0 or self._expired:
+                await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
+            else:
+                await self._expire(timeout)
+
+    async def _expire(self, timeout: float) -> None:
+        if any(self._written) or not self._written:
+            self._tell(
+                Severity.WARNING,
+                f'no set-point for {timeout:g} s: the motor ramps to a stop '
+                'until the next one arrives',
+            )
+            key = SETPOINT_KEYS[self.control_mode]
+            before = self._request
+            try:
+                await self._registers.write(key, 0, Priority.STOP)
+            except Refused as error:
+                self._refused(f'it refused set-point 0: {error}')
+                return
+            except LinkError:
+                # the poll finds out whether the drive is lost; until then this is tried again
+                await self._bus.sleep(_WATCH_PERIOD)
+                return
+            if self._request is before:
+                self.commanded = 0.0
+            self._written = self._registers.words(key, 0)
+            self._written_at = time.monotonic()
+        self._expired = True
+
+    def _tell(self, severity: Severity, text: str) -> None:
+        self._listener.on_event(severity, text)

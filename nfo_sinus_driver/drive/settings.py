@@ -1,0 +1,91 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How one drive is to be treated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from nfo_sinus_driver.catalog import MODELS
+
+CONTROL_METHODS = ('mode_scmd', 'monitor')
+#: The control modes by the names that ``expected_control_mode`` takes.
+CONTROL_MODES = ('Freque', 'PI-Reg', 'Torque', 'Speed')
+
+_LONGEST_DRIVE_TIMEOUT = 25.0
+_MODBUS_ADDRESSES = range(1, 248)
+
+
+@dataclass(frozen=True)
+class DriveSettings:
+    """
+    How one drive is to be treated; the fields are the parameters of its node.
+
+    :ivar address: Modbus 1 to 247 [M0 §6.2.2].
+    :ivar poll_rate: Hz; 0 is as fast as the bus allows.
+    :ivar telemetry_rate: Hz; 0 turns telemetry off.
+    :ivar setpoint_timeout: s; 0 turns it off.
+    :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
+    :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are.
+    :raises ValueError: a field that makes no sense; the message says what would.
+    """
+
+    address: int = 1
+    model: str = 'sinus_g2'
+    control_method: str = 'mode_scmd'
+    poll_rate: float = 0.0
+    telemetry_rate: float = 2.0
+    setpoint_timeout: float = 2.5
+    setpoint_max: float = 0.0
+    expected_control_mode: str = ''
+    drive_timeout: float = 0.0
+    shutdown_timeout: float = 4.0
+    retries: int = 2
+
+    def __post_init__(self) -> None:
+        _one_of('model', self.model, MODELS)
+        _one_of('control_method', self.control_method, CONTROL_METHODS)
+        _one_of('expected_control_mode', self.expected_control_mode, ('', *CONTROL_MODES))
+        if self.address not in _MODBUS_ADDRESSES:
+            raise ValueError(f'address {self.address}: a Modbus drive has 1 to 247')
+        _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
+        _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
+        _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
+        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: the limit of the drive)')
+        _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
+        _between('drive_timeout', self.drive_timeout, 0, _LONGEST_DRIVE_TIMEOUT, 's (0: as it is)')
+        if 0 < self.drive_timeout < 1:
+            raise ValueError(
+                f'drive_timeout {self.drive_timeout:g} s: at least 1 s, '
+                'so that a repeated request does not stop the motor'
+            )
+        tenths = self.drive_timeout * 10
+        if abs(tenths - round(tenths)) > 1e-3:
+            raise ValueError(
+                f'drive_timeout {self.drive_timeout:g} s lies between two steps of the drive, '
+                f'{math.floor(tenths) / 10:g} and {math.ceil(tenths) / 10:g}'
+            )
+
+
+def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        shown = ', '.join(repr(choice) for choice in allowed)
+        raise ValueError(f'{name} {value!r}: choose one of {shown}')
+
+
+def _between(name: str, value: float, low: float, high: float, unit: str) -> None:
+    if not low <= value <= high:
+        raise ValueError(f'{name} {value:g}: allowed are {low:g} to {high:g} {unit}')

@@ -1,0 +1,155 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a drive tells the outside: immutable pictures of one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import enum
+import math
+from typing import Protocol
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.catalog import state_of
+from nfo_sinus_driver.catalog.inv_st import BUS_RUNNING
+from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
+
+NAN = math.nan
+
+#: States in which the output stage drives the motor [M0 table 16].
+_DRIVEN = frozenset(
+    (State.OPERATION_ENABLED, State.STOPPING, State.QUICK_STOP, State.FAULT_REACTION_ACTIVE)
+)
+
+
+class Severity(enum.Enum):
+    """How grave an event is; it becomes the level of a log line."""
+
+    INFO = 'info'
+    WARNING = 'warning'
+    ERROR = 'error'
+
+
+@dataclass(frozen=True)
+class InverterStatus:
+    """
+    What the drive's status word and its inverter status say at one moment.
+
+    :ivar at: when the answer arrived, s of ``time.monotonic``.
+    :ivar word: DriveStatus, the low 16 bits [C24].
+    :ivar code: the inverter status code, read without acknowledging.
+    """
+
+    at: float
+    word: int
+    code: int
+
+    @property
+    def status(self) -> Status:
+        """The bits of the status word."""
+        return Status(self.word)
+
+    @property
+    def state(self) -> State:
+        """The state of the generic state machine."""
+        return state_of(self.word)
+
+    @property
+    def faulted(self) -> bool:
+        """A fault stands, or waits for being acknowledged [M0 table 15]."""
+        return Status.FAULTED in self.status
+
+    @property
+    def from_bus(self) -> bool:
+        """The bus has control."""
+        return Status.CTRL_FROM_NET in self.status or self.code in BUS_RUNNING | BUS_STANDBY
+
+    @property
+    def runs(self) -> bool:
+        """The motor is driven and not on its way to a stop."""
+        if self.state is State.UNKNOWN:
+            return self.code in BUS_RUNNING
+        return self.state is State.OPERATION_ENABLED
+
+    @property
+    def driven(self) -> bool:
+        """The output stage drives the motor, be it only to a stop."""
+        if self.state is State.UNKNOWN:
+            return self.code in BUS_RUNNING
+        return self.state in _DRIVEN
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """
+    One poll of a drive; NaN where nothing was measured.
+
+    :ivar at: when the status arrived, s of ``time.monotonic``.
+    :ivar status: ``None`` while the drive is not connected.
+    :ivar control_mode: the manual's label, ``''`` while unknown.
+    :ivar unit: of ``setpoint`` and ``actual``.
+    :ivar setpoint: what the drive was last given, NaN while it was given none.
+    :ivar setpoint_age: s since the newest valid set-point came in; NaN if none did.
+    :ivar frequency: Hz.
+    :ivar speed: rpm.
+    :ivar text: the inverter status as on the display.
+    :ivar kind: its kind; the fault bit has the last word [C95].
+    """
+
+    at: float
+    connected: bool
+    enabled: bool
+    control_method: str
+    status: InverterStatus | None = None
+    control_mode: str = ''
+    unit: str = ''
+    setpoint: float = NAN
+    setpoint_age: float = NAN
+    setpoint_clamped: bool = False
+    actual: float = NAN
+    frequency: float = NAN
+    speed: float = NAN
+    text: str = ''
+    description: str = ''
+    remedy: str = ''
+    kind: Kind = Kind.STATUS
+    requires_ack: bool = False
+
+
+@dataclass(frozen=True)
+class Telemetry:
+    """
+    Measured values by catalog key, NaN where the drive has none, and when the last one arrived.
+
+    :ivar at: s of ``time.monotonic``.
+    """
+
+    at: float
+    values: dict[str, float]
+
+
+class Listener(Protocol):
+    """Who wants to know; called by the bus worker, so it must not keep it waiting."""
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        """Take the result of a poll."""
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Take measured values."""
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        """Take a line for the log."""

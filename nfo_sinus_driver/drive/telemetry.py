@@ -1,0 +1,91 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Measured values beside the status: some often, the slow ones in turn."""
+
+from __future__ import annotations
+
+from collections import deque
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Telemetry
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+#: Read every time.
+FAST = (
+    'status.u_rms',
+    'status.i_rms',
+    'status.p_out',
+    'status.pf',
+    'status.dc_link',
+    'status.frq_act',
+    'status.spd_act',
+    'status.trq_act',
+)
+#: Read one after the other, one each time, for they change slowly.
+SLOW = (
+    'status.m_temp',
+    'status.pt1000',
+    'status.op_time',
+    'status.rn_time',
+    'status.br_time',
+    'status.e_out',
+    'status.sigma_e_out',
+)
+
+#: How often the settings are looked at while telemetry is turned off, s.
+_OFF_PERIOD = 0.5
+
+
+async def watch_telemetry(
+    bus: Bus, inverter: Inverter, registers: Registers, listener: Listener
+) -> None:
+    """Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN."""
+    values = dict.fromkeys((*FAST, *SLOW), NAN)
+    missing = {key for key in values if not inverter.has(key)}
+    # the first time all are read, so that the first message is whole
+    due = deque(SLOW)
+    first = True
+
+    async def measure(key: str) -> None:
+        if key in missing:
+            return
+        try:
+            values[key] = await registers.read_number(key, Priority.TELEMETRY, once=True)
+        except Refused:
+            values[key] = NAN
+            missing.add(key)
+
+    while True:
+        started = time.monotonic()
+        rate = inverter.settings.telemetry_rate
+        if rate and inverter.connected:
+            try:
+                for key in (*FAST, *due) if first else (*FAST, due[0]):
+                    await measure(key)
+                due.rotate(-1)
+                first = False
+                listener.on_telemetry(Telemetry(time.monotonic(), dict(values)))
+            except LinkError:
+                # the poll says so if the drive is lost
+                values.update(dict.fromkeys(FAST, NAN))
+        period = 1 / rate if rate else _OFF_PERIOD
+        await bus.sleep(period - (time.monotonic() - started))

@@ -1,0 +1,88 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What can go wrong on a line, and whether the request may have been carried out all the same."""
+
+from __future__ import annotations
+
+
+class LinkError(Exception):
+    """
+    A transaction failed.
+
+    :ivar maybe_done: the drive may have carried the request out. False only where it cannot have.
+    """
+
+    maybe_done = False
+
+
+class PortError(LinkError):
+    """The port cannot be opened or was lost; the message says what to do."""
+
+
+class NoAnswer(LinkError):
+    """Nobody answered in time."""
+
+    maybe_done = True
+
+
+class DamagedAnswer(LinkError):
+    """Something came, but no answer to this request: noise, a collision or wrong line settings."""
+
+    maybe_done = True
+
+
+class Refused(LinkError):
+    """
+    The drive answered that it will not.
+
+    :ivar code: the Modbus exception code.
+    """
+
+    ILLEGAL_FUNCTION = 1
+    ILLEGAL_ADDRESS = 2
+    ILLEGAL_VALUE = 3
+    DEVICE_FAILURE = 4
+
+    def __init__(self, code: int) -> None:
+        self.code = code
+        text = _REFUSALS.get(code, 'the drive refused')
+        super().__init__(f'{text} (exception {code})')
+
+
+_REFUSALS = {
+    Refused.ILLEGAL_FUNCTION: 'the drive does not know this function',
+    Refused.ILLEGAL_ADDRESS: 'the drive has no such parameter',
+    Refused.ILLEGAL_VALUE: 'the drive does not accept this value',
+    Refused.DEVICE_FAILURE: 'the drive cannot do this in its present state',
+    5: 'the drive needs more time',
+    6: 'the drive is busy',
+    8: 'the drive found a memory error',
+    10: 'the gateway has no path to the drive',
+    11: 'the gateway got no answer from the drive',
+}
+
+
+class NotReady(LinkError):
+    """
+    This unit must be left alone for a while, lest a late answer be taken for the right one.
+
+    Nothing was sent.
+
+    :ivar until: when it may be asked again, in seconds of ``time.monotonic``.
+    """
+
+    def __init__(self, until: float) -> None:
+        self.until = until
+        super().__init__('answers to earlier requests may still be on their way')

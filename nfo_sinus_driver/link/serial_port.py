@@ -1,0 +1,230 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A serial port as a raw descriptor: opened for us alone, set as asked, read without delay."""
+
+from __future__ import annotations
+
+import array
+import errno
+import fcntl
+import os
+import select
+import struct
+import termios
+import time
+
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.settings import LineSettings
+
+# Linux ioctls that Python's termios module does not name
+_TIOCGSERIAL = 0x541E
+_TIOCSSERIAL = 0x541F
+_TIOCGRS485 = 0x542E
+_TIOCSRS485 = 0x542F
+_ASYNC_LOW_LATENCY = 1 << 13
+_SER_RS485_ENABLED = 1 << 0
+_SER_RS485_RTS_ON_SEND = 1 << 1
+#: Of struct serial_struct: the flags are its fifth int.
+_SERIAL_STRUCT_INTS = 20
+_SERIAL_FLAGS = 4
+_RS485_STRUCT_INTS = 8
+#: Device numbers of pseudo-terminals, which have no parity and no baud rate to set.
+_PTY_MAJORS = range(136, 144)
+
+_READ_SIZE = 512
+
+
+class SerialPort:
+    """One serial port, non-blocking."""
+
+    def __init__(self, path: str, settings: LineSettings) -> None:
+        self._path = path
+        self._settings = settings
+        self._fd: int | None = None
+
+    def open(self) -> None:
+        """
+        Open the port, lock it and set it.
+
+        :raises PortError: absent, not permitted, in use, or unable to do the settings.
+        """
+        fd = _open_device(self._path)
+        try:
+            self._lock(fd)
+            self._configure(fd)
+            _prefer_low_latency(fd)
+            if self._settings.rs485:
+                _switch_transmitter_by_port(fd)
+            termios.tcflush(fd, termios.TCIOFLUSH)
+        except BaseException:
+            os.close(fd)
+            raise
+        self._fd = fd
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        fd, self._fd = self._fd, None
+        if fd is not None:
+            os.close(fd)
+
+    def write(self, data: bytes) -> None:
+        """
+        Hand all bytes to the port.
+
+        :raises PortError: the port is gone.
+        """
+        fd = self._descriptor()
+        deadline = time.monotonic() + 1.0
+        try:
+            while data:
+                data = data[self._write_some(fd, data) :]
+                if data and not select.select((), (fd,), (), deadline - time.monotonic())[1]:
+                    raise PortError(f'{self._path} takes no more bytes: is the adapter stuck?')
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def read(self, until: float) -> bytes:
+        """
+        Return what has come; wait for the first byte until ``until`` (``time.monotonic``).
+
+        :returns: at least one byte, or none when the time is over.
+        :raises PortError: the port is gone.
+        """
+        fd = self._descriptor()
+        wait = max(0.0, until - time.monotonic())
+        try:
+            if not select.select((fd,), (), (), wait)[0]:
+                return b''
+            data = os.read(fd, _READ_SIZE)
+        except BlockingIOError:
+            return b''
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost(OSError(errno.EIO, 'end of file'))
+        return data
+
+    @staticmethod
+    def _write_some(fd: int, data: bytes) -> int:
+        try:
+            return os.write(fd, data)
+        except BlockingIOError:
+            return 0
+
+    def _descriptor(self) -> int:
+        if self._fd is None:
+            raise PortError(f'{self._path} is not open')
+        return self._fd
+
+    def _lost(self, error: OSError) -> PortError:
+        return PortError(f'{self._path} was lost ({error.strerror}): is the adapter unplugged?')
+
+    def _lock(self, fd: int) -> None:
+        try:
+            # flock is what pyserial and other masters look at; TIOCEXCL stops those that do not
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise _busy(self._path) from None
+        fcntl.ioctl(fd, termios.TIOCEXCL)
+
+    def _configure(self, fd: int) -> None:
+        settings = self._settings
+        rate = getattr(termios, f'B{settings.baud_rate}')
+        cflag = termios.CREAD | termios.CLOCAL
+        cflag |= termios.CS7 if settings.data_bits == 7 else termios.CS8
+        if settings.parity != 'N':
+            cflag |= termios.PARENB
+        if settings.parity == 'O':
+            cflag |= termios.PARODD
+        if settings.stop_bits == 2:
+            cflag |= termios.CSTOPB
+        # a byte with wrong parity is dropped, so that the frame is too short to be believed
+        iflag = termios.INPCK | termios.IGNPAR if settings.parity != 'N' else 0
+        cc = termios.tcgetattr(fd)[6]
+        cc[termios.VMIN] = 0
+        cc[termios.VTIME] = 0
+        try:
+            termios.tcsetattr(fd, termios.TCSANOW, [iflag, 0, cflag, 0, rate, rate, cc])
+        except termios.error as error:
+            # the C library compares what it set with what it got, and a pseudo-terminal has
+            # neither parity nor seven bits
+            if not _is_pty(fd):
+                raise PortError(
+                    f'{self._path} cannot do {settings.baud_rate} bit/s {settings.char_format} '
+                    f'({error.args[-1]}): choose a rate and format that the adapter has'
+                ) from error
+
+
+def _open_device(path: str) -> int:
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except FileNotFoundError:
+        raise PortError(
+            f'{path} does not exist: is the adapter plugged in? '
+            f'Ports there are: {", ".join(_ports()) or "none"}'
+        ) from None
+    except PermissionError:
+        raise PortError(
+            f'no permission to use {path}: add yourself to its group '
+            '(often: sudo usermod -aG dialout $USER, then log in again)'
+        ) from None
+    except OSError as error:
+        if error.errno == errno.EBUSY:
+            raise _busy(path) from None
+        raise PortError(f'{path} cannot be opened: {error.strerror}') from error
+    if not os.isatty(fd):
+        os.close(fd)
+        raise PortError(f'{path} is not a serial port')
+    return fd
+
+
+def _busy(path: str) -> PortError:
+    return PortError(f'{path} is in use by another process: stop that one first')
+
+
+def _ports() -> list[str]:
+    by_id = '/dev/serial/by-id'
+    names = [f'{by_id}/{name}' for name in os.listdir(by_id)] if os.path.isdir(by_id) else []
+    prefixes = ('ttyUSB', 'ttyACM', 'ttyAMA')
+    names += [f'/dev/{name}' for name in os.listdir('/dev') if name.startswith(prefixes)]
+    return sorted(names)
+
+
+def _is_pty(fd: int) -> bool:
+    return os.major(os.fstat(fd).st_rdev) in _PTY_MAJORS
+
+
+def _prefer_low_latency(fd: int) -> None:
+    """Ask for answers without delay; without it an FTDI adapter holds them back for 16 ms."""
+    settings = array.array('i', [0] * _SERIAL_STRUCT_INTS)
+    try:
+        fcntl.ioctl(fd, _TIOCGSERIAL, settings)
+        settings[_SERIAL_FLAGS] |= _ASYNC_LOW_LATENCY
+        fcntl.ioctl(fd, _TIOCSSERIAL, settings)
+    except OSError:
+        # best effort: pseudo-terminals and some adapters do not know it
+        return
+
+
+def _switch_transmitter_by_port(fd: int) -> None:
+    """Let the port's driver switch the RS-485 transmitter with RTS, if it can."""
+    settings = array.array('I', struct.unpack('8I', bytes(4 * _RS485_STRUCT_INTS)))
+    try:
+        fcntl.ioctl(fd, _TIOCGRS485, settings)
+        settings[0] |= _SER_RS485_ENABLED | _SER_RS485_RTS_ON_SEND
+        fcntl.ioctl(fd, _TIOCSRS485, settings)
+    except OSError:
+        # best effort: most adapters switch by themselves and do not know it
+        return

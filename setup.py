@@ -1,0 +1,58 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from pathlib import Path
+
+from setuptools import find_packages
+from setuptools import setup
+
+NAME = 'nfo_sinus_driver'
+
+
+def share(*folders):
+    """Return what the folders hold, at any depth, as data files of the package's share folder."""
+    found = {}
+    for folder in folders:
+        for path in sorted(Path(folder).rglob('*')):
+            if path.is_file() and '__pycache__' not in path.parts:
+                found.setdefault(f'share/{NAME}/{path.parent}', []).append(str(path))
+    return list(found.items())
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['catalog/*.csv']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        *share('config', 'launch'),
+    ],
+    python_requires='>=3.10',
+    install_requires=['setuptools'],
+    # What it needs at run time stands in package.xml, under the names that rosdep knows.
+    extras_require={'test': ['hypothesis', 'pytest']},
+    zip_safe=False,
+    maintainer='NFO Sinus driver developers',
+    maintainer_email='nfo-sinus-driver@example.org',
+    description='Driver for NFO Sinus inverters on a serial bus',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            f'driver = {NAME}.node.main:main',
+            f'simulator = {NAME}.simulator.main:main',
+        ],
+    },
+)
