@@ -137,7 +137,7 @@ class Task:
                 awaited = self._coroutine.send(value)
         except StopIteration as end:
             self.future.set_result(end.value)
-        except BaseException as failure:  # noqa: BLE001 - nothing may end the worker
+        except BaseException as failure:
             self.future.set_exception(failure)
         else:
             assert isinstance(awaited, (Transfer, _Pause))

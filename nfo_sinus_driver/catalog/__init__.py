@@ -16,11 +16,11 @@
 
 from nfo_sinus_driver.catalog.inv_st import InvStCode
 from nfo_sinus_driver.catalog.inv_st import Kind
+from nfo_sinus_driver.catalog.model import MODELS
 from nfo_sinus_driver.catalog.model import Model
 from nfo_sinus_driver.catalog.model import load_model
-from nfo_sinus_driver.catalog.model import MODELS
-from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import DEFAULT_SCALING
+from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Place
 from nfo_sinus_driver.catalog.parameter import Protocol

@@ -84,7 +84,7 @@ class Model(Mapping[str, Parameter]):
         return entry.old_text if old else entry.text
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def load_model(name: str) -> Model:
     """
     Read and check the tables of one drive family.

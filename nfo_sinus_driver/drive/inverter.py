@@ -76,8 +76,11 @@ class Inverter:
         code = await self._registers.read_number('fieldbus.inv_st', priority)
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
-        self.seen = InverterStatus(at, word & 0xFFFF, int(code))
-        return self.seen
+        seen = InverterStatus(at, word & 0xFFFF, int(code))
+        # a look of low priority may be overtaken by one that began later
+        if self.seen is None or seen.at >= self.seen.at:
+            self.seen = seen
+        return seen
 
     async def identify(self) -> Identity:
         """

@@ -75,6 +75,8 @@ class Motion:
         self._again = False
         self._held_by_fault = False
         self._unconfirmed = ''
+        #: When the run command was last given or taken back: an older status says nothing.
+        self._changed_at = 0.0
 
     @property
     def armed(self) -> bool:
@@ -209,6 +211,8 @@ class Motion:
     def watch(self, seen: InverterStatus) -> None:
         """Judge what the drive says about itself."""
         self._setpoint.answered()
+        if seen.at < self._changed_at:
+            return
         if self.armed:
             reason = self._why_disarmed(seen)
             if reason:
@@ -253,6 +257,7 @@ class Motion:
         await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.run()
         await self._await_run()
+        self._changed_at = time.monotonic()
         self._setpoint.arm(control_mode)
 
     async def _await_run(self) -> None:
@@ -315,6 +320,7 @@ class Motion:
                 await self._bus.sleep(_RETRY_PERIOD if connected else _LOST_RETRY_PERIOD)
         self._withdrawal = None
         self._held_by_fault = False
+        self._changed_at = time.monotonic()
 
     async def _withdrawn(self) -> bool:
         """Try once; true when the drive took it and says that it stops."""

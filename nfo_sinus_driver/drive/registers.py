@@ -89,7 +89,7 @@ class Registers:
         """Read a parameter that is a number."""
         value = await self.read(key, priority, once=once)
         assert not isinstance(value, str), key
-        return value
+        return float(value)
 
     async def acknowledge(self, key: str, priority: Priority) -> None:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""

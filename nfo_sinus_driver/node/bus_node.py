@@ -1,0 +1,105 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of the bus: its settings, its statistics, its diagnostics."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray
+from nfo_sinus_msgs.msg import BusStatistics
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock import ClockType
+from rclpy.node import Node
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.link import LineSettings
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.node import diagnostics
+from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.node.line import Line
+from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.settings import BUS_SETTINGS
+from nfo_sinus_driver.node.settings import declare
+
+#: The factory settings of the drive for Modbus RTU [M0 §6.2.2].
+_FACTORY_BAUD_RATE = 19200
+_FACTORY_FORMAT = '8E1'
+_PERIOD = 1.0
+
+NAME = 'nfo_sinus_bus'
+
+
+class BusNode(Node):
+    """
+    The node of one bus.
+
+    :raises ValueError: a setting makes no sense; the message says what would.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        values = declare(self, BUS_SETTINGS)
+        settings = LineSettings(
+            baud_rate=values['baud_rate'] or _FACTORY_BAUD_RATE,
+            char_format=values['char_format'] or _FACTORY_FORMAT,
+            response_timeout=values['response_timeout'],
+            rs485=values['rs485'],
+        )
+        self.drive_names: list[str] = list(values['drives'])
+        self._port: str = values['port']
+        link = open_link(values['protocol'], self._port, settings)
+        self.line = Line(Bus(link), Outbox(), values['retries'])
+        self._told_port: str | None = ''
+        self._last_diagnosis: tuple[bytes, str] | None = None
+        self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
+        self.create_timer(
+            _PERIOD,
+            lambda: self.line.outbox.put(self._tell),
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+
+    def start(self) -> None:
+        """Open the port and begin to tell."""
+        self.line.outbox.start()
+        self.line.bus.start()
+
+    def _tell(self) -> None:
+        statistics = self.line.bus.statistics()
+        silent = [
+            node.get_name()
+            for node in self.line.drives
+            if node.state != 'unconfigured' and not node.drive.snapshot.connected
+        ]
+        stamp = self.get_clock().now().to_msg()
+        self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
+        error = self.line.bus.port_error
+        status = diagnostics.bus_status(
+            self.get_name(), self._port, statistics, error, silent
+        )
+        self._diagnostics.publish(diagnostics.array(status, stamp))
+        self._log_port(None if error is None else str(error))
+
+    def _log_port(self, error: str | None) -> None:
+        """Say what the port does, on change."""
+        if error == self._told_port:
+            return
+        self._told_port = error
+        if error is None:
+            self.get_logger().info(f'{self._port} is open')
+        else:
+            self.get_logger().error(f'{error}; trying again for ever')

@@ -1,0 +1,117 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Diagnostics as REP-107 has them: once a second and on change, never used to stop anything."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
+from std_msgs.msg import Header
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.statistics import Statistics
+
+_LEVELS = {
+    Kind.STATUS: DiagnosticStatus.OK,
+    Kind.ALARM: DiagnosticStatus.WARN,
+    Kind.FAULT: DiagnosticStatus.ERROR,
+}
+
+
+def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
+    """Wrap one status for ``/diagnostics``."""
+    return DiagnosticArray(header=Header(stamp=stamp), status=[status])
+
+
+def drive_status(
+    name: str,
+    snapshot: Snapshot,
+    *,
+    lifecycle_state: str,
+    address: int,
+    firmware: str,
+    stop_unconfirmed: bool,
+) -> DiagnosticStatus:
+    """Return how one drive is doing."""
+    if stop_unconfirmed:
+        level, message = DiagnosticStatus.ERROR, 'the stop is NOT confirmed'
+    elif not snapshot.connected:
+        # a node that nobody configured has nothing to complain about
+        waiting = lifecycle_state == 'unconfigured'
+        level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
+        message = 'not connected'
+    else:
+        level = _LEVELS[snapshot.kind]
+        message = snapshot.text
+        if snapshot.kind is not Kind.STATUS:
+            message = f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
+    code = '' if snapshot.status is None else str(snapshot.status.code)
+    values = {
+        'lifecycle state': lifecycle_state,
+        'address': str(address),
+        'firmware': firmware,
+        'inverter status': f'{code} {snapshot.text}'.strip(),
+        'control method': snapshot.control_method,
+        'control mode': snapshot.control_mode,
+        'enabled': str(snapshot.enabled),
+        'setpoint': f'{snapshot.setpoint:g} {snapshot.unit}'.strip(),
+        'actual': f'{snapshot.actual:g} {snapshot.unit}'.strip(),
+    }
+    return _status(level, f'{name}: drive', message, '', values)
+
+
+def bus_status(
+    name: str,
+    port: str,
+    statistics: Statistics,
+    port_error: PortError | None,
+    silent_drives: list[str],
+) -> DiagnosticStatus:
+    """Return how the line is doing."""
+    if port_error is not None:
+        level, message = DiagnosticStatus.ERROR, str(port_error)
+    elif silent_drives:
+        level, message = DiagnosticStatus.WARN, f'silent: {", ".join(silent_drives)}'
+    else:
+        level, message = DiagnosticStatus.OK, 'all drives answer'
+    values = {
+        'port': port,
+        'utilisation': f'{100 * statistics.utilisation:.0f} %',
+        'cycle time': f'{1000 * statistics.cycle_time:.1f} ms',
+        'transactions': str(statistics.transactions),
+        'timeouts': str(statistics.timeouts),
+        'damaged': str(statistics.damaged),
+        'refused': str(statistics.refused),
+        'retries': str(statistics.retries),
+        'reconnects': str(statistics.reconnects),
+        'round trip p99': f'{1000 * statistics.round_trip_p99:.1f} ms',
+    }
+    return _status(level, f'{name}: line', message, port, values)
+
+
+def _status(
+    level: bytes, name: str, message: str, hardware_id: str, values: dict[str, str]
+) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=level,
+        name=name,
+        message=message,
+        hardware_id=hardware_id,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )

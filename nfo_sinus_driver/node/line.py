@@ -1,0 +1,77 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the nodes of one process share: the bus, the outbox, and who is who."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from dataclasses import field
+from typing import TYPE_CHECKING
+
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import HistoryPolicy
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.node.outbox import Outbox
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: For what flows: status, actual values, telemetry, statistics.
+RELIABLE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=10,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+#: For what changes rarely and late comers want to know.
+LATCHED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+#: For set-points: only the newest counts, and every publisher matches.
+NEWEST = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
+
+@dataclass
+class Line:
+    """
+    One bus and the nodes on it.
+
+    :ivar retries: how often a request that nobody answered is repeated.
+    """
+
+    bus: Bus
+    outbox: Outbox
+    retries: int
+    drives: list[DriveNode] = field(default_factory=list)
+
+    def say(self, log: Callable[[str], object], text: str) -> None:
+        """Log a line from the outbox, for the bus must not wait for a log."""
+        self.outbox.put(lambda: log(text))
+
+    def owner_of(self, address: int) -> DriveNode | None:
+        """Return the node whose drive has an address."""
+        return next((node for node in self.drives if node.settings.address == address), None)

@@ -1,0 +1,207 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The driver process: one bus node and a managed node for each drive.
+
+It owns its signals, so that ROS is still there when the motors are being stopped.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import logging
+import signal
+import sys
+import threading
+import time
+
+import rclpy
+from rclpy.exceptions import InvalidNodeNameException
+from rclpy.exceptions import ParameterException
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_node_name import validate_node_name
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.arguments import take_out_node_name
+from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
+_GROUPS_OF_A_DRIVE = 7
+_GROUPS_OF_THE_BUS = 3
+#: With many threads and a busy one among them, this keeps the bus on time, s.
+_SWITCH_INTERVAL = 0.0002
+_POLL_SIGNALS = 0.5
+
+#: Signals that end a process, as far as they can be caught. Those of the keyboard and of job
+#: control that would only suspend it are caught too: a suspended driver would leave the motor on.
+_SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))
+_ENDING = frozenset(
+    (
+        signal.SIGINT,
+        signal.SIGTERM,
+        signal.SIGHUP,
+        signal.SIGQUIT,
+        signal.SIGUSR1,
+        signal.SIGUSR2,
+        signal.SIGALRM,
+        signal.SIGVTALRM,
+        signal.SIGPROF,
+        signal.SIGXCPU,
+        signal.SIGPOLL,
+        signal.SIGPWR,
+    )
+)
+
+_log = logging.getLogger(__name__)
+
+
+class DriverProcess:
+    """The nodes of one bus, spun until somebody ends them."""
+
+    def __init__(self, single_name: str | None) -> None:
+        self._bus_node = BusNode()
+        names = self._bus_node.drive_names
+        if single_name is not None:
+            names = _renamed(names, single_name)
+        _check_names(names)
+        line = self._bus_node.line
+        for name in names:
+            line.drives.append(DriveNode(name, line))
+        self._drives = line.drives
+        threads = _GROUPS_OF_A_DRIVE * len(names) + _GROUPS_OF_THE_BUS
+        self._executor = MultiThreadedExecutor(threads)
+        for node in (self._bus_node, *self._drives):
+            self._executor.add_node(node)
+        self._spinning = True
+        self._thread = threading.Thread(target=self._spin, name='executor', daemon=True)
+
+    def start(self) -> None:
+        """Open the port and let the nodes work."""
+        self._bus_node.start()
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        """The nodes still work."""
+        return self._thread.is_alive()
+
+    def stop(self) -> bool:
+        """
+        Stop the motors, give control back and end.
+
+        :returns: whether every drive confirmed that it stops.
+        """
+        confirmed = self._stop_motors()
+        self._bus_node.line.outbox.close()
+        self._spinning = False
+        self._executor.wake()
+        self._thread.join(1.0)
+        self._bus_node.line.bus.close()
+        return confirmed
+
+    def _spin(self) -> None:
+        while self._spinning:
+            try:
+                self._executor.spin_once(timeout_sec=1.0)
+            except Exception:
+                # a mistake in one callback must not take the others with it
+                _log.exception('error in a callback; the driver goes on')
+
+    def _stop_motors(self) -> bool:
+        connected = [node for node in self._drives if node.drive.identity is not None]
+        # all are told before the first is waited for
+        stops = [(node, node.drive.stop()) for node in connected if _may_run(node)]
+        unconfirmed = [node for node, future in stops if not _wait(node, future)]
+        releases = [
+            (node, node.drive.disconnect(node.settings.shutdown_timeout)) for node in connected
+        ]
+        unconfirmed += [node for node, future in releases if not _wait(node, future)]
+        return not unconfirmed
+
+
+def _may_run(node: DriveNode) -> bool:
+    status = node.drive.snapshot.status
+    return node.settings.control_method != 'monitor' and (status is None or status.from_bus)
+
+
+def _wait(node: DriveNode, future: Future[str]) -> bool:
+    """Wait for an answer for as long as the node's exit may last."""
+    deadline = time.monotonic() + node.settings.shutdown_timeout + 1.0
+    log = node.get_logger()
+    try:
+        log.info(future.result(max(0.0, deadline - time.monotonic())))
+    except (DriveError, FutureTimeoutError) as error:
+        log.error(str(error) or 'the drive did not confirm in time')
+        return False
+    return True
+
+
+def _renamed(names: list[str], single_name: str) -> list[str]:
+    if len(names) != 1:
+        raise ValueError(
+            f'a node name ({single_name}) was given to the whole process, but it has '
+            f'{len(names)} drives: name them by the parameter drives of nfo_sinus_bus instead'
+        )
+    return [single_name]
+
+
+def _check_names(names: list[str]) -> None:
+    if not names:
+        raise ValueError('drives names no drive: give at least one name')
+    for name in names:
+        validate_node_name(name)
+        if names.count(name) > 1:
+            raise ValueError(f'drives names {name} more than once: every drive needs its own name')
+        if name == 'nfo_sinus_bus':
+            raise ValueError('a drive cannot be named nfo_sinus_bus: that is the bus node')
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    # blocked before any thread exists, so that only the main thread ever sees them
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING | _SUSPENDING)
+    arguments, single_name = take_out_node_name(sys.argv if args is None else args)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        process = DriverProcess(single_name)
+    except (ParameterException, InvalidNodeNameException, ValueError) as error:
+        rclpy.logging.get_logger('nfo_sinus_driver').fatal(f'cannot start: {error}')
+        rclpy.shutdown()
+        return 2
+    process.start()
+    try:
+        _await_end(process)
+    finally:
+        confirmed = process.stop()
+        rclpy.shutdown()
+    return 0 if confirmed else 1
+
+
+def _await_end(process: DriverProcess) -> None:
+    log = rclpy.logging.get_logger('nfo_sinus_driver')
+    while process.alive:
+        caught = signal.sigtimedwait(_ENDING | _SUSPENDING, _POLL_SIGNALS)
+        if caught is None:
+            continue
+        name = signal.Signals(caught.si_signo).name
+        if caught.si_signo in _ENDING:
+            log.info(f'{name}: stopping the motors')
+            return
+        log.warning(f'{name} ignored: a suspended driver would leave the motors running')
+    log.error('the executor has ended by itself: stopping the motors')

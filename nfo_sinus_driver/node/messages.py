@@ -1,0 +1,176 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Turns what a drive and a line tell into messages."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from nfo_sinus_msgs.msg import BusStatistics
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
+from std_msgs.msg import Header
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.statistics import Statistics
+
+_CONTROL_METHODS = {
+    'mode_scmd': DriveStatus.MODE_SCMD,
+    'drive_control': DriveStatus.DRIVE_CONTROL,
+    'monitor': DriveStatus.MONITOR,
+}
+_CONTROL_MODES = {
+    'Freque': DriveStatus.FREQUE,
+    'PI-Reg': DriveStatus.PI_REG,
+    'Torque': DriveStatus.TORQUE,
+    'Speed': DriveStatus.SPEED,
+}
+_STATES = {state: getattr(DriveStatus, state.name) for state in State}
+_KINDS = {Kind.STATUS: InvSt.STATUS, Kind.ALARM: InvSt.ALARM, Kind.FAULT: InvSt.FAULT}
+
+#: What the G2's status word and inverter status tell; the rest it does not report ([M0 table 15],
+#: [C90]).
+_VALID = (
+    DriveStatus.VALID_READY
+    | DriveStatus.VALID_SWITCHED_ON
+    | DriveStatus.VALID_OPERATION_ENABLED
+    | DriveStatus.VALID_FAULT
+    | DriveStatus.VALID_ALARM
+    | DriveStatus.VALID_VOLTAGE_ENABLED
+    | DriveStatus.VALID_QUICK_STOP_ACTIVE
+    | DriveStatus.VALID_SWITCH_ON_DISABLED
+    | DriveStatus.VALID_NETWORK_REFERENCE
+    | DriveStatus.VALID_NETWORK_CONTROL
+    | DriveStatus.VALID_SETPOINT_REACHED
+    | DriveStatus.VALID_LIMIT_ACTIVE
+    | DriveStatus.VALID_REVERSE
+    | DriveStatus.VALID_STOPPING
+)
+
+#: The fields of Telemetry and where they come from.
+_TELEMETRY = {
+    'output_voltage': 'status.u_rms',
+    'output_current': 'status.i_rms',
+    'output_power': 'status.p_out',
+    'power_factor': 'status.pf',
+    'dc_link_voltage': 'status.dc_link',
+    'frequency': 'status.frq_act',
+    'speed': 'status.spd_act',
+    'torque': 'status.trq_act',
+    'motor_temperature': 'status.m_temp',
+    'pt1000_temperature': 'status.pt1000',
+    'operating_time': 'status.op_time',
+    'running_time': 'status.rn_time',
+    'brake_time': 'status.br_time',
+    'energy': 'status.e_out',
+    'total_energy': 'status.sigma_e_out',
+}
+
+
+def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
+    """Return the DriveStatus of a poll."""
+    message = DriveStatus(
+        header=Header(stamp=stamp, frame_id=frame_id),
+        connected=snapshot.connected,
+        enabled=snapshot.enabled,
+        control_method=_CONTROL_METHODS[snapshot.control_method],
+        control_mode=_CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
+        unit=snapshot.unit,
+        setpoint=snapshot.setpoint,
+        setpoint_age=snapshot.setpoint_age,
+        setpoint_clamped=snapshot.setpoint_clamped,
+        actual=snapshot.actual,
+        state=DriveStatus.UNKNOWN,
+    )
+    if snapshot.status is not None:
+        _fill_bits(message, snapshot.status, snapshot.kind)
+    return message
+
+
+def _fill_bits(message: DriveStatus, seen: InverterStatus, kind: Kind) -> None:
+    status = seen.status
+    state = seen.state
+    message.state = _STATES[state]
+    message.status_word = seen.word
+    message.valid = _VALID
+    message.ready = Status.READY_TO_SWITCH_ON in status
+    message.switched_on = Status.SWITCHED_ON in status
+    message.operation_enabled = bool(status & (Status.OP_ENABLED | Status.REV_OP_ENABLED))
+    message.fault = Status.FAULTED in status
+    message.alarm = kind is Kind.ALARM
+    message.voltage_enabled = Status.VOLTAGE_ENABLED in status
+    # bit 5 is undefined outside the driven states, so the state decides [M0 table 16]
+    message.quick_stop_active = state is State.QUICK_STOP
+    message.switch_on_disabled = Status.SWITCH_ON_DISABLED in status
+    message.network_reference = Status.REF_FROM_NET in status
+    message.network_control = Status.CTRL_FROM_NET in status
+    message.setpoint_reached = Status.SETPOINT_REACHED in status
+    message.limit_active = Status.LIMIT_ACTIVE in status
+    message.reverse = Status.REV_OP_ENABLED in status
+    message.stopping = Status.STOPPING in status
+
+
+def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
+    """
+    Return the InvSt of a poll.
+
+    :raises ValueError: the drive was not connected.
+    """
+    if snapshot.status is None:
+        raise ValueError('no inverter status without a connection')
+    return InvSt(
+        header=Header(stamp=stamp, frame_id=frame_id),
+        code=snapshot.status.code & 0xFF,
+        text=snapshot.text,
+        description=snapshot.description,
+        kind=_KINDS[snapshot.kind],
+        requires_ack=snapshot.requires_ack,
+        remedy=snapshot.remedy,
+    )
+
+
+def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessage:
+    """Return the Telemetry message of measured values."""
+    values = {field: measured.values.get(key, math.nan) for field, key in _TELEMETRY.items()}
+    return TelemetryMessage(header=Header(stamp=stamp, frame_id=frame_id), **values)
+
+
+def bus_statistics(
+    statistics: Statistics, silent_drives: list[str], stamp: Time
+) -> BusStatistics:
+    """Return the BusStatistics message of a line."""
+    return BusStatistics(
+        header=Header(stamp=stamp),
+        utilisation=statistics.utilisation,
+        cycle_time=statistics.cycle_time,
+        transactions=statistics.transactions,
+        timeouts=statistics.timeouts,
+        damaged=statistics.damaged,
+        refused=statistics.refused,
+        retries=statistics.retries,
+        reconnects=statistics.reconnects,
+        round_trip_min=statistics.round_trip_min,
+        round_trip_mean=statistics.round_trip_mean,
+        round_trip_p99=statistics.round_trip_p99,
+        round_trip_max=statistics.round_trip_max,
+        silent_drives=silent_drives,
+    )

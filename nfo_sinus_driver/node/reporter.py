@@ -1,0 +1,161 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tells ROS what a drive tells: topics, diagnostics and log lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from std_msgs.msg import Float32
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.node import diagnostics
+from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.line import LATCHED
+from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.node.line import Line
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: How often diagnostics go out and, while the drive is not connected, the status, s.
+_PERIOD = 1.0
+
+
+class Reporter:
+    """
+    The listener of one drive.
+
+    Its ``on_…`` methods are called by the bus and only put something into the outbox; everything
+    else runs on the outbox's thread.
+    """
+
+    def __init__(self, node: DriveNode, line: Line) -> None:
+        self._node = node
+        self._line = line
+        self._log = node.get_logger()
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._drive: Callable[[], Drive] | None = None
+        self._last_inv_st: tuple[int, Kind] | None = None
+        self._last_diagnosis: tuple[bytes, str] | None = None
+        create = node.create_lifecycle_publisher
+        # these flow from the start, whatever the lifecycle says
+        self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
+        self._inv_st = node.create_publisher(InvSt, '~/inv_st', LATCHED)
+        self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
+        self._speed = create(Float32, '~/actual_speed', RELIABLE)
+        self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
+        self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
+
+    def start(self, drive: Callable[[], Drive]) -> None:
+        """Begin with what is told once a second."""
+        self._drive = drive
+        self._node.create_timer(
+            _PERIOD,
+            lambda: self._line.outbox.put(self._tell_regularly),
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            clock=self._steady,
+        )
+
+    # --- called by the bus --------------------------------------------------------------------
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        """Publish a poll."""
+        self._line.outbox.put(lambda: self._tell_snapshot(snapshot))
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Publish measured values."""
+        self._line.outbox.put(lambda: self._tell_telemetry(telemetry))
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        """Log a line."""
+        # one call site for each level: rclpy forbids another level at the same place
+        if severity is Severity.ERROR:
+            self._line.outbox.put(lambda: self._log.error(text))
+        elif severity is Severity.WARNING:
+            self._line.outbox.put(lambda: self._log.warning(text))
+        else:
+            self._line.outbox.put(lambda: self._log.info(text))
+
+    # --- on the outbox's thread ---------------------------------------------------------------
+
+    def _stamp(self, at: float) -> Time:
+        """Return the node's time of a moment of ``time.monotonic``."""
+        age = self._steady.now().nanoseconds - round(at * 1e9)
+        stamp: Time = (self._node.get_clock().now() - Duration(nanoseconds=age)).to_msg()
+        return stamp
+
+    def _frame_id(self) -> str:
+        frame_id: str = self._node.get_parameter('frame_id').value
+        return frame_id
+
+    def _tell_snapshot(self, snapshot: Snapshot) -> None:
+        stamp = self._stamp(snapshot.at)
+        frame_id = self._frame_id()
+        self._status.publish(messages.drive_status(snapshot, stamp, frame_id))
+        self._diagnose(snapshot, on_change=True)
+        if snapshot.status is None:
+            return
+        self._frequency.publish(Float32(data=snapshot.frequency))
+        self._speed.publish(Float32(data=snapshot.speed))
+        inv_st = (snapshot.status.code, snapshot.kind)
+        if inv_st != self._last_inv_st:
+            self._last_inv_st = inv_st
+            self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
+
+    def _tell_telemetry(self, telemetry: Telemetry) -> None:
+        stamp = self._stamp(telemetry.at)
+        self._telemetry.publish(messages.telemetry(telemetry, stamp, self._frame_id()))
+
+    def _tell_regularly(self) -> None:
+        assert self._drive is not None
+        snapshot = self._drive().snapshot
+        if not snapshot.connected:
+            now = self._steady.now().nanoseconds / 1e9
+            stamp = self._stamp(now)
+            self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id()))
+        self._diagnose(snapshot, on_change=False)
+
+    def _diagnose(self, snapshot: Snapshot, *, on_change: bool) -> None:
+        assert self._drive is not None
+        drive = self._drive()
+        status = diagnostics.drive_status(
+            self._node.get_name(),
+            snapshot,
+            lifecycle_state=self._node.state,
+            address=drive.settings.address,
+            firmware=str(drive.identity or ''),
+            stop_unconfirmed=drive.stop_unconfirmed,
+        )
+        diagnosis = (status.level, status.message)
+        if on_change and diagnosis == self._last_diagnosis:
+            return
+        self._last_diagnosis = diagnosis
+        stamp = self._node.get_clock().now().to_msg()
+        self._diagnostics.publish(diagnostics.array(status, stamp))
