@@ -66,5 +66,5 @@ build: ## build both packages again
 	@tools/setup
 
 clean: ## remove all that was set up, built or cached
-	rm -rf .venv build install log .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv/stamps .venv build install log .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the manuals say: tables and pure functions on them. No I/O but reading the tables, no ROS."""
+"""What the manuals say: tables and pure functions on them. No I/O beyond that, no ROS."""
 
 from nfo_sinus_driver.catalog.inv_st import InvStCode
 from nfo_sinus_driver.catalog.inv_st import Kind

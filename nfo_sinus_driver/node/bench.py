@@ -1,0 +1,103 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Starts a simulated drive and the driver for it: what ``make run`` and ``make demo`` share."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+from typing import IO
+
+_SIMULATOR = (sys.executable, '-m', 'nfo_sinus_driver.simulator')
+_DRIVER = (sys.executable, '-m', 'nfo_sinus_driver.node')
+
+BAUD_RATE = 57600
+
+
+class Bench(contextlib.ExitStack):
+    """
+    A simulated drive on a pseudo-terminal and a driver for it, each a process of its own.
+
+    :param log: where both write what they say; ``None``: to our own output.
+    """
+
+    def __init__(self, log: IO[bytes] | None = None) -> None:
+        super().__init__()
+        folder = self.enter_context(tempfile.TemporaryDirectory(prefix='nfo_sinus_'))
+        self.port = str(Path(folder) / 'line')
+        self._log = log
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def start_simulator(self) -> str:
+        """
+        Start the simulated drive, and wait until it serves its port.
+
+        :returns: what it says of itself.
+        :raises RuntimeError: it does not start.
+        """
+        arguments = ('--link', self.port, '--baud', str(BAUD_RATE), '--paced')
+        process = self._start(*_SIMULATOR, *arguments, stdout=subprocess.PIPE)
+        assert process.stdout is not None
+        line = process.stdout.readline().decode().strip()
+        if not line:
+            raise RuntimeError('the simulator does not start; see what it says above')
+        return line
+
+    def start_driver(self, *arguments: str) -> subprocess.Popen[bytes]:
+        """Start the driver on the simulated drive's port."""
+        settings = ('-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}')
+        return self._start(*_DRIVER, '--ros-args', *settings, *arguments, stdout=self._log)
+
+    def inject(self, *what: str) -> None:
+        """
+        Have something happen to the simulated drive.
+
+        :raises subprocess.CalledProcessError: the simulator refuses; it said why.
+        """
+        subprocess.run((*_SIMULATOR, 'inject', '--link', self.port, *what), check=True)
+
+    def wait(self) -> int:
+        """Wait until one of the processes ends; return its exit status."""
+        while True:
+            for process in self._processes:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    return process.wait(0.2)
+
+    def _start(
+        self, *command: str, stdout: IO[bytes] | int | None
+    ) -> subprocess.Popen[bytes]:
+        # in a session of its own, so that Ctrl-C does not end the simulated drive while the
+        # driver stops its motor; the driver is asked to end by us
+        process = subprocess.Popen(
+            command, stdout=stdout, stderr=self._log, start_new_session=True
+        )
+        self._processes.append(process)
+        self.callback(_end, process)
+        return process
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ask a process to end; it takes as long as a stop may take."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+    try:
+        process.wait(20.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,55 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``make run``: a simulated drive and the driver, up until Ctrl-C, for one's own commands."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from nfo_sinus_driver.node.bench import Bench
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_HELP = """
+The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try:
+
+  ros2 topic echo /nfo_sinus/status
+  ros2 service call /nfo_sinus/enable std_srvs/srv/SetBool '{data: true}'
+  ros2 topic pub -r 10 /nfo_sinus/setpoint std_msgs/msg/Float32 '{data: 25.0}'
+  simulator inject --link %s fault 5
+
+Ctrl-C stops the motor and ends both.
+"""
+
+
+def main() -> int:
+    """Run both until one of them ends or a signal comes; then the driver is ended first."""
+    for number in _ENDING:
+        signal.signal(number, signal.default_int_handler)
+    with Bench() as bench:
+        try:
+            print(bench.start_simulator(), flush=True)
+            bench.start_driver()
+            print(_HELP % bench.port, flush=True)
+            return bench.wait()
+        except KeyboardInterrupt:
+            # the driver now stops the motor, and that must not be cut short
+            for number in _ENDING:
+                signal.signal(number, signal.SIG_IGN)
+            return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
