@@ -55,7 +55,7 @@ _OVERLOAD = 5
 #: How close to the set-point counts as reached, Hz.
 _NEAR = 0.3
 _STANDS_FOR = 1.5
-_COASTS_FOR = 4.0
+_COASTS_FOR = 2.0
 _DOMAINS = range(1, 102)
 
 _HEADING = f'{"time":>8} {"set-point":>10} {"frequency":>10} {"speed":>9} {"current":>9}  inverter'
@@ -216,6 +216,8 @@ def ride(rider: Rider, bench: Bench) -> None:
     # the drive cannot measure the speed of a motor that coasts
     rider.watch_for(_COASTS_FOR, 'a released motor', near(0.0))
     rider.trigger('fault_ack')
+    # what still coasts is caught and ramped down
+    rider.wait_for('standstill', near(0.0))
     rider.say('set-points keep coming, and nothing turns until it is enabled again')
     rider.watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
