@@ -52,6 +52,7 @@ _PUBLISH_PERIOD = 0.1
 #: A shared machine may be very slow; a step that takes longer has failed, s.
 _PATIENCE = 30.0
 _OVERLOAD = 5
+_BUS_STANDBY = 37
 #: How close to the set-point counts as reached, Hz.
 _NEAR = 0.3
 _STANDS_FOR = 1.5
@@ -217,7 +218,7 @@ def ride(rider: Rider, bench: Bench) -> None:
     rider.watch_for(_COASTS_FOR, 'a released motor', near(0.0))
     rider.trigger('fault_ack')
     # what still coasts is caught and ramped down
-    rider.wait_for('standstill', near(0.0))
+    rider.wait_for('standby', lambda: rider.inv_st and rider.inv_st.code == _BUS_STANDBY)
     rider.say('set-points keep coming, and nothing turns until it is enabled again')
     rider.watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
