@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Coroutine
 from concurrent.futures import Future
 import dataclasses
+import functools
 import time
 from typing import Any
 from typing import TypeVar
@@ -88,8 +89,7 @@ class Drive:
             bus,
             self._unit,
             self._registers,
-            listener,
-            lambda: self._inverter.settings,
+            self._inverter,
             lambda reason: self._motion.secure(reason) if self._motion else None,
         )
         self._motion: Motion | None = None
@@ -233,7 +233,7 @@ class Drive:
                 await self._set_drive_timeout(inverter.settings.drive_timeout)
         self._misses = 0
         self._complaint = ''
-        inverter.connected = True
+        inverter.connected = inverter.answering = True
         inverter.tell(Severity.INFO, f'connected: {inverter.model.name}, {identity}')
         self._warn_of_missing_timeout()
 
@@ -321,24 +321,30 @@ class Drive:
 
     async def _poll(self) -> None:
         inverter = self._inverter
-        seen = await inverter.look(Priority.POLL)
+        # a request that fails is not repeated at once, so that a silent drive costs its
+        # neighbours no more than one time-out in each of their cycles
+        seen = await inverter.look(Priority.POLL, once=True)
+        inverter.answering = True
         if time.monotonic() - self._mode_read_at > _MODE_PERIOD:
             self._mode_read_at = time.monotonic()
             await inverter.read_control_mode(Priority.POLL)
         if self._motion is not None:
             self._motion.watch(seen)
-        read = self._registers.read_number
-        frequency = await read('status.frq_act', Priority.POLL)
-        speed = await read('status.spd_act', Priority.POLL)
+        read = functools.partial(
+            self._registers.read_number, priority=Priority.POLL, once=True
+        )
+        frequency = await read('status.frq_act')
+        speed = await read('status.spd_act')
         actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
         if inverter.control_mode in _ACTUAL_KEYS:
-            actual = await read(_ACTUAL_KEYS[inverter.control_mode], Priority.POLL)
+            actual = await read(_ACTUAL_KEYS[inverter.control_mode])
         self._publish(seen, frequency=frequency, speed=speed, actual=actual)
 
     def _miss(self, error: LinkError | DriveError) -> None:
         """Count a failed poll; too many in a row and the drive is lost."""
         inverter = self._inverter
         self._misses += 1
+        inverter.answering = False
         if inverter.connected and (
             self._misses > inverter.settings.retries or isinstance(error, PortError)
         ):

@@ -59,6 +59,8 @@ class Inverter:
         self._registers = registers
         self._listener = listener
         self.connected = False
+        #: The last poll was answered; while it was not, nobody else should wait for the drive.
+        self.answering = False
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
         self.control_mode = ''
@@ -66,14 +68,15 @@ class Inverter:
         #: The drive's own time-out, s; 0 if it has none.
         self.sio_tot = 0.0
 
-    async def look(self, priority: Priority) -> InverterStatus:
+    async def look(self, priority: Priority, *, once: bool = False) -> InverterStatus:
         """
         Read the status, without acknowledging anything.
 
+        :param once: do not repeat a request when nobody answers.
         :raises LinkError: the drive does not answer.
         """
-        word, at = await self._registers.read_at('fieldbus.drive_status', priority)
-        code = await self._registers.read_number('fieldbus.inv_st', priority)
+        word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
+        code = await self._registers.read_number('fieldbus.inv_st', priority, once=once)
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
         seen = InverterStatus(at, word & 0xFFFF, int(code))

@@ -21,6 +21,8 @@ has the shape of this one.
 
 from __future__ import annotations
 
+import contextlib
+
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
@@ -96,10 +98,15 @@ class ModeScmd:
             if await self.in_control(Priority.STOP):
                 raise
 
-    async def quick_stop(self) -> None:
+    async def quick_stop(self, control_mode: str) -> None:
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
-        if await self.in_control(Priority.STOP):
-            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.STOP)
+        if not await self.in_control(Priority.STOP):
+            return
+        await self._registers.write('fieldbus.mode', Mode.STOP, Priority.STOP)
+        if control_mode:
+            # a drive may well refuse a set-point while the bus has no control
+            with contextlib.suppress(Refused):
+                await self._registers.write(SETPOINT_KEYS[control_mode], 0, Priority.STOP)
 
     async def release(self) -> None:
         """Give control back; never by MODE = Ext, which can start the motor [C43]."""

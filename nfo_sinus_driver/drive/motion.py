@@ -139,7 +139,7 @@ class Motion:
         """
         self.disarm()
         try:
-            await self._method.quick_stop()
+            await self._method.quick_stop(self._inverter.control_mode)
             await self._await_status(lambda seen: not seen.driven, Priority.STOP, _PATIENCE)
         except (DriveError, LinkError) as error:
             self._withdraw()
@@ -217,7 +217,7 @@ class Motion:
             reason = self._why_disarmed(seen)
             if reason:
                 self.secure(reason)
-        elif self._arming is None and self._withdrawal is None and seen.runs and seen.from_bus:
+        elif self._arming is None and self._withdrawal is None and seen.runs_by_bus:
             self.secure('it runs under bus control although nobody enabled it')
 
     def secure(self, reason: str) -> None:
@@ -336,9 +336,9 @@ class Motion:
             self._unconfirmed = str(error)
             return False
         # a drive with a fault may refuse everything; it stands, but would go on afterwards
-        self._held_by_fault = bool(refusal) and seen.faulted and not seen.runs
+        self._held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
         self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
-        return not refusal and not seen.runs and not self._again
+        return not refusal and not seen.runs_by_bus and not self._again
 
     async def _await_status(
         self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float

@@ -25,11 +25,10 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.mode_scmd import SETPOINT_KEYS
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -52,15 +51,13 @@ class Setpoint:
         bus: Bus,
         unit: int,
         registers: Registers,
-        listener: Listener,
-        settings: Callable[[], DriveSettings],
+        inverter: Inverter,
         refused: Callable[[str], None],
     ) -> None:
         self._bus = bus
         self._unit = unit
         self._registers = registers
-        self._listener = listener
-        self._settings = settings
+        self._inverter = inverter
         self._refused = refused
         self._slot = Slot(self._make, self._done)
         #: The newest request and when it came in; written by any thread, at once.
@@ -132,13 +129,16 @@ class Setpoint:
         parameter = self._registers.model[SETPOINT_KEYS[self.control_mode]]
         assert parameter.maximum is not None, parameter.key
         most = float(parameter.maximum)
-        if self._settings().setpoint_max:
-            most = min(most, self._settings().setpoint_max)
+        if self._inverter.settings.setpoint_max:
+            most = min(most, self._inverter.settings.setpoint_max)
         return max(-most, min(most, value))
 
     def _make(self) -> Transfer | None:
         value, at = self._request
-        if at <= self._armed_at or self._waits_for_answer:
+        if at <= self._armed_at:
+            return None
+        if not self._inverter.answering:
+            self._waits_for_answer = True
             return None
         limited = self._limited(value)
         self.clamped = limited != value
@@ -169,12 +169,13 @@ class Setpoint:
             self._refused(f'it refused set-point {self._asked:g}: {error}')
         else:
             # asking a silent drive again at once would starve its neighbours
+            self._inverter.answering = False
             self._waits_for_answer = True
             self._written = ()
 
     async def _watch_age(self) -> None:
         while True:
-            timeout = self._settings().setpoint_timeout
+            timeout = self._inverter.settings.setpoint_timeout
             last = max(self._request[1], self._armed_at)
             left = last + timeout - time.monotonic() if timeout else math.inf
             if left > 0 or self._expired:
@@ -207,4 +208,4 @@ class Setpoint:
         self._expired = True
 
     def _tell(self, severity: Severity, text: str) -> None:
-        self._listener.on_event(severity, text)
+        self._inverter.tell(severity, text)

@@ -86,6 +86,11 @@ class InverterStatus:
         return self.state is State.OPERATION_ENABLED
 
     @property
+    def runs_by_bus(self) -> bool:
+        """The motor is driven on a command that came over the bus."""
+        return self.runs and self.from_bus
+
+    @property
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN:

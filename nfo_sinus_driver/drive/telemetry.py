@@ -77,7 +77,7 @@ async def watch_telemetry(
     while True:
         started = time.monotonic()
         rate = inverter.settings.telemetry_rate
-        if rate and inverter.connected:
+        if rate and inverter.connected and inverter.answering:
             try:
                 for key in (*FAST, *due) if first else (*FAST, due[0]):
                     await measure(key)
@@ -86,6 +86,7 @@ async def watch_telemetry(
                 listener.on_telemetry(Telemetry(time.monotonic(), dict(values)))
             except LinkError:
                 # the poll says so if the drive is lost
+                inverter.answering = False
                 values.update(dict.fromkeys(FAST, NAN))
         period = 1 / rate if rate else _OFF_PERIOD
         await bus.sleep(period - (time.monotonic() - started))

@@ -46,6 +46,8 @@ _GROUPS_OF_THE_BUS = 3
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
 _POLL_SIGNALS = 0.5
+#: What the last request of an exit may take beyond ``shutdown_timeout``, s.
+_LAST_ANSWER = 0.5
 
 #: Signals that end a process, as far as they can be caught. Those of the keyboard and of job
 #: control that would only suspend it are caught too: a suspended driver would leave the motor on.
@@ -123,14 +125,17 @@ class DriverProcess:
                 _log.exception('error in a callback; the driver goes on')
 
     def _stop_motors(self) -> bool:
+        begun = time.monotonic()
         connected = [node for node in self._drives if node.drive.identity is not None]
         # all are told before the first is waited for
         stops = [(node, node.drive.stop()) for node in connected if _may_run(node)]
-        unconfirmed = [node for node, future in stops if not _wait(node, future)]
+        unconfirmed = [node for node, future in stops if not _confirmed(node, future, begun)]
         releases = [
-            (node, node.drive.disconnect(node.settings.shutdown_timeout)) for node in connected
+            (node, node.drive.disconnect(_time_left(node, begun)))
+            for node in connected
+            if node not in unconfirmed
         ]
-        unconfirmed += [node for node, future in releases if not _wait(node, future)]
+        unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         return not unconfirmed
 
 
@@ -139,14 +144,21 @@ def _may_run(node: DriveNode) -> bool:
     return node.settings.control_method != 'monitor' and (status is None or status.from_bus)
 
 
-def _wait(node: DriveNode, future: Future[str]) -> bool:
-    """Wait for an answer for as long as the node's exit may last."""
-    deadline = time.monotonic() + node.settings.shutdown_timeout + 1.0
+def _time_left(node: DriveNode, begun: float) -> float:
+    """Return how much of the time that the node's exit may take is left, s."""
+    return max(0.0, begun + node.settings.shutdown_timeout - time.monotonic())
+
+
+def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
+    """Wait for the answer to a stop or a release, and log it."""
     log = node.get_logger()
     try:
-        log.info(future.result(max(0.0, deadline - time.monotonic())))
-    except (DriveError, FutureTimeoutError) as error:
-        log.error(str(error) or 'the drive did not confirm in time')
+        log.info(future.result(_time_left(node, begun) + _LAST_ANSWER))
+    except FutureTimeoutError:
+        log.error('the stop is NOT confirmed: the drive did not answer in time')
+        return False
+    except DriveError as error:
+        log.error(str(error))
         return False
     return True
 

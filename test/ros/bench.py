@@ -1,0 +1,336 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tests with ROS share: processes, and a client that sees and commands them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+import json
+import os
+from pathlib import Path
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.srv import GetState
+from nfo_sinus_msgs.msg import BusStatistics
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import Telemetry
+from rcl_interfaces.srv import DescribeParameters
+from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import ListParameters
+from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float32
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+#: Machines are shared and slow: a condition that does not come true in this time never will, s.
+PATIENCE = 40.0
+#: For how long something must not happen, s; longer than a few polls and a ramp's first step.
+A_WHILE = 2.0
+BAUD_RATE = 57600
+
+TOPICS = {
+    'status': (DriveStatus, 10),
+    'inv_st': (InvSt, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)),
+    'actual_speed': (Float32, 10),
+    'actual_frequency': (Float32, 10),
+    'telemetry': (Telemetry, 10),
+}
+
+
+def wait_until(
+    condition: Callable[[], Any], what: str, timeout: float = PATIENCE, period: float = 0.01
+) -> Any:
+    """Wait for a condition and return what it returned."""
+    deadline = time.monotonic() + timeout
+    while True:
+        result = condition()
+        if result:
+            return result
+        assert time.monotonic() < deadline, f'not within {timeout:g} s: {what}'
+        time.sleep(period)
+
+
+def holds_for(seconds: float, condition: Callable[[], Any], what: str) -> None:
+    """Fail if a condition ceases to hold within some time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        assert condition(), f'did not hold: {what}'
+        time.sleep(0.02)
+
+
+class Process:
+    """A process whose output goes to a file."""
+
+    def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
+        self._log = log
+        with log.open('ab') as stream:
+            self._process = subprocess.Popen(
+                command,
+                env=environment,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+
+    @property
+    def text(self) -> str:
+        """What it said so far."""
+        return self._log.read_text(errors='replace')
+
+    @property
+    def running(self) -> bool:
+        """It has not ended."""
+        return self._process.poll() is None
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def wait(self) -> int:
+        """Wait for its end; return its exit status."""
+        return self._process.wait(PATIENCE)
+
+    def end(self) -> None:
+        """End it, gently first."""
+        if self.running:
+            self.signal(signal.SIGINT)
+        try:
+            self.wait()
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise
+
+
+class Bench(contextlib.ExitStack):
+    """A simulated line, drivers on it and a client, all in one ROS domain."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        super().__init__()
+        self.folder = folder
+        self.port = str(folder / 'line')
+        self.trace = folder / 'trace.jsonl'
+        self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        self._domain = domain
+        self._drivers = 0
+
+    def simulator(self, *arguments: str) -> Simulated:
+        """Start a simulated line; return what looks into it."""
+        command = [_executable('simulator'), '--link', self.port, '--baud', str(BAUD_RATE)]
+        command += ['--paced', '--trace', str(self.trace), *arguments]
+        process = Process(command, self._environment, self.folder / 'simulator.log')
+        self.callback(process.end)
+        wait_until(lambda: 'serving' in process.text or not process.running, 'the simulator')
+        assert process.running, process.text
+        return self.enter_context(Simulated.at_link(self.port))
+
+    def driver(self, *arguments: str) -> Process:
+        """Start a driver on the line; ``-p name:=value`` arguments may follow."""
+        self._drivers += 1
+        settings = ['-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}']
+        command = [_executable('driver'), '--ros-args', *settings, *arguments]
+        process = Process(command, self._environment, self.folder / f'driver{self._drivers}.log')
+        self.callback(process.end)
+        return process
+
+    def client(self, name: str = '/nfo_sinus') -> Client:
+        """Return a client of one drive node."""
+        return self.enter_context(Client(self._domain, name))
+
+    def frames(self) -> list[dict[str, Any]]:
+        """Return what the simulator's line has traced so far."""
+        lines = self.trace.read_text().splitlines()
+        return [json.loads(line) for line in lines if line.endswith('}')]
+
+
+class Client(contextlib.ExitStack):
+    """A ROS client of one drive node, with its own context."""
+
+    def __init__(self, domain: int, name: str) -> None:
+        super().__init__()
+        self._name = name
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.callback(rclpy.shutdown, context=self._context)
+        self.node = Node(
+            f'test_client_{os.getpid()}_{id(self)}', context=self._context,
+            start_parameter_services=False, enable_rosout=False,
+        )
+        self.callback(self.node.destroy_node)
+        self.messages: dict[str, list[Any]] = {}
+        for topic, (type_, qos) in TOPICS.items():
+            self.listen(topic, type_, f'{name}/{topic}', qos)
+        self.listen('diagnostics', DiagnosticArray, '/diagnostics', 10)
+        self.listen('statistics', BusStatistics, '/nfo_sinus_bus/statistics', 10)
+        self._setpoint = self.node.create_publisher(Float32, f'{name}/setpoint', 1)
+        self._clients: dict[str, Any] = {}
+        executor = SingleThreadedExecutor(context=self._context)
+        executor.add_node(self.node)
+        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread.start()
+        self.callback(thread.join, 5.0)
+        self.callback(executor.shutdown, 5.0)
+
+    # --- seeing -------------------------------------------------------------------------------
+
+    def listen(self, key: str, type_: type, topic: str, qos: Any) -> None:
+        """Collect the messages of a topic under a key."""
+        self.messages[key] = []
+        self.node.create_subscription(type_, topic, self.messages[key].append, qos)
+
+    def latest(self, key: str) -> Any:
+        """Return the newest message of a topic, or ``None``."""
+        messages = self.messages[key]
+        return messages[-1] if messages else None
+
+    def wait_for(self, key: str, condition: Callable[[Any], Any], what: str) -> Any:
+        """Wait until the newest message of a topic fulfils a condition; return the message."""
+
+        def seen() -> Any:
+            message = self.latest(key)
+            return message if message is not None and condition(message) else None
+
+        return wait_until(seen, what)
+
+    def connected(self) -> Client:
+        """Wait until the drive is connected and its node is active."""
+        self.wait_for('status', lambda status: status.connected, 'the drive is connected')
+        wait_until(lambda: self.state() == 'active', 'the node is active')
+        return self
+
+    # --- commanding ---------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def setpoints(self, value: float, period: float = 0.05) -> Iterator[None]:
+        """Publish a set-point over and over."""
+        ended = threading.Event()
+
+        def publish() -> None:
+            while not ended.wait(period):
+                self._setpoint.publish(Float32(data=float(value)))
+
+        thread = threading.Thread(target=publish, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
+
+    def publish(self, value: float) -> None:
+        """Publish one set-point, once somebody listens."""
+        wait_until(lambda: self._setpoint.get_subscription_count(), 'somebody listens')
+        self._setpoint.publish(Float32(data=float(value)))
+
+    def call_async(self, service: str, type_: type, **fields: Any) -> Any:
+        """Call a service of the node; return the future."""
+        path = service if service.startswith('/') else f'{self._name}/{service}'
+        client = self._clients.get(path)
+        if client is None:
+            client = self._clients[path] = self.node.create_client(type_, path)
+        assert client.wait_for_service(PATIENCE), f'there is no service {path}'
+        return client.call_async(type_.Request(**fields))
+
+    def call(self, service: str, type_: type = Trigger, **fields: Any) -> Any:
+        """Call a service of the node and return its response."""
+        future = self.call_async(service, type_, **fields)
+        wait_until(future.done, f'{service} answers')
+        return future.result()
+
+    def enable(self, on: bool = True) -> Any:
+        """Call ``~/enable``."""
+        return self.call('enable', SetBool, data=on)
+
+    @contextlib.contextmanager
+    def run_at(self, value: float) -> Iterator[None]:
+        """Enable, and publish a set-point until the motor is there and all through the block."""
+        response = self.enable()
+        assert response.success, response.message
+        with self.setpoints(value):
+            self.wait_for('status', lambda status: abs(status.actual - value) < 1, f'{value}')
+            yield
+
+    def change_state(self, transition: int) -> bool:
+        """Ask for a lifecycle transition."""
+        request = Transition(id=transition)
+        success: bool = self.call('change_state', ChangeState, transition=request).success
+        return success
+
+    def state(self) -> str:
+        """Return the label of the lifecycle state."""
+        label: str = self.call('get_state', GetState).current_state.label
+        return label
+
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        values = self.call('get_parameters', GetParameters, names=[name]).values
+        return parameter_value_to_python(values[0])
+
+    def parameter_names(self) -> set[str]:
+        """Return the names of all parameters."""
+        return set(self.call('list_parameters', ListParameters).result.names)
+
+    def descriptor(self, name: str) -> Any:
+        """Return the descriptor of a parameter."""
+        return self.call('describe_parameters', DescribeParameters, names=[name]).descriptors[0]
+
+    def set_parameters(self, **values: Any) -> Any:
+        """Set parameters atomically; return the result."""
+        future = self.set_parameters_async(**values)
+        wait_until(future.done, 'set_parameters answers')
+        return future.result().result
+
+    def set_parameters_async(self, **values: Any) -> Any:
+        """Begin to set parameters; return the future."""
+        messages = [
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]
+        return self.call_async(
+            'set_parameters_atomically', SetParametersAtomically, parameters=messages
+        )
+
+
+def seconds(stamp: Time) -> float:
+    """Return a time stamp as a number."""
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
+def _executable(name: str) -> str:
+    path = shutil.which(name)
+    assert path, f'{name} is not on the path: run the tests by make'
+    return path

@@ -1,0 +1,58 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A driver, a simulated drive and a client for each test, isolated from everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+import tempfile
+
+import pytest
+
+from bench import Bench
+
+# before any context exists, in this process and in those it starts
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# a field of a wrong type is an exception then, and not the end of the process
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+_DOMAINS = range(1, 102)
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """Return a ROS domain that no other test on this machine uses at the time."""
+    with contextlib.ExitStack() as stack:
+        for number in _DOMAINS:
+            path = Path(tempfile.gettempdir()) / f'nfo_sinus_test_domain_{number}.lock'
+            lock = stack.enter_context(path.open('w'))
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield number
+            return
+    pytest.fail('no ROS domain is free')
+
+
+@pytest.fixture
+def bench(domain: int, tmp_path: Path) -> Iterator[Bench]:
+    """Return a bench on which nothing runs yet."""
+    with Bench(domain, tmp_path) as bench:
+        yield bench

@@ -1,0 +1,199 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nothing turns by itself: after whatever stopped it, the motor waits for an enable."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from bench import A_WHILE
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import Process
+from bench import wait_until
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')
+
+
+def _stays_still(drive: Simulated) -> None:
+    """Watch the simulated motor for a while of its own time."""
+    # what still coasts may be caught and ramped down first
+    began = drive.wait_for(
+        lambda state: not state['turning'] and not state['driven'], timeout=PATIENCE
+    )['time']
+    state = drive.wait_for(
+        lambda state: state['turning'] or state['driven'] or state['time'] > began + A_WHILE,
+        timeout=PATIENCE,
+    )
+    assert not state['turning'], state
+    assert not state['driven'], state
+
+
+def _turns_after_enable(drive: Simulated, client: Client) -> None:
+    wait_until(lambda: client.enable().success, 'it can be enabled again', period=0.2)
+    drive.wait_for(lambda state: state['turning'] and state['frequency'] > 15, timeout=PATIENCE)
+
+
+def _fault_and_acknowledgement(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('fault', 5)
+    client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
+    assert 'Overload' in client.enable().message
+    assert client.call('fault_ack').message == 'acknowledged 5 Overload'
+
+
+def _fault_that_stands(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('fault', 3, standing=True)
+    client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
+    refused = client.call('fault_ack')
+    assert not refused.success
+    assert 'Temp Hi still stands' in refused.message
+    drive.inject('ack-cause-gone')
+    assert client.call('fault_ack').success
+
+
+def _run_input_lost_and_back(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('run', False)
+    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    drive.inject('run', True)
+
+
+def _keypad_stop(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('keypad', 'stop')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+
+
+def _power_cycle(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('power-cycle')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    client.wait_for('status', lambda status: status.connected, 'it is back')
+
+
+def _line_gone_for_five_seconds(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('line-dead', 5.0)
+    client.wait_for('status', lambda status: not status.connected, 'the line is gone')
+    assert drive.state()['turning'], 'the drive runs on, and that is what makes this a test'
+    client.wait_for('status', lambda status: status.connected, 'the line is back')
+
+
+def _adapter_unplugged(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('hangup')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    client.wait_for('status', lambda status: status.connected, 'the port is back')
+
+
+def _mode_changed_by_somebody(bench: Bench, drive: Simulated, client: Client) -> None:
+    drive.inject('keypad', 'ext')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    drive.inject('keypad', 'stop')
+
+
+def _stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
+    assert client.call('stop').message == 'stopping: it ramps down'
+
+
+def _quick_stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
+    assert client.call('quick_stop').message == 'released: the motor coasts'
+
+
+def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
+    assert client.enable(False).success
+
+
+@pytest.mark.parametrize(
+    'event',
+    [
+        _fault_and_acknowledgement,
+        _fault_that_stands,
+        _run_input_lost_and_back,
+        _keypad_stop,
+        _power_cycle,
+        _line_gone_for_five_seconds,
+        _adapter_unplugged,
+        _mode_changed_by_somebody,
+        _stop_service,
+        _quick_stop_service,
+        _disable,
+    ],
+    ids=lambda event: event.__name__.strip('_'),
+)
+def test_nothing_turns_again_until_enable(bench: Bench, event) -> None:
+    drive = bench.simulator(*_QUICK)
+    bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        event(bench, drive, client)
+        _stays_still(drive)
+        _turns_after_enable(drive, client)
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL], ids=lambda n: n.name)
+def test_a_restarted_driver_lets_nothing_turn(bench: Bench, number: int) -> None:
+    drive = bench.simulator(*_QUICK)
+    driver: Process = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(number)
+        driver.wait()
+        if number == signal.SIGKILL:
+            assert drive.state()['driven'], 'the drive runs on, and that makes this a test'
+        bench.driver()
+        _stays_still(drive)
+        client.wait_for('status', lambda status: status.connected, 'it is connected')
+        _stays_still(drive)
+        _turns_after_enable(drive, client)
+
+
+def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK, '--no-run-input')
+    bench.driver()
+    client = bench.client().connected()
+    with client.setpoints(20.0):
+        refused = client.enable()
+        assert not refused.success
+        assert 'RUN input is not active' in refused.message
+        drive.inject('run', True)
+        _stays_still(drive)
+
+
+def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK)
+    bench.driver()
+    client = bench.client().connected()
+    client.publish(20.0)
+    assert client.enable().success
+    began = drive.state()['time']
+    state = drive.wait_for(lambda state: state['turning'] or state['time'] > began + A_WHILE)
+    assert not state['turning']
+    status = client.latest('status')
+    assert status.enabled
+    assert status.setpoint == 0
+
+
+def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK)
+    drive.inject('keypad', 'ext')
+    running = drive.wait_for(lambda state: state['driven'])
+    driver = bench.driver()
+    client = bench.client().connected()
+    assert client.call('stop').message.startswith('the bus has no control of this drive')
+    driver.signal(signal.SIGINT)
+    assert driver.wait() == 0
+    state = drive.state()
+    assert state['driven']
+    assert state['mode'] == running['mode'] == 2

@@ -1,0 +1,189 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every way out ends with the motor stopped, seen from the simulated drive's own state."""
+
+from __future__ import annotations
+
+import signal
+
+from lifecycle_msgs.msg import Transition
+import pytest
+
+from bench import PATIENCE
+from bench import Bench
+from bench import wait_until
+
+
+def _stops(state: dict) -> bool:
+    """Tell whether the motor stands or is on its way: the drive drives it to a stop or not."""
+    return not state['turning'] or state['state'] in (
+        'SHUTDOWN',
+        'DISABLE',
+        'QUICK_STOP',
+        'SWITCHED_ON',
+        'READY_TO_SWITCH_ON',
+        'SWITCH_ON_DISABLED',
+        'FAULT_REACTION_ACTIVE',
+        'FAULTED',
+    )
+
+
+@pytest.mark.parametrize(
+    'number',
+    [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1],
+    ids=lambda number: number.name,
+)
+def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int) -> None:
+    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    driver = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        assert drive.state()['turning']
+        driver.signal(number)
+        assert driver.wait() == 0, driver.text
+        state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert state['mode'] == 1, 'control was not given back'
+    assert state['scmd'] == 0
+    assert state['fault'] == 0
+    assert state['mode_ext_writes'] == 0
+
+
+def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.retard=60', '--set', 'control.accel=1')
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGTERM)
+        assert driver.wait() == 0, driver.text
+        state = drive.state()
+    assert state['turning']
+    assert state['scmd'] == 0
+    assert state['state'] == 'SHUTDOWN'
+    assert state['fault'] == 0
+
+
+def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator('--set', 'control.retard=60', '--set', 'control.accel=1')
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'drive_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGTERM)
+        assert driver.wait() == 0, driver.text
+    ended = drive.state()['time']
+    state = drive.wait_for(lambda state: state['time'] > ended + 2.0, timeout=PATIENCE)
+    assert state['fault'] == 0
+    assert not state['driven']
+    assert not state['error_log']
+
+
+def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
+    drive = bench.simulator(
+        '--set', 'control.retard=60', '--set', 'control.accel=1', '--set', 'serial.auto_stop=OFF'
+    )
+    driver = bench.driver('-p', 'drive_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        parameters = drive.state()['parameters']
+        assert parameters['serial.sio_tot'] == 1.0
+        assert parameters['serial.auto_stop'] is True
+        driver.signal(signal.SIGKILL)
+        assert driver.wait() == -signal.SIGKILL
+        state = drive.wait_for(lambda state: not state['driven'], timeout=PATIENCE)
+    assert state['fault'], 'the drive stopped for another reason'
+
+
+def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
+    bench.simulator()
+    driver = bench.driver()
+    bench.client().connected()
+    wait_until(lambda: 'set drive_timeout' in driver.text, 'the warning')
+    assert driver.text.count('set drive_timeout') == 1
+
+
+def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+        assert _stops(drive.state())
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+        stood = drive.state()['time']
+        state = drive.wait_for(lambda state: state['time'] > stood + 2.5 or state['turning'], timeout=PATIENCE)
+        assert not state['turning']
+        assert client.state() == 'inactive', 'autostart undid what a person did'
+        assert not client.enable().success
+
+
+def test_cleanup_gives_control_back_without_mode_ext(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+        assert client.change_state(Transition.TRANSITION_CLEANUP)
+    state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert state['mode'] == 1
+    assert state['mode_ext_writes'] == 0
+    assert state['fault'] == 0
+
+
+def test_lifecycle_shutdown_stops_the_motor(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        assert client.change_state(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+        assert _stops(drive.state())
+        state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert state['mode'] == 1
+
+
+def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    driver = bench.driver('-p', 'setpoint_timeout:=0.5')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        pass
+    drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert drive.state()['scmd'] == 0x101, 'it is still enabled'
+    wait_until(lambda: 'no set-point for 0.5 s' in driver.text, 'the warning')
+    with client.setpoints(15.0):
+        client.wait_for('status', lambda status: status.actual > 14, 'it moves again')
+    assert driver.text.count('no set-point for') == 1
+
+
+def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    driver = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGTSTP)
+        wait_until(lambda: 'SIGTSTP ignored' in driver.text, 'the warning')
+        assert client.call('stop').success
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+
+
+def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1')
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        drive.inject('line-dead', 60.0)
+        driver.signal(signal.SIGINT)
+        assert driver.wait() == 1
+    assert 'NOT confirmed' in driver.text
