@@ -188,6 +188,8 @@ class Bus:
         self._reopen_at = 0.0
         self._port_error = PortError('the port is not open yet')
         self._stopping = False
+        self._closed = False
+        self._tasks: set[Task] = set()
         self._recorder = Recorder()
         self._current: Task | None = None
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
@@ -199,7 +201,11 @@ class Bus:
         self._thread.start()
 
     def close(self, timeout: float = 5.0) -> None:
-        """End the worker after its present transaction and close the port."""
+        """
+        End the worker after its present transaction and close the port.
+
+        Every coroutine that has not ended is cancelled; one that comes later never begins.
+        """
         self._stopping = True
         self._awake.set()
         if self._thread.is_alive():
@@ -324,6 +330,9 @@ class Bus:
     def _enter(self, item: Task | Slot | Callable[[], None]) -> None:
         self._inbox.append(item)
         self._awake.set()
+        if self._closed:
+            # the worker may have looked into its inbox for the last time
+            self._take_in()
 
     def _work(self) -> None:
         _tighten_timers()
@@ -333,8 +342,12 @@ class Bus:
             except Exception:
                 # a mistake in a callback must not take every drive on the line with it
                 _log.exception('error in the bus worker; it goes on')
+        self._is_open = False
         self._link.close()
-        self._fail_all(PortError('the bus is closed'))
+        self._closed = True
+        self._take_in()
+        for task in tuple(self._tasks):
+            self.cancel(task)
 
     def _work_once(self) -> None:
         self._awake.clear()
@@ -353,7 +366,7 @@ class Bus:
         while self._inbox:
             item = self._inbox.popleft()
             if isinstance(item, Task):
-                self._advance(item, None, None)
+                self._advance(item, None, Cancelled() if self._closed else None)
             elif isinstance(item, Slot):
                 self._slots.append(item)
             else:
@@ -386,10 +399,16 @@ class Bus:
         caller, self._current = self._current, task
         awaited = task.step(value, error)
         self._current = caller
+        if awaited is not None and self._closed:
+            # it would wait for ever
+            self._advance(task, None, Cancelled())
+            return
         if awaited is None:
+            self._tasks.discard(task)
             for joiner in task.joiners:
                 self.wake(joiner)
             return
+        self._tasks.add(task)
         if isinstance(awaited, Transfer):
             self._queues[awaited.priority].append((task, awaited))
         else:

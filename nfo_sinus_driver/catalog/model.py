@@ -99,8 +99,7 @@ def load_model(name: str) -> Model:
     _check_unique(f'{name}.csv', 'key', [parameter.key for parameter in parameters])
     for protocol in Protocol:
         places = [p.places[protocol] for p in parameters if protocol in p.places]
-        # Classic gives each word its own id, Modbus one base register to each parameter
-        used = [address for place in places for address in place.addresses]
+        used = [address for place in places for address in place.occupied]
         _check_unique(f'{name}.csv', protocol.value, used)
     _check_unique(f'inv_st_{name}.csv', 'code', [entry.code for entry in inv_st])
     return Model(name, parameters, inv_st)

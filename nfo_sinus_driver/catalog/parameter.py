@@ -134,6 +134,13 @@ class Place:
         """How many 16-bit words the parameter has here."""
         return self.type.words
 
+    @property
+    def occupied(self) -> Sequence[int]:
+        """Every register or id that it takes: Classic names them all, Modbus only the first."""
+        if len(self.addresses) == self.words:
+            return self.addresses
+        return range(self.address, self.address + self.words)
+
 
 @dataclass(frozen=True)
 class Parameter:

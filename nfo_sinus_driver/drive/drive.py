@@ -19,12 +19,12 @@ from __future__ import annotations
 from collections.abc import Coroutine
 from concurrent.futures import Future
 import dataclasses
-import functools
 import time
 from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import load_model
@@ -194,6 +194,8 @@ class Drive:
             return await coroutine
         except LinkError as error:
             raise DriveError(self._explain(error)) from error
+        except Cancelled:
+            raise DriveError('the driver is ending') from None
 
     def _explain(self, error: LinkError) -> str:
         if isinstance(error, (PortError, Refused)):
@@ -330,15 +332,19 @@ class Drive:
             await inverter.read_control_mode(Priority.POLL)
         if self._motion is not None:
             self._motion.watch(seen)
-        read = functools.partial(
-            self._registers.read_number, priority=Priority.POLL, once=True
-        )
-        frequency = await read('status.frq_act')
-        speed = await read('status.spd_act')
+        frequency = await self._measure('status.frq_act')
+        speed = await self._measure('status.spd_act')
         actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
         if inverter.control_mode in _ACTUAL_KEYS:
-            actual = await read(_ACTUAL_KEYS[inverter.control_mode])
+            actual = await self._measure(_ACTUAL_KEYS[inverter.control_mode])
         self._publish(seen, frequency=frequency, speed=speed, actual=actual)
+
+    async def _measure(self, key: str) -> float:
+        """Read a measured value; NaN if the drive refuses it, for it answers all the same."""
+        try:
+            return await self._registers.read_number(key, Priority.POLL, once=True)
+        except Refused:
+            return NAN
 
     def _miss(self, error: LinkError | DriveError) -> None:
         """Count a failed poll; too many in a row and the drive is lost."""

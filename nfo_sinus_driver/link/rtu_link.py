@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 from dataclasses import dataclass
 from dataclasses import field
 import time
@@ -119,7 +120,9 @@ class RtuLink:
         doubt = self._doubt(request.unit)
         # a write answer names what was written, and nobody believes it without reading back
         if isinstance(request, rtu.Read) and doubt is not None:
-            self._transact(self._probe(request.unit, doubt))
+            # a refusal that is believed tells as well as an answer that all is said
+            with contextlib.suppress(Refused):
+                self._transact(self._probe(request.unit, doubt))
             self._await_silence()
         return self._transact(request)
 
@@ -173,9 +176,12 @@ class RtuLink:
         except Refused:
             self._doubts.pop(request.unit, None)
             raise
-        # units answer in order: whatever was still to come has come before this
-        self._doubts.pop(request.unit, None)
-        if answer.received:
+        late = request.answer_head in self._doubts.get(request.unit, _Doubt()).heads
+        if not late:
+            # units answer in order: whatever was still to come has come before this
+            self._doubts.pop(request.unit, None)
+        if late or answer.received:
+            # it may answer an earlier write of the same, or answer twice: one more may come
             self._distrust(request)
         return reply
 

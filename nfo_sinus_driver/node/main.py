@@ -48,6 +48,8 @@ _SWITCH_INTERVAL = 0.0002
 _POLL_SIGNALS = 0.5
 #: What the last request of an exit may take beyond ``shutdown_timeout``, s.
 _LAST_ANSWER = 0.5
+#: How long callbacks may take to end once the bus is closed, s.
+_LAST_CALLBACK = 2.0
 
 #: Signals that end a process, as far as they can be caught. Those of the keyboard and of job
 #: control that would only suspend it are caught too: a suspended driver would leave the motor on.
@@ -109,11 +111,13 @@ class DriverProcess:
         :returns: whether every drive confirmed that it stops.
         """
         confirmed = self._stop_motors()
+        # whoever still waits for the bus is told, so that no callback keeps the executor
+        self._bus_node.line.bus.close()
         self._bus_node.line.outbox.close()
         self._spinning = False
         self._executor.wake()
-        self._thread.join(1.0)
-        self._bus_node.line.bus.close()
+        self._thread.join(_LAST_CALLBACK)
+        self._executor.shutdown(_LAST_CALLBACK)
         return confirmed
 
     def _spin(self) -> None:

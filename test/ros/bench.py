@@ -146,7 +146,7 @@ class Bench(contextlib.ExitStack):
         self.port = str(folder / 'line')
         self.trace = folder / 'trace.jsonl'
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
-        self._domain = domain
+        self.domain = domain
         self._drivers = 0
 
     def simulator(self, *arguments: str) -> Simulated:
@@ -170,7 +170,7 @@ class Bench(contextlib.ExitStack):
 
     def client(self, name: str = '/nfo_sinus') -> Client:
         """Return a client of one drive node."""
-        return self.enter_context(Client(self._domain, name))
+        return self.enter_context(Client(self.domain, name))
 
     def frames(self) -> list[dict[str, Any]]:
         """Return what the simulator's line has traced so far."""

@@ -23,9 +23,8 @@ import os
 from pathlib import Path
 import tempfile
 
-import pytest
-
 from bench import Bench
+import pytest
 
 # before any context exists, in this process and in those it starts
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -18,14 +18,14 @@ from __future__ import annotations
 
 import signal
 
-import pytest
-
 from bench import A_WHILE
 from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import Process
 from bench import wait_until
+import pytest
+
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import signal
 
-from lifecycle_msgs.msg import Transition
-import pytest
-
 from bench import PATIENCE
 from bench import Bench
 from bench import wait_until
+from lifecycle_msgs.msg import Transition
+import pytest
 
 
 def _stops(state: dict) -> bool:
@@ -123,7 +122,9 @@ def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
         assert _stops(drive.state())
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         stood = drive.state()['time']
-        state = drive.wait_for(lambda state: state['time'] > stood + 2.5 or state['turning'], timeout=PATIENCE)
+        state = drive.wait_for(
+            lambda state: state['time'] > stood + 2.5 or state['turning'], timeout=PATIENCE
+        )
         assert not state['turning']
         assert client.state() == 'inactive', 'autostart undid what a person did'
         assert not client.enable().success

@@ -1,0 +1,253 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The control channel of a running simulator: JSON objects, one a line, over a Unix socket.
+
+A request names a ``verb`` and its ``arguments``; the answer has ``ok`` and either ``result`` or
+``error``, a text for people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import json
+import os
+from pathlib import Path
+import socket
+import socketserver
+import tempfile
+import threading
+import time
+from typing import Any
+
+#: The longest path that a Unix socket takes, on Linux.
+_LONGEST = 107
+
+Handler = Callable[[str, dict[str, Any]], Any]
+
+
+class ControlError(Exception):
+    """The simulator cannot be reached, or it refuses; the message says what to do."""
+
+
+def control_path(link: str | None = None, tcp: int | None = None) -> str:
+    """Return where a simulator's control channel is by default: by its link, or its TCP port."""
+    if link is not None:
+        return f'{link}.control'
+    name = f'tcp-{tcp}' if tcp is not None else str(os.getpid())
+    return str(Path(tempfile.gettempdir()) / f'nfo-simulator-{name}.control')
+
+
+def somebody_listens(path: str) -> bool:
+    """Whether a live simulator has its control channel at ``path``."""
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(1.0)
+        try:
+            probe.connect(path)
+        except OSError:
+            return False
+    return True
+
+
+class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
+    daemon_threads = True
+    block_on_close = False
+    handler: Handler
+    connections: set[socket.socket]
+
+
+class _Connection(socketserver.StreamRequestHandler):
+    def handle(self) -> None:
+        assert isinstance(self.server, _Server)
+        self.server.connections.add(self.connection)
+        # a client that goes away is no error
+        with contextlib.suppress(ConnectionError):
+            for line in self.rfile:
+                self.wfile.write(self._answer(line).encode() + b'\n')
+        self.server.connections.discard(self.connection)
+
+    def _answer(self, line: bytes) -> str:
+        assert isinstance(self.server, _Server)
+        try:
+            request = json.loads(line)
+            result = self.server.handler(request['verb'], request.get('arguments') or {})
+            return json.dumps({'ok': True, 'result': result})
+        except (ValueError, KeyError, TypeError) as error:
+            text = error.args[0] if isinstance(error, KeyError) and error.args else error
+            return json.dumps({'ok': False, 'error': str(text)})
+
+
+class ControlServer:
+    """
+    Serves the control channel in threads of its own.
+
+    :param path: the socket's path; a dead simulator's socket there is replaced.
+    :param handler: carries out a verb with its arguments; raises ``ValueError`` to refuse.
+    :raises ControlError: a live simulator has it, or it cannot be made.
+    """
+
+    def __init__(self, path: str, handler: Handler) -> None:
+        self.path = path
+        if somebody_listens(path):
+            raise ControlError(
+                f'a simulator already runs with its control channel at {path}: stop it, '
+                'or choose another --link or --control'
+            )
+        place = Path(path)
+        if place.exists() and not place.is_socket():
+            raise ControlError(f'{path} is no socket: choose another --control')
+        if len(path.encode()) > _LONGEST:
+            raise ControlError(f'{path} is too long for a socket: choose another --control')
+        try:
+            place.unlink(missing_ok=True)
+            self._server = _Server(path, _Connection)
+        except OSError as error:
+            raise ControlError(
+                f'cannot make the control channel {path} ({error.strerror}): '
+                'choose another --control'
+            ) from error
+        self._server.handler = handler
+        self._server.connections = set()
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, kwargs={'poll_interval': 0.1}, daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop serving and remove the socket."""
+        self._server.shutdown()
+        self._server.server_close()
+        for connection in list(self._server.connections):
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        Path(self.path).unlink(missing_ok=True)
+
+
+class Client:
+    """
+    Speaks to a running simulator.
+
+    :param path: its control channel, as it printed it; or use :meth:`at_link`.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self._socket: socket.socket | None = None
+        self._buffer = b''
+
+    @classmethod
+    def at_link(cls, link: str) -> Client:
+        """Return a client for the simulator that serves the pseudo-terminal at ``link``."""
+        return cls(control_path(link))
+
+    def state(self, address: int | None = None) -> dict[str, Any]:
+        """
+        Return the state of a drive; without an address, of the only one.
+
+        :raises ControlError: nobody listens, no such drive, or several to choose from.
+        """
+        result: dict[str, Any] = self.call('state', address=address)
+        return result
+
+    def states(self) -> dict[int, dict[str, Any]]:
+        """Return the states of all drives, by address."""
+        states: dict[str, dict[str, Any]] = self.call('states')
+        return {int(address): state for address, state in states.items()}
+
+    def inject(
+        self, what: str, *values: object, address: int | None = None, **arguments: object
+    ) -> None:
+        """
+        Let something happen: a verb of ``simulator inject`` with its arguments, by order or name.
+
+        :raises ControlError: nobody listens, or the simulator refuses.
+        """
+        self.call('inject', what=what, values=values, address=address, arguments=arguments)
+
+    def wait_for(
+        self,
+        condition: Callable[[dict[str, Any]], object],
+        timeout: float = 5.0,
+        address: int | None = None,
+    ) -> dict[str, Any]:
+        """
+        Wait until the state of a drive fulfils a condition, and return that state.
+
+        :raises TimeoutError: it did not within ``timeout`` seconds; shows the last state.
+        """
+        end = time.monotonic() + timeout
+        while True:
+            state = self.state(address)
+            if condition(state):
+                return state
+            if time.monotonic() >= end:
+                shown = {key: state[key] for key in state if key != 'parameters'}
+                raise TimeoutError(f'not within {timeout:g} s; the drive is at {shown}')
+            time.sleep(0.005)
+
+    def call(self, verb: str, **arguments: object) -> Any:
+        """
+        Send a request and return its result.
+
+        :raises ControlError: nobody listens, or the simulator refuses.
+        """
+        request = json.dumps({'verb': verb, 'arguments': arguments}).encode() + b'\n'
+        try:
+            if self._socket is None:
+                self._socket = self._connected()
+            self._socket.sendall(request)
+            answer = json.loads(self._line(self._socket))
+        except OSError as error:
+            self.close()
+            raise ControlError(
+                f'no simulator listens at {self.path}: start one there, or name the right one '
+                f'with --link or --control ({error.strerror or error})'
+            ) from error
+        if not answer['ok']:
+            raise ControlError(answer['error'])
+        return answer['result']
+
+    def close(self) -> None:
+        """Hang up; the next call connects again."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+        self._buffer = b''
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _connected(self) -> socket.socket:
+        connection = socket.socket(socket.AF_UNIX)
+        connection.settimeout(10.0)
+        try:
+            connection.connect(self.path)
+        except OSError:
+            connection.close()
+            raise
+        return connection
+
+    def _line(self, connection: socket.socket) -> bytes:
+        while b'\n' not in self._buffer:
+            data = connection.recv(65536)
+            if not data:
+                raise ConnectionResetError('it went away')
+            self._buffer += data
+        line, self._buffer = self._buffer.split(b'\n', 1)
+        return line

@@ -1,0 +1,402 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A whole NFO Sinus G2 made of software: parameters, commands, state machine, motor, faults.
+
+It knows parameters by catalog key and raw numbers, and time only as it is told of it; which
+protocol asks is not its business. Where the manuals leave the drive's behaviour open, it does
+what makes a careless driver fail: a run command stands through a lost RUN input and through a
+fault, a set-point through a power cycle, and MODE = Ext starts the motor.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from collections.abc import Sequence
+
+from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import Control
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
+from nfo_sinus_driver.simulator.control_source import TUNING_COMMANDS
+from nfo_sinus_driver.simulator.control_source import Source
+from nfo_sinus_driver.simulator.faults import SERIAL
+from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.measured import Counters
+from nfo_sinus_driver.simulator.measured import measure
+from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import RegisterMap
+from nfo_sinus_driver.simulator.motor import Motor
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.runner import SETPOINTS
+from nfo_sinus_driver.simulator.runner import Runner
+from nfo_sinus_driver.simulator.runner import nameplate
+from nfo_sinus_driver.simulator.serial_side import SerialSide
+from nfo_sinus_driver.simulator.state_machine import Phase
+
+#: The longest step of model time (s) while something moves, and while nothing does.
+_STEP = 0.005
+_IDLE_STEP = 0.1
+
+
+class SimulatedDrive:
+    """
+    One simulated drive.
+
+    :param model: the drive family, one of the catalog's.
+    :param address: its address on the line, 1 to 247.
+    :param settings: parameters other than factory, in engineering units, by key.
+    :param run_input: whether the digital input RUN is active.
+    :param boot_time: how long it is silent after the mains come back (s).
+    :raises ValueError: an unknown model or parameter, or a value that the drive would refuse.
+
+    :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
+    :ivar time: model time since the start (s).
+    :ivar refuses_writes_when_faulted: while a fault stands every write is refused [M0 §6.1.5].
+    :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
+    :ivar command_writes: how often it wrote each set-point or command, by key.
+    :ivar ack_reads: how often 02A4h was read, which acknowledges.
+    :ivar mode_ext_writes: how often MODE = 2 was written, which may start the motor.
+    """
+
+    def __init__(
+        self,
+        model: str = 'sinus_g2',
+        address: int = 1,
+        *,
+        settings: Mapping[str, Value] | None = None,
+        run_input: bool = True,
+        boot_time: float = 2.0,
+    ) -> None:
+        self.model = load_model(model)
+        self.settings = frozenset(
+            key
+            for key, parameter in self.model.items()
+            if parameter.access is Access.READ_WRITE
+            and not key.startswith('fieldbus.')
+            and key not in SETPOINTS
+        )
+        self.memory = Memory(self.model, {**(settings or {}), 'serial.address': address})
+        self.faults = Faults(self.model)
+        self.motor = Motor(nameplate(self.memory))
+        self.runner = Runner(self.memory, self.motor)
+        self.runner.run_input = run_input
+        self.counters = Counters()
+        self.boot_time = boot_time
+        self.refuses_writes_when_faulted = True
+        self.writes: Counter[str] = Counter()
+        self.command_writes: Counter[str] = Counter()
+        self.ack_reads = 0
+        self.mode_ext_writes = 0
+        self.time = 0.0
+        self._registers = RegisterMap(self.model)
+        self._origin: float | None = None
+        self._boot_left = 0.0
+        self._silent_left = 0.0
+        self.serial = SerialSide(self.memory)
+        self._booted()
+
+    # ---- time ----
+
+    def advance(self, dt: float) -> None:
+        """Let ``dt`` seconds of model time pass."""
+        while dt > 1e-9:
+            step = min(dt, _IDLE_STEP if self._resting else _STEP)
+            self._pass(step)
+            dt -= step
+
+    def advance_to(self, now: float) -> None:
+        """Catch up with the caller's clock (s); the first call only sets the clock."""
+        if self._origin is None:
+            self._origin = now - self.time
+        self.advance(now - self._origin - self.time)
+
+    # ---- the bus ----
+
+    @property
+    def listening(self) -> bool:
+        """Whether it hears the line and answers: not while it boots or is held silent."""
+        return self._boot_left <= 0 and self._silent_left <= 0
+
+    def heard(self) -> None:
+        """Take note that a valid frame addressed to this drive arrived."""
+        self.serial.heard()
+
+    def read(self, register: int, count: int) -> tuple[int, ...]:
+        """
+        Read the parameter at a Modbus register, as words, the low one first.
+
+        :raises Refused: no such parameter, or not its length.
+        """
+        parameter = self._registers.find(register, count)
+        return parameter.place(Protocol.MODBUS).type.to_words(self.read_raw(parameter.key))
+
+    def write(self, register: int, words: Sequence[int]) -> None:
+        """
+        Write the parameter at a Modbus register.
+
+        :raises Refused: as the reason says.
+        """
+        parameter = self._registers.find(register, len(words))
+        self.write_raw(parameter.key, parameter.place(Protocol.MODBUS).type.to_raw(words))
+
+    def read_raw(self, key: str) -> int:
+        """
+        Read a parameter as the bus does, side effects included.
+
+        :raises Refused: ADDRESS; it can only be written.
+        """
+        if self.model[key].access is Access.WRITE:
+            raise Refused(Reason.ADDRESS, f'{key} cannot be read')
+        if key == 'fieldbus.inv_st_with_ack':
+            self.ack_reads += 1
+            code = self.inv_st
+            self.faults.acknowledge()
+            self._settle()
+            return code
+        return self._peek(key)
+
+    def write_raw(self, key: str, raw: int) -> None:
+        """
+        Write a parameter as the bus does.
+
+        :raises Refused: ADDRESS when it can only be read, VALUE or STATE.
+        """
+        if key == 'fieldbus.setpoint':
+            key = self.runner.setpoint_key
+        parameter = self.model[key]
+        if parameter.access not in (Access.WRITE, Access.READ_WRITE):
+            raise Refused(Reason.ADDRESS, f'{key} cannot be written')
+        Memory.check(parameter, raw)
+        if key == 'fieldbus.mode':
+            self._write_mode(raw)
+        elif key == 'fieldbus.scmd':
+            self._write_scmd(raw)
+        elif key == 'fieldbus.drive_control':
+            self._write_control(Control(raw))
+        elif key == 'fieldbus.drv_ctrl_write_mask':
+            keep, add = Control(raw & 0xFFFF), Control(raw >> 16)
+            self._write_control(self.runner.word & keep | add)
+        else:
+            self._refuse_when_faulted()
+            if parameter.stopped and (self.motor.driven or self.motor.turning):
+                raise Refused(Reason.STATE, f'{key} changes only while the motor stands')
+            self._store(key, raw)
+        counter = self.writes if key in self.settings else self.command_writes
+        counter[key] += 1
+        self._settle()
+
+    # ---- what happens to it ----
+
+    def trip(self, code: int, *, cause_present: bool = False) -> None:
+        """
+        Let a fault happen: the motor coasts, and it wants acknowledging.
+
+        :param cause_present: the cause lasts, so that it cannot be acknowledged yet.
+        :raises ValueError: the model has no such fault.
+        """
+        self.faults.trip(code, self.counters.op_time, cause_present=cause_present)
+        if code in SERIAL:
+            self.runner.take(Source.STOP)
+        self._settle()
+
+    def end_fault_causes(self) -> None:
+        """Take away the causes of all faults; they still want acknowledging."""
+        self.faults.end_causes()
+
+    def set_run_input(self, active: bool) -> None:
+        """Switch the digital input RUN."""
+        self.runner.run_input = active
+        self._settle()
+
+    def press_stop(self) -> None:
+        """Press <STOP>: the motor is released and control goes to the keypad [M0 §5.2]."""
+        self.runner.take(Source.STOP)
+        self._settle()
+
+    def press_ext(self) -> None:
+        """Press <SHIFT+STOP>: control goes to the terminals, which may start the motor."""
+        self.runner.take(Source.EXT)
+        self._settle()
+
+    def press_start(self) -> None:
+        """Start the motor from the keypad."""
+        self.runner.take(Source.KEYPAD)
+        self._settle()
+
+    def set_from_keypad(self, key: str, value: Value) -> None:
+        """
+        Change a parameter at the keypad, in engineering units.
+
+        :raises ValueError: an unknown key or a value that the drive would refuse.
+        """
+        if key not in self.settings and key not in SETPOINTS:
+            raise ValueError(f'{key} cannot be changed at the keypad')
+        self.memory.set(key, value)
+        self._store(key, self.memory.raw(key))
+        self._settle()
+
+    def power_cycle(self, boot_time: float | None = None) -> None:
+        """Take the mains away and give them back: silent for the boot time (s), then anew."""
+        self._boot_left = self.boot_time if boot_time is None else boot_time
+        self.motor.release(at_once=True)
+        self.motor.dc_link = 0.0
+        self.runner.restart()
+        if self._boot_left <= 0:
+            self._booted()
+
+    def silence(self, seconds: float) -> None:
+        """Neither hear nor answer for a while, as with a loose connector; the motor runs on."""
+        self._silent_left = seconds
+
+    # ---- what it shows ----
+
+    @property
+    def address(self) -> int:
+        """The address that is in effect."""
+        return self.serial.address
+
+    @property
+    def inv_st(self) -> int:
+        """The inverter status, without acknowledging anything [M0 table 19]."""
+        return self.faults.shown or self.runner.inv_st
+
+    @property
+    def status_word(self) -> Status:
+        """DriveStatus [M0 table 15]."""
+        return self.runner.status_word
+
+    @property
+    def phase(self) -> Phase:
+        """The state of the generic state machine."""
+        return self.runner.machine.phase
+
+    # ---- inside ----
+
+    def _peek(self, key: str) -> int:
+        """Read a parameter without side effects."""
+        if key == 'fieldbus.setpoint':
+            key = self.runner.setpoint_key
+        parameter = self.model[key]
+        measured = measure(parameter, self.motor, self.counters)
+        if measured is not None:
+            return measured
+        if key == 'fieldbus.mode':
+            return int(self.runner.source.mode)
+        if key in ('fieldbus.inv_st', 'fieldbus.inv_st_with_ack'):
+            return self.inv_st
+        if key == 'fieldbus.drive_control':
+            return int(self.runner.word)
+        if key in ('fieldbus.drive_status', 'fieldbus.profidrive_status'):
+            return int(self.status_word)
+        return self.memory.raw(key)
+
+    def peek(self, key: str) -> Value:
+        """Return a parameter in engineering units, without side effects."""
+        return Memory.show(self.model[key], self._peek(key))
+
+    def _store(self, key: str, raw: int) -> None:
+        self.memory.put(key, raw)
+        if key.startswith('motor.'):
+            self.motor.plate = nameplate(self.memory)
+        if key.startswith('serial.'):
+            self.serial.changed()
+
+    def _refuse_when_faulted(self) -> None:
+        if self.faults and self.refuses_writes_when_faulted:
+            raise Refused(Reason.STATE, f'fault {self.faults.shown} stands')
+
+    def _write_mode(self, raw: int) -> None:
+        if raw not in (Mode.STOP, Mode.EXT, Mode.BUS):
+            raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
+        if raw == Mode.STOP and self.faults.serial:
+            self.faults.acknowledge_serial()
+        else:
+            self._refuse_when_faulted()
+        if raw == Mode.EXT:
+            self.mode_ext_writes += 1
+        sources = {Mode.STOP: Source.STOP, Mode.EXT: Source.EXT, Mode.BUS: Source.SCMD}
+        self.runner.take(sources[Mode(raw)])
+        self.heard()
+
+    def _write_scmd(self, raw: int) -> None:
+        if raw not in set(Scmd):
+            raise Refused(Reason.VALUE, f'SCMD has no code {raw:#x}')
+        self._refuse_when_faulted()
+        if not self._bus_controls:
+            raise Refused(Reason.STATE, 'SCMD needs MODE = Bus')
+        if raw in TUNING_COMMANDS:
+            raise Refused(Reason.STATE, 'tuning is not simulated')
+        if raw == Scmd.ERASE_E_LOG:
+            self.faults.log.clear()
+        elif raw == Scmd.RESET_E_OUT:
+            self.counters.e_out = 0.0
+        elif raw in RUN_COMMANDS or raw == Scmd.STOP:
+            self.runner.command(Scmd(raw))
+
+    def _write_control(self, word: Control) -> None:
+        # acknowledging goes this way, so a fault does not refuse it [M0 table 16, FAULTED]
+        if self.runner.machine.asks_reset(word):
+            self.faults.acknowledge()
+        self.runner.control(word)
+
+    def _booted(self) -> None:
+        self._boot_left = 0.0
+        self.faults.restart()
+        self.serial.initialise()
+        self.runner.restart()
+        self.runner.initialised = True
+        if self.memory.raw('control.auto_start'):
+            self.runner.take(Source.EXT)
+        self.heard()
+        self._settle()
+
+    @property
+    def _resting(self) -> bool:
+        timers = self._boot_left > 0 or self._silent_left > 0 or self.runner.waiting
+        watched = self.serial.watches and self._bus_controls
+        return self.motor.settled and self.runner.settled and not timers and not watched
+
+    @property
+    def _bus_controls(self) -> bool:
+        return self.runner.source.mode is Mode.BUS
+
+    def _pass(self, dt: float) -> None:
+        self.time += dt
+        self._silent_left = max(0.0, self._silent_left - dt)
+        if self._boot_left > 0:
+            self.motor.advance(dt)
+            self._boot_left -= dt
+            if self._boot_left <= 1e-9:
+                self._booted()
+            return
+        self.serial.advance(dt)
+        if self._bus_controls and self.serial.timed_out:
+            self.trip(SIO_FAIL)
+        self.runner.wait(dt)
+        self.motor.advance(dt)
+        self.counters.advance(dt, self.motor)
+        self._settle()
+
+    def _settle(self) -> None:
+        self.runner.settle(fault=bool(self.faults))

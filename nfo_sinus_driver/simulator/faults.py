@@ -1,0 +1,105 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The faults of a simulated drive: what stands, what may be acknowledged, and the error log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
+from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+
+#: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges them
+#: [M0 §6.1.5].
+SERIAL = frozenset({SIO_FAIL, BUS_FAIL})
+#: Entries that the error log holds [C4].
+_LOG_SIZE = 128
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One entry of the error log: the fault's code, and OpTime (h) when it happened."""
+
+    code: int
+    op_time: float
+
+
+class Faults:
+    """
+    The faults that stand and those that were.
+
+    :ivar log: the error log, newest first.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._present: dict[int, bool] = {}
+        self.log: list[LogEntry] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._present)
+
+    @property
+    def codes(self) -> list[int]:
+        """The faults that stand, the first one first."""
+        return list(self._present)
+
+    @property
+    def shown(self) -> int:
+        """The fault that InvSt shows: the first one; 0 when none stands."""
+        return next(iter(self._present), 0)
+
+    @property
+    def serial(self) -> bool:
+        """Whether a fault of the serial channel stands."""
+        return not SERIAL.isdisjoint(self._present)
+
+    def trip(self, code: int, op_time: float, *, cause_present: bool) -> None:
+        """
+        Let a fault happen, at ``op_time`` hours.
+
+        :raises ValueError: the model has no such fault.
+        """
+        if self._model.inv_st(code).kind is not Kind.FAULT:
+            raise ValueError(f'{code} is no fault of {self._model.name}: see InvSt [M0 table 19]')
+        if code not in self._present:
+            self.log.insert(0, LogEntry(code, op_time))
+            del self.log[_LOG_SIZE:]
+        self._present[code] = cause_present
+
+    def end_causes(self) -> None:
+        """Take the causes away; the faults still stand until they are acknowledged."""
+        self._present = dict.fromkeys(self._present, False)
+
+    def acknowledge(self) -> None:
+        """
+        Acknowledge, as reading 02A4h does.
+
+        A fault whose cause is still there stands on, and so does Sio Fail, which has an
+        acknowledgement of its own [C42].
+        """
+        self._present = {
+            code: cause for code, cause in self._present.items() if cause or code == SIO_FAIL
+        }
+
+    def acknowledge_serial(self) -> None:
+        """Acknowledge the serial channel's faults, as MODE = Stop does [M0 §6.1.5]."""
+        self._present = {code: cause for code, cause in self._present.items() if code not in SERIAL}
+
+    def restart(self) -> None:
+        """Forget the faults whose cause is gone, as a power cycle does; the log stays."""
+        self._present = {code: True for code, cause in self._present.items() if cause}

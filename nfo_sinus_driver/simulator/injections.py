@@ -1,0 +1,248 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What can be made to happen to a running simulator, by ``simulator inject`` and by tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+import difflib
+from typing import Any
+
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.line import Line
+
+#: Stands for an argument that must be given.
+_REQUIRED: Any = object()
+
+
+def parse_setting(model: Model, key: str, text: Value) -> Value:
+    """
+    Turn what was typed for a parameter into its value.
+
+    :raises ValueError: an unknown key, with the names nearest to it; or no value for it.
+    """
+    if key not in model:
+        near = difflib.get_close_matches(key, list(model), n=3, cutoff=0.4)
+        hint = f': did you mean {", ".join(near)}?' if near else ''
+        raise ValueError(f'{model.name} has no parameter {key!r}{hint}')
+    kind = model[key].kind
+    if not isinstance(text, str) or kind is str:
+        return text
+    if kind is bool:
+        switch = {'on': True, 'true': True, '1': True, 'off': False, 'false': False, '0': False}
+        if text.lower() not in switch:
+            raise ValueError(f'{key}: {text!r} is neither ON nor OFF')
+        return switch[text.lower()]
+    try:
+        return int(text) if kind is int else float(text)
+    except ValueError:
+        raise ValueError(f'{key}: {text!r} is not a number') from None
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One argument of a verb; optional where it has a default."""
+
+    name: str
+    type: Callable[[Any], Any]
+    help: str
+    default: Any = _REQUIRED
+    choices: Sequence[str] | None = None
+
+    @property
+    def required(self) -> bool:
+        """Whether it must be given."""
+        return self.default is _REQUIRED
+
+    def convert(self, value: Any) -> Any:
+        """
+        Return the value in its right type.
+
+        :raises ValueError: it cannot be that.
+        """
+        if value is None and not self.required:
+            return None
+        try:
+            converted = self.type(value)
+        except (TypeError, ValueError):
+            raise ValueError(f'{self.name}: {value!r} is not right: {self.help}') from None
+        if self.choices is not None and converted not in self.choices:
+            raise ValueError(f'{self.name}: choose one of {", ".join(self.choices)}')
+        return converted
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a verb works on; ``drive`` is ``None`` when it concerns any drive of the line."""
+
+    line: Line
+    drive: SimulatedDrive | None
+    now: float
+
+    @property
+    def one(self) -> SimulatedDrive:
+        """The drive of a verb that needs one."""
+        assert self.drive is not None
+        return self.drive
+
+    @property
+    def address(self) -> int | None:
+        """The address of the drive, ``None`` for any."""
+        return None if self.drive is None else self.drive.address
+
+
+@dataclass(frozen=True)
+class Verb:
+    """Something that can be made to happen."""
+
+    help: str
+    act: Callable[[Target, dict[str, Any]], None]
+    arguments: tuple[Argument, ...] = ()
+    #: Whether it happens to one drive; otherwise to the line, or to every drive on it.
+    to_drive: bool = True
+
+    def bind(self, values: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
+        """
+        Return the arguments by name, converted and complete.
+
+        :raises ValueError: too many, one missing, unknown or wrong.
+        """
+        names = [argument.name for argument in self.arguments]
+        if len(values) > len(names):
+            raise ValueError(f'takes at most {len(names)} arguments: {", ".join(names)}')
+        given = {**dict(zip(names, values, strict=False)), **named}
+        unknown = set(given) - set(names)
+        if unknown:
+            raise ValueError(f'has no argument {", ".join(sorted(unknown))}')
+        bound = {}
+        for argument in self.arguments:
+            if argument.name not in given and argument.required:
+                raise ValueError(f'needs {argument.name}: {argument.help}')
+            bound[argument.name] = argument.convert(given.get(argument.name, argument.default))
+        return bound
+
+
+def _switch(value: object) -> str:
+    """Take ``on`` and ``off`` as they are, and True and False for them."""
+    if isinstance(value, bool):
+        return 'on' if value else 'off'
+    return str(value)
+
+
+def _as_is(value: object) -> object:
+    return value
+
+
+def _keypad(target: Target, given: dict[str, Any]) -> None:
+    drive = target.one
+    press = {'stop': drive.press_stop, 'ext': drive.press_ext, 'start': drive.press_start}
+    press[given['key']]()
+
+
+def _set(target: Target, given: dict[str, Any]) -> None:
+    drive = target.one
+    value = parse_setting(drive.model, given['key'], given['value'])
+    drive.set_from_keypad(given['key'], value)
+
+
+def _line_dead(target: Target, given: dict[str, Any]) -> None:
+    target.line.faults.dead_until = target.now + given['seconds']
+
+
+def _load(target: Target, given: dict[str, Any]) -> None:
+    target.one.motor.load = given['share']
+
+
+def _answers(what: str, help_text: str, *more: Argument) -> Verb:
+    """Return a verb that spoils the next answers."""
+
+    def act(target: Target, given: dict[str, Any]) -> None:
+        target.line.faults.add(what, given['times'], target.address, given.get('seconds', 0.0))
+
+    times = Argument('times', int, 'how many answers', 1)
+    return Verb(help_text, act, (times, *more), to_drive=False)
+
+
+_SECONDS = Argument('seconds', float, 'for how many seconds')
+
+VERBS: Mapping[str, Verb] = {
+    'fault': Verb(
+        'let a fault happen: the motor coasts until it is acknowledged',
+        lambda target, given: target.one.trip(given['code'], cause_present=given['standing']),
+        (
+            Argument('code', int, 'InvSt code of the fault, 1 to 23'),
+            Argument('standing', bool, 'its cause lasts until ack-cause-gone', False),
+        ),
+    ),
+    'ack-cause-gone': Verb(
+        'take away the causes of all faults, so that they can be acknowledged',
+        lambda target, _: target.one.end_fault_causes(),
+    ),
+    'run': Verb(
+        'switch the digital input RUN',
+        lambda target, given: target.one.set_run_input(given['state'] == 'on'),
+        (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
+    ),
+    'keypad': Verb(
+        'press a key: stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally)',
+        _keypad,
+        (Argument('key', str, 'stop, ext or start', choices=('stop', 'ext', 'start')),),
+    ),
+    'set': Verb(
+        'change a parameter at the keypad',
+        _set,
+        (
+            Argument('key', str, 'its name, such as control.accel'),
+            Argument('value', _as_is, 'in its own unit, such as 7'),
+        ),
+    ),
+    'load': Verb(
+        'change the load of the motor',
+        _load,
+        (Argument('share', float, 'torque at nominal speed, 1 is the nominal torque'),),
+    ),
+    'power-cycle': Verb(
+        'take the mains away and give them back',
+        lambda target, given: target.one.power_cycle(given['seconds']),
+        (Argument('seconds', float, 'how long it is silent (default: its boot time, 2 s)', None),),
+    ),
+    'silence': Verb(
+        'let the drive neither hear nor answer',
+        lambda target, given: target.one.silence(given['seconds']),
+        (_SECONDS,),
+    ),
+    'line-dead': Verb('let the line carry nothing, either way', _line_dead, (_SECONDS,), False),
+    'hangup': Verb(
+        'let the port disappear and come back, like a USB adapter that is pulled out',
+        lambda target, given: target.line.hang_up(target.now + given['seconds']),
+        (Argument('seconds', float, 'for how many seconds', 1.0),),
+        to_drive=False,
+    ),
+    'noise': _answers('noise', 'put noise before the next answers'),
+    'damage': _answers('damage', 'flip a bit in the next answers'),
+    'delay': _answers(
+        'delay', 'send the next answers late', Argument('seconds', float, 'how late', 0.5)
+    ),
+    'drop': _answers('drop', 'lose the next answers; the requests are carried out'),
+    'double': _answers('double', 'send the next answers twice'),
+    'heal': Verb(
+        'end all faults of the line', lambda target, _: target.line.faults.heal(), to_drive=False
+    ),
+}

@@ -1,0 +1,199 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The far end of a line: requests come in, drives carry them out, answers go back, in their time.
+
+Knows no clock of its own: it is told the time, so that tests can make it up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field
+import heapq
+import itertools
+
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.line_faults import LineFaults
+from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.ports import Port
+from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.receiver import Arrived
+from nfo_sinus_driver.simulator.receiver import Protocol
+from nfo_sinus_driver.simulator.receiver import Receiver
+from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.timing import FORMAT_CODES
+from nfo_sinus_driver.simulator.timing import Timing
+from nfo_sinus_driver.simulator.trace import Trace
+
+#: How long to wait before a port that could not come back is tried again (s).
+_TRY_AGAIN = 0.1
+
+
+@dataclass
+class _Answer:
+    """An answer on its way: what is left of it, and when it began."""
+
+    reply: Reply
+    sent: int = 0
+    began: float = 0.0
+
+
+@dataclass(order=True)
+class _Delivery:
+    """The moment at which an answer's bytes up to ``until`` have arrived at the master."""
+
+    at: float
+    order: int
+    answer: _Answer = field(compare=False)
+    until: int = field(compare=False)
+
+
+class Line:
+    """
+    One line with several drives on it.
+
+    :param paced: bytes take the time that they take on a real line, never less.
+    :param turnaround: time a drive takes before it answers (s).
+    :param clock: for the stamps of bytes that go out (s); everything else is told the time.
+    """
+
+    def __init__(
+        self,
+        port: Port,
+        protocol: Protocol,
+        drives: Sequence[SimulatedDrive],
+        timing: Timing,
+        clock: Callable[[], float],
+        *,
+        paced: bool = False,
+        turnaround: float = 0.0,
+        trace: Trace | None = None,
+    ) -> None:
+        self.port = port
+        self.protocol = protocol
+        self.drives = drives
+        self.timing = timing
+        self.faults = LineFaults()
+        self._clock = clock
+        self._trace = trace
+        self._character = timing.character if paced else 0.0
+        self._pause = max(turnaround, timing.t35 if paced else 0.0)
+        self._receiver = Receiver(protocol, self._character, timing.t35)
+        self._deliveries: list[_Delivery] = []
+        self._order = itertools.count()
+        self._gone_until: float | None = None
+        self._going = False
+
+    def hang_up(self, until: float) -> None:
+        """Let the port disappear, as an adapter that is pulled out, and come back ``until``."""
+        # not here: the thread of the line may be waiting for the port
+        self._going = True
+        self._gone_until = until
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that were read at ``now``."""
+        for arrived in self._receiver.feed(data, now):
+            self._handle(arrived)
+
+    def act(self, now: float) -> None:
+        """Do everything that is due."""
+        for arrived in self._receiver.take(now):
+            self._handle(arrived)
+        while self._deliveries and self._deliveries[0].at <= now:
+            self._deliver(heapq.heappop(self._deliveries), now)
+        if self._going:
+            self._going = False
+            self.port.hang_up()
+            self._receiver.clear()
+            self._deliveries.clear()
+        if self._gone_until is not None and self._gone_until <= now:
+            try:
+                self.port.come_back()
+                self._gone_until = None
+            except PortError:
+                self._gone_until = now + _TRY_AGAIN
+
+    @property
+    def due(self) -> float:
+        """When :meth:`act` has something to do again; infinity when nothing is to come."""
+        if self._going:
+            return float('-inf')
+        times = [self._receiver.due, self._gone_until]
+        if self._deliveries:
+            times.append(self._deliveries[0].at)
+        return min((time for time in times if time is not None), default=float('inf'))
+
+    def _handle(self, arrived: Arrived) -> None:
+        request = self.protocol.unwrap(arrived.data)
+        dead = arrived.last < self.faults.dead_until
+        if self._trace is not None:
+            note = 'lost' if dead else 'rubbish' if request is None else ''
+            self._trace.record('request', arrived.data, arrived.first, arrived.last, note)
+        if dead or request is None:
+            return
+        address, pdu = request
+        everybody = self.protocol.broadcast(address, pdu)
+        for drive in self.drives:
+            if not everybody and drive.address != address:
+                continue
+            drive.advance_to(arrived.last)
+            if not self._hears(drive):
+                continue
+            drive.heard()
+            answer = self.protocol.answer(drive, pdu)
+            if not everybody:
+                self._send(address, answer, arrived.last)
+
+    def _hears(self, drive: SimulatedDrive) -> bool:
+        serial = drive.serial
+        return (
+            drive.listening
+            and self.protocol.speaks(drive)
+            and serial.baud == BAUD_CODES[self.timing.baud]
+            and serial.char_format == FORMAT_CODES[self.timing.char_format]
+        )
+
+    def _send(self, address: int, pdu: bytes, asked: float) -> None:
+        start = asked + self._pause
+        for reply in self.faults.alter(address, self.protocol.wrap(address, pdu)):
+            answer = _Answer(reply)
+            length = len(reply.data)
+            begin = start + reply.delay
+            end = begin + length * self._character
+            if self._character:
+                self._schedule(begin + self._character, answer, 1)
+            self._schedule(end, answer, length)
+            # a second answer comes as a frame of its own
+            start = end - reply.delay + self.timing.t35
+
+    def _schedule(self, at: float, answer: _Answer, until: int) -> None:
+        heapq.heappush(self._deliveries, _Delivery(at, next(self._order), answer, until))
+
+    def _deliver(self, delivery: _Delivery, now: float) -> None:
+        answer = delivery.answer
+        data = answer.reply.data
+        stamp = self._clock()
+        if not answer.sent:
+            answer.began = stamp
+        dead = now < self.faults.dead_until
+        if not dead:
+            self.port.send(data[answer.sent : delivery.until])
+        answer.sent = delivery.until
+        if delivery.until == len(data) and self._trace is not None:
+            note = 'lost' if dead else answer.reply.note
+            self._trace.record('answer', data, answer.began, stamp, note)

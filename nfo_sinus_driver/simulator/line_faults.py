@@ -1,0 +1,99 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What can go wrong between a drive and the master, on request."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import replace
+import random
+
+#: Faults of the next answers.
+ANSWER_FAULTS = ('noise', 'damage', 'delay', 'drop', 'double')
+
+
+@dataclass
+class _Pending:
+    what: str
+    address: int | None
+    left: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Reply:
+    """An answer as it goes on the line: what, how much later than usual, what is wrong with it."""
+
+    data: bytes
+    delay: float = 0.0
+    note: str = ''
+
+
+class LineFaults:
+    """
+    The faults that wait for the next answers.
+
+    :ivar dead_until: until when the whole line carries nothing, either way.
+    """
+
+    def __init__(self, seed: int = 0) -> None:
+        self.dead_until = float('-inf')
+        self._pending: list[_Pending] = []
+        self._random = random.Random(seed)
+
+    def add(
+        self, what: str, times: int = 1, address: int | None = None, seconds: float = 0.0
+    ) -> None:
+        """
+        Spoil the next ``times`` answers, of one drive or of any.
+
+        :param what: one of :data:`ANSWER_FAULTS`.
+        :param seconds: how late the answers come, for ``delay``.
+        """
+        self._pending.append(_Pending(what, address, times, seconds))
+
+    def heal(self) -> None:
+        """Forget them all."""
+        self._pending.clear()
+        self.dead_until = float('-inf')
+
+    def alter(self, address: int, frame: bytes) -> list[Reply]:
+        """Return what goes on the line in place of an answer."""
+        replies = [Reply(frame)]
+        for fault in list(self._pending):
+            if fault.address in (None, address):
+                replies = [new for reply in replies for new in self._spoiled(fault, reply)]
+                fault.left -= 1
+        self._pending = [fault for fault in self._pending if fault.left > 0]
+        return replies
+
+    def _spoiled(self, fault: _Pending, reply: Reply) -> list[Reply]:
+        if fault.what == 'drop':
+            return []
+        if fault.what == 'double':
+            return [reply, replace(reply, note=_noted(reply, 'double'))]
+        if fault.what == 'delay':
+            note = _noted(reply, 'delayed')
+            return [replace(reply, delay=reply.delay + fault.seconds, note=note)]
+        if fault.what == 'noise':
+            data = self._random.randbytes(self._random.randint(1, 5)) + reply.data
+            return [replace(reply, data=data, note=_noted(reply, 'noise'))]
+        damaged = bytearray(reply.data)
+        damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(8)
+        return [replace(reply, data=bytes(damaged), note=_noted(reply, 'damaged'))]
+
+
+def _noted(reply: Reply, note: str) -> str:
+    return f'{reply.note}, {note}' if reply.note else note

@@ -1,0 +1,222 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command ``simulator``: simulated drives on a pseudo-terminal or TCP port; needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import signal
+import sys
+
+from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.simulator.control import ControlError
+from nfo_sinus_driver.simulator.inject import inject
+from nfo_sinus_driver.simulator.injections import parse_setting
+from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.simulator import PROTOCOLS
+from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.timing import FORMAT_CODES
+
+#: Lets the line's thread go on soon after another one was busy (s).
+_SWITCH_INTERVAL = 0.0002
+
+_EPILOG = """
+While it runs, "simulator inject --link LINK VERB ..." makes things happen to it: faults, a lost
+RUN input, the keypad, a power cycle, noise on the line; see "simulator inject --help".
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run the command and return its exit status.
+
+    :param argv: the arguments, without the program's name; by default the process's own.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments[:1] == ['inject']:
+        return inject(arguments[1:])
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    with _signals_that_quit():
+        try:
+            simulator = _simulator(options)
+        except ValueError as error:
+            parser.error(str(error))
+        except (PortError, ControlError, OSError) as error:
+            print(f'simulator: {error}', file=sys.stderr)
+            return 1
+        with simulator:
+            return _serve(simulator)
+
+
+def _serve(simulator: Simulator) -> int:
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    drives = 'drive' if len(simulator.drives) == 1 else 'drives'
+    addresses = ', '.join(str(address) for address in simulator.drives)
+    print(
+        f'serving {simulator.protocol} at {simulator.timing.baud} '
+        f'{simulator.timing.char_format} on {simulator.port}, {drives} {addresses}; '
+        f'control {simulator.control}',
+        flush=True,
+    )
+    # the line has a thread of its own: this one waits for a signal, or for a failure there
+    simulator.finished.wait()
+    print(f'simulator: the line broke down: {simulator.failure!r}', file=sys.stderr)
+    return 1
+
+
+@contextlib.contextmanager
+def _signals_that_quit() -> Iterator[None]:
+    """Leave by SystemExit on SIGINT and SIGTERM, so that whatever was made is cleaned up."""
+
+    def quit_(*_: object) -> None:
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+        raise SystemExit(0)
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, quit_)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _simulator(options: argparse.Namespace) -> Simulator:
+    """
+    Return the simulator that the options ask for.
+
+    :raises ValueError: an option is wrong, of itself or beside another one.
+    :raises PortError: the port cannot be had.
+    :raises ControlError: another simulator is there.
+    """
+    if options.link is not None and options.tcp is not None:
+        raise ValueError('--link and --tcp exclude each other')
+    return Simulator(
+        options.address or [1],
+        model=options.model,
+        protocol=options.protocol,
+        link=options.link,
+        tcp=options.tcp,
+        baud=options.baud,
+        char_format=options.char_format,
+        paced=options.paced,
+        turnaround=options.turnaround,
+        trace=options.trace,
+        control=options.control,
+        settings=_settings(options.model, options.set),
+        run_input=options.run_input,
+        boot_time=options.boot_time,
+    )
+
+
+def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
+    settings: dict[str, Value] = {}
+    for text in given:
+        key, equals, value = text.partition('=')
+        if not equals:
+            raise ValueError(f'argument --set: {text!r} is not NAME=VALUE')
+        if key == 'serial.address':
+            raise ValueError('argument --set: give the address with --address')
+        settings[key] = parse_setting(load_model(model), key, value)
+    return settings
+
+
+def _address(text: str) -> int:
+    address = int(text, 10)
+    if not 1 <= address <= 247:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 1 to 247')
+    return address
+
+
+def _tcp(text: str) -> int:
+    port = int(text, 10)
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 0 (any free one) to 65535')
+    return port
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 <= seconds < 1e6:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 0 or more seconds')
+    return seconds
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='simulator',
+        description='Simulates whole NFO Sinus drives on a pseudo-terminal or TCP port.',
+        epilog=_EPILOG,
+    )
+    add = parser.add_argument
+    add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
+    add('--model', default='sinus_g2', choices=MODELS, help='default: sinus_g2')
+    add(
+        '--address',
+        type=_address,
+        action='append',
+        metavar='N',
+        help='address of a drive, 1 to 247; once for each drive (default: 1)',
+    )
+    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
+    add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
+    add('--baud', type=int, default=19200, choices=BAUD_CODES, help='default: 19200')
+    add('--char-format', default='8E1', choices=FORMAT_CODES, help='default: 8E1')
+    add('--paced', action='store_true', help='bytes take the time they take on a real line')
+    add(
+        '--turnaround',
+        type=_seconds,
+        default=0.0,
+        metavar='SECONDS',
+        help='how long a drive takes before it answers (default: 0)',
+    )
+    add('--trace', metavar='FILE', help='write every frame with its time, one JSON object a line')
+    add(
+        '--control',
+        default='',
+        metavar='PATH',
+        help='socket of the control channel (default: LINK.control; without --link in the '
+        "system's temporary folder)",
+    )
+    add(
+        '--set',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='a parameter other than factory, such as control.retard=60; may be repeated',
+    )
+    add(
+        '--no-run-input',
+        dest='run_input',
+        action='store_false',
+        help='the digital input RUN is not active',
+    )
+    add(
+        '--boot-time',
+        type=_seconds,
+        default=2.0,
+        metavar='SECONDS',
+        help='how long a drive is silent after power-on (default: 2)',
+    )
+    return parser

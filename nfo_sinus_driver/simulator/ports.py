@@ -1,0 +1,224 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where bytes come in and go out: a pseudo-terminal or a TCP port."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from pathlib import Path
+import socket
+import tty
+from typing import Protocol
+
+
+class PortError(Exception):
+    """The port cannot be had; the message says why and what to do."""
+
+
+class Port(Protocol):
+    """The far end of a line."""
+
+    #: What a master opens.
+    name: str
+
+    def filenos(self) -> list[int]:
+        """The descriptors to wait on for reading."""
+
+    def receive(self) -> bytes:
+        """Return what has arrived; nothing is fine."""
+
+    def send(self, data: bytes) -> None:
+        """Send; what nobody takes is lost, as on a wire."""
+
+    def hang_up(self) -> None:
+        """Go away, as an adapter does that is pulled out."""
+
+    def come_back(self) -> None:
+        """Be there again under the same name."""
+
+    def close(self) -> None:
+        """Go for good and leave nothing behind."""
+
+
+class PtyPort:
+    """
+    A pseudo-terminal, perhaps under a symbolic link.
+
+    The simulator keeps the master's side open itself, so a master that goes away is no error and
+    may come back.
+
+    :param link: the symbolic link to make, or ``None``.
+    :raises PortError: the link's place is taken by something else.
+    """
+
+    def __init__(self, link: str | None = None) -> None:
+        self._link = Path(link) if link else None
+        self._ends: tuple[int, int] | None = None
+        self._device = ''
+        self.come_back()
+        self.name = str(self._link or self._device)
+
+    def filenos(self) -> list[int]:
+        """The descriptors to wait on for reading."""
+        return [self._ends[0]] if self._ends else []
+
+    def receive(self) -> bytes:
+        """Return what has arrived."""
+        if self._ends is None:
+            return b''
+        try:
+            return os.read(self._ends[0], 4096)
+        except OSError as error:
+            if error.errno in (errno.EAGAIN, errno.EIO):
+                return b''
+            raise
+
+    def send(self, data: bytes) -> None:
+        """Send; what does not fit because nobody reads is lost."""
+        if self._ends is not None:
+            with contextlib.suppress(BlockingIOError):
+                os.write(self._ends[0], data)
+
+    def hang_up(self) -> None:
+        """Close the pseudo-terminal; the link goes with it."""
+        if self._ends is None:
+            return
+        if self._link is not None and self._points_here():
+            self._link.unlink()
+        for end in self._ends:
+            os.close(end)
+        self._ends = None
+
+    def come_back(self) -> None:
+        """Open a pseudo-terminal and put the link on it."""
+        if self._ends is not None:
+            return
+        far, near = os.openpty()
+        # whoever opens it sets the line as he needs it; until then no byte is to be changed
+        tty.setraw(near)
+        os.set_blocking(far, False)
+        self._ends = far, near
+        self._device = os.ttyname(near)
+        if self._link is not None:
+            try:
+                _put_link(self._link, self._device)
+            except BaseException:
+                os.close(far)
+                os.close(near)
+                self._ends = None
+                raise
+
+    def close(self) -> None:
+        """Close the pseudo-terminal and remove the link."""
+        self.hang_up()
+
+    def _points_here(self) -> bool:
+        assert self._link is not None
+        return self._link.is_symlink() and os.readlink(self._link) == self._device
+
+
+def _put_link(link: Path, device: str) -> None:
+    """Make or replace the link in one step, so that nobody ever sees it missing."""
+    if link.is_symlink():
+        if not os.readlink(link).startswith('/dev/pts/'):
+            raise PortError(f'{link} is a link to {os.readlink(link)}: choose another --link')
+    elif link.exists():
+        raise PortError(f'{link} exists and is no link of a simulator: choose another --link')
+    temporary = link.with_name(f'.{link.name}.{os.getpid()}')
+    try:
+        temporary.unlink(missing_ok=True)
+        temporary.symlink_to(device)
+        temporary.replace(link)
+    except OSError as error:
+        raise PortError(f'cannot make the link {link}: {error.strerror}') from error
+
+
+class TcpPort:
+    """
+    A TCP port on this machine, as of a serial device server: one master after another.
+
+    :param port: the port number; 0 lets the system choose.
+    :raises PortError: the port is taken.
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        self._client: socket.socket | None = None
+        self._number = port
+        self._listener = self._listen()
+        self._number = self._listener.getsockname()[1]
+        self.name = f'127.0.0.1:{self._number}'
+
+    def filenos(self) -> list[int]:
+        """The descriptors to wait on for reading."""
+        waiting = self._client or self._listener
+        return [waiting.fileno()] if waiting.fileno() >= 0 else []
+
+    def receive(self) -> bytes:
+        """Return what has arrived, or take the next master in."""
+        if self._client is None:
+            with contextlib.suppress(OSError):
+                self._client, _ = self._listener.accept()
+                self._client.setblocking(False)
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return b''
+        try:
+            data = self._client.recv(4096)
+        except BlockingIOError:
+            return b''
+        except OSError:
+            data = b''
+        if not data:
+            self._client.close()
+            self._client = None
+        return data
+
+    def send(self, data: bytes) -> None:
+        """Send; what nobody takes is lost."""
+        if self._client is not None:
+            with contextlib.suppress(OSError):
+                self._client.send(data)
+
+    def hang_up(self) -> None:
+        """Close the connection and refuse new ones."""
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        self._listener.close()
+
+    def come_back(self) -> None:
+        """Listen again on the same port."""
+        if self._listener.fileno() < 0:
+            self._listener = self._listen()
+
+    def close(self) -> None:
+        """Close everything."""
+        self.hang_up()
+
+    def _listen(self) -> socket.socket:
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setblocking(False)
+        try:
+            listener.bind(('127.0.0.1', self._number))
+        except OSError as error:
+            listener.close()
+            raise PortError(
+                f'TCP port {self._number} cannot be had ({error.strerror}): choose another, '
+                'or --tcp 0'
+            ) from error
+        listener.listen(1)
+        return listener

@@ -1,0 +1,147 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The pieces of pymodbus that the simulator uses, the same from version 3.6.9 to the current one.
+
+What changed on the way:
+
+* The PDU classes moved: ``pymodbus.register_read_message`` and ``register_write_message`` (3.6),
+  both below ``pymodbus.pdu`` (3.7), ``pymodbus.pdu.register_message`` (3.8 and later).
+* Their constructors changed names and order of arguments (``slave``, ``dev_id``, ``values``,
+  ``registers``). Made without arguments and filled by attributes they are the same everywhere.
+* A register's value is ``value`` (06) or ``values`` (16) in old ones, ``registers`` in new ones.
+* Old ones do not check counts while decoding; new ones raise ``ValueError``.
+* The CRC stands in ``pymodbus.message.rtu.MessageRTU`` (3.6.9) or ``pymodbus.framer.rtu`` and
+  always comes byte-swapped: most significant byte first is the order on the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import importlib
+import logging
+import struct
+from typing import Any
+
+# some versions log every refusal as an error; here a refusal is an answer like any other
+logging.getLogger('pymodbus').addHandler(logging.NullHandler())
+
+
+def _first_of(modules: Sequence[str], name: str) -> Any:
+    """Return the class ``name`` from the first of ``modules`` that has it."""
+    for module in modules:
+        try:
+            return getattr(importlib.import_module(module), name)
+        except (ImportError, AttributeError):
+            continue
+    raise ImportError(f'this pymodbus has no {name} in any of {", ".join(modules)}')
+
+
+_READ = (
+    'pymodbus.pdu.register_message',
+    'pymodbus.pdu.register_read_message',
+    'pymodbus.register_read_message',
+)
+_WRITE = (
+    'pymodbus.pdu.register_message',
+    'pymodbus.pdu.register_write_message',
+    'pymodbus.register_write_message',
+)
+_ReadRequest = _first_of(_READ, 'ReadHoldingRegistersRequest')
+_ReadResponse = _first_of(_READ, 'ReadHoldingRegistersResponse')
+_WriteSingleRequest = _first_of(_WRITE, 'WriteSingleRegisterRequest')
+_WriteSingleResponse = _first_of(_WRITE, 'WriteSingleRegisterResponse')
+_WriteMultipleRequest = _first_of(_WRITE, 'WriteMultipleRegistersRequest')
+_WriteMultipleResponse = _first_of(_WRITE, 'WriteMultipleRegistersResponse')
+_ExceptionResponse = _first_of(
+    ('pymodbus.pdu.exceptionresponse', 'pymodbus.pdu'), 'ExceptionResponse'
+)
+try:
+    _Rtu = _first_of(('pymodbus.framer.rtu', 'pymodbus.framer'), 'FramerRTU')
+except ImportError:
+    _Rtu = _first_of(('pymodbus.message.rtu',), 'MessageRTU')
+
+
+def crc(data: bytes) -> bytes:
+    """Return the two CRC bytes of an RTU frame, in the order they go over the line."""
+    checksum: int = _Rtu.compute_CRC(data)
+    return checksum.to_bytes(2, 'big')
+
+
+def decode_read(data: bytes) -> tuple[int, int]:
+    """
+    Decode what follows function 03: register and count.
+
+    :raises ValueError: malformed, or a count that the standard forbids.
+    """
+    request = _decoded(_ReadRequest(), data)
+    return request.address, request.count
+
+
+def decode_write_single(data: bytes) -> tuple[int, int]:
+    """
+    Decode what follows function 06: register and word.
+
+    :raises ValueError: malformed.
+    """
+    request = _decoded(_WriteSingleRequest(), data)
+    word = request.value if hasattr(request, 'value') else request.registers[0]
+    return request.address, word
+
+
+def decode_write_multiple(data: bytes) -> tuple[int, int, tuple[int, ...]]:
+    """
+    Decode what follows function 16: register, count, words.
+
+    :raises ValueError: malformed.
+    """
+    request = _decoded(_WriteMultipleRequest(), data)
+    words = request.values if hasattr(request, 'values') else request.registers
+    return request.address, request.count, tuple(words)
+
+
+def encode_read(words: Sequence[int]) -> bytes:
+    """Return the answer PDU of function 03."""
+    return _encoded(_ReadResponse(), registers=list(words))
+
+
+def encode_write_single(register: int, word: int) -> bytes:
+    """Return the answer PDU of function 06."""
+    return _encoded(_WriteSingleResponse(), address=register, value=word, registers=[word])
+
+
+def encode_write_multiple(register: int, count: int) -> bytes:
+    """Return the answer PDU of function 16."""
+    return _encoded(_WriteMultipleResponse(), address=register, count=count)
+
+
+def encode_exception(function: int, code: int) -> bytes:
+    """Return the answer PDU that refuses a request."""
+    return _encoded(_ExceptionResponse(function & 0x7F, code))
+
+
+def _decoded(request: Any, data: bytes) -> Any:
+    try:
+        request.decode(data)
+    except (struct.error, IndexError) as error:
+        raise ValueError(f'malformed request: {error}') from error
+    return request
+
+
+def _encoded(response: Any, **fields: object) -> bytes:
+    for name, value in fields.items():
+        setattr(response, name, value)
+    pdu: bytes = bytes([response.function_code]) + response.encode()
+    return pdu

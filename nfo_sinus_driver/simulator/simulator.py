@@ -1,0 +1,301 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line with simulated drives, running in a thread, for programs and for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+import contextlib
+import os
+import select
+import threading
+import time
+from typing import Any
+
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.simulator.control import ControlServer
+from nfo_sinus_driver.simulator.control import control_path
+from nfo_sinus_driver.simulator.control import somebody_listens
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.injections import VERBS
+from nfo_sinus_driver.simulator.injections import Target
+from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.modbus import ModbusRtu
+from nfo_sinus_driver.simulator.ports import Port
+from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.ports import PtyPort
+from nfo_sinus_driver.simulator.ports import TcpPort
+from nfo_sinus_driver.simulator.receiver import Protocol
+from nfo_sinus_driver.simulator.report import describe
+from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.timing import FORMAT_CODES
+from nfo_sinus_driver.simulator.timing import Timing
+from nfo_sinus_driver.simulator.timing import sharpen_timers
+from nfo_sinus_driver.simulator.trace import Trace
+
+PROTOCOLS: Mapping[str, type[Protocol]] = {ModbusRtu.name: ModbusRtu}
+ADDRESSES = range(1, 248)
+#: How often every drive catches up with the clock while nobody asks it (s).
+_TICK = 0.05
+#: A drive does not catch up when something is due within this time (s).
+_HURRY = 0.0005
+
+
+class Simulator:
+    """
+    Simulated drives on one line; a context manager.
+
+    :param addresses: one drive for each.
+    :param link: a symbolic link to the pseudo-terminal; without it, only the device.
+    :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
+    :param paced: bytes take the time they take on a real line.
+    :param turnaround: how long a drive takes before it answers (s).
+    :param trace: a file to write every frame to.
+    :param control: path of the control channel; ``''`` for the default one, ``None`` for none.
+    :param settings: parameters other than factory, in engineering units, by key.
+    :param boot_time: how long a drive is silent after power-on (s).
+    :raises ValueError: a wrong address, model, protocol, baud rate or parameter.
+    :raises PortError: the port or link cannot be had.
+    :raises ControlError: another simulator is there.
+
+    :ivar port: what a master opens.
+    :ivar control: path of the control channel, or ``None``.
+    :ivar finished: it serves no more, because it was stopped or because of a failure.
+    :ivar failure: what made the thread of the line fail, or ``None``.
+    :ivar drives: the drives by the addresses they began with; hold :attr:`lock` to touch them.
+    """
+
+    def __init__(
+        self,
+        addresses: Sequence[int] = (1,),
+        *,
+        model: str = 'sinus_g2',
+        protocol: str = 'modbus_rtu',
+        link: str | None = None,
+        tcp: int | None = None,
+        baud: int = 19200,
+        char_format: str = '8E1',
+        paced: bool = False,
+        turnaround: float = 0.0,
+        trace: str | None = None,
+        control: str | None = None,
+        settings: Mapping[str, Value] | None = None,
+        run_input: bool = True,
+        boot_time: float = 2.0,
+    ) -> None:
+        if protocol not in PROTOCOLS:
+            raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
+        if link is not None and tcp is not None:
+            raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
+        timing = Timing(baud, char_format)
+        data_bits = PROTOCOLS[protocol].data_bits
+        if not char_format.startswith(str(data_bits)):
+            raise ValueError(f'{protocol} has {data_bits} data bits, {char_format} has not')
+        labels = load_model(model)
+        serial = {
+            'serial.si_baud': labels['serial.si_baud'].labels[BAUD_CODES[baud]],
+            'serial.si_prot': labels['serial.si_prot'].labels[FORMAT_CODES[char_format]],
+            **(settings or {}),
+        }
+        self.drives = {
+            address: SimulatedDrive(
+                model, address, settings=serial, run_input=run_input, boot_time=boot_time
+            )
+            for address in _checked(addresses)
+        }
+        self.lock = threading.RLock()
+        self.control: str | None = None
+        self.failure: Exception | None = None
+        self.finished = threading.Event()
+        self._wake_read, self._wake_write = -1, -1
+        self._thread: threading.Thread | None = None
+        with contextlib.ExitStack() as stack:
+            if control == '' and tcp is None:
+                control = control_path(link)
+            if control and somebody_listens(control):
+                raise PortError(
+                    f'a simulator already serves there (control channel {control}): '
+                    'stop it, or choose another --link or --control'
+                )
+            port: Port = PtyPort(link) if tcp is None else TcpPort(tcp)
+            stack.callback(port.close)
+            stream = None
+            if trace is not None:
+                stream = stack.enter_context(open(trace, 'w', encoding='utf-8'))
+            self.line = Line(
+                port,
+                PROTOCOLS[protocol](),
+                list(self.drives.values()),
+                timing,
+                time.monotonic,
+                paced=paced,
+                turnaround=turnaround,
+                trace=Trace(stream) if stream else None,
+            )
+            if control == '':
+                control = control_path(tcp=int(port.name.rpartition(':')[2]))
+            if control is not None:
+                server = ControlServer(control, self._control)
+                stack.callback(server.close)
+                self.control = control
+            # nothing went wrong: keep it all until stop()
+            self._clean_up = stack.pop_all()
+        self.port = port.name
+        self.protocol = protocol
+        self.timing = timing
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._wake_read, self._wake_write = os.pipe()
+        now = time.monotonic()
+        for drive in self.drives.values():
+            drive.advance_to(now)
+        self._thread = threading.Thread(target=self._run, name='simulated line', daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop serving and remove everything that was made; a second call does nothing."""
+        if self._thread is not None:
+            self.finished.set()
+            os.write(self._wake_write, b'.')
+            self._thread.join()
+            with self.lock:
+                self._thread = None
+                os.close(self._wake_read)
+                os.close(self._wake_write)
+        self._clean_up.close()
+
+    def __enter__(self) -> Simulator:
+        self.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.stop()
+        if kind is None and self.failure is not None:
+            raise RuntimeError('the simulated line broke down') from self.failure
+
+    def state(self, address: int | None = None) -> dict[str, Any]:
+        """
+        Return the state of a drive as it is now; without an address, of the only one.
+
+        :raises ValueError: no such drive, or several to choose from.
+        """
+        with self.lock:
+            drive = self._drive(address)
+            drive.advance_to(time.monotonic())
+            return describe(drive)
+
+    def states(self) -> dict[int, dict[str, Any]]:
+        """Return the states of all drives, by the addresses they began with."""
+        return {address: self.state(address) for address in self.drives}
+
+    def inject(
+        self, what: str, *values: object, address: int | None = None, **arguments: object
+    ) -> None:
+        """
+        Let something happen: see :data:`~nfo_sinus_driver.simulator.injections.VERBS`.
+
+        :raises ValueError: no such verb, drive or argument, or a value that is not possible.
+        """
+        if what not in VERBS:
+            raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(VERBS)}')
+        verb = VERBS[what]
+        try:
+            bound = verb.bind(values, arguments)
+        except ValueError as error:
+            raise ValueError(f'{what} {error}') from None
+        with self.lock:
+            now = time.monotonic()
+            drive = None
+            if verb.to_drive or address is not None:
+                drive = self._drive(address)
+                drive.advance_to(now)
+            verb.act(Target(self.line, drive, now), bound)
+            if self._thread is not None:
+                os.write(self._wake_write, b'.')
+
+    def _drive(self, address: int | None) -> SimulatedDrive:
+        known = ', '.join(str(number) for number in self.drives)
+        if address is None:
+            if len(self.drives) > 1:
+                raise ValueError(f'say which drive, with --address: {known}')
+            return next(iter(self.drives.values()))
+        if address not in self.drives:
+            raise ValueError(f'no drive has address {address}, only {known}')
+        return self.drives[address]
+
+    def _control(self, verb: str, arguments: dict[str, Any]) -> Any:
+        if verb == 'state':
+            return self.state(arguments.get('address'))
+        if verb == 'states':
+            return self.states()
+        if verb == 'inject':
+            named = arguments.get('arguments') or {}
+            address = arguments.get('address')
+            values = arguments.get('values') or ()
+            return self.inject(arguments['what'], *values, address=address, **named)
+        raise ValueError(f'unknown request {verb!r}')
+
+    def _run(self) -> None:
+        try:
+            sharpen_timers()
+            self._serve()
+        except Exception as error:
+            self.failure = error
+            raise
+        finally:
+            self.finished.set()
+
+    def _serve(self) -> None:
+        line = self.line
+        turn = list(self.drives.values())
+        tick = time.monotonic()
+        while not self.finished.is_set():
+            until = min(line.due, tick)
+            ports = line.port.filenos()
+            wait = max(0.0, until - time.monotonic())
+            ready, _, _ = select.select([*ports, self._wake_read], [], [], wait)
+            with self.lock:
+                if self._wake_read in ready:
+                    os.read(self._wake_read, 4096)
+                if ports and ports[0] in ready:
+                    data = line.port.receive()
+                    if data:
+                        line.receive(data, time.monotonic())
+                now = time.monotonic()
+                line.act(now)
+                if now < tick:
+                    continue
+                if line.due < now + _HURRY:
+                    tick = line.due + _HURRY
+                else:
+                    # one drive at a time, so that an answer never waits for all of them
+                    drive = turn.pop(0)
+                    turn.append(drive)
+                    drive.advance_to(now)
+                    tick = now + _TICK / len(turn)
+
+
+def _checked(addresses: Sequence[int]) -> Sequence[int]:
+    for address in addresses:
+        if address not in ADDRESSES:
+            raise ValueError(f'address {address} is not possible: 1 to 247')
+        if addresses.count(address) > 1:
+            raise ValueError(f'address {address} is given twice')
+    if not addresses:
+        raise ValueError('a line needs a drive')
+    return addresses

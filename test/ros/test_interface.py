@@ -1,0 +1,293 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Names, types, quality of service and answers, as a ROS user meets them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from bench import TOPICS
+from bench import Bench
+from bench import Client
+from bench import seconds
+from bench import wait_until
+from diagnostic_msgs.msg import DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import InvSt
+import pytest
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import ReliabilityPolicy
+
+_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
+
+_SETTINGS = {
+    'address': 1,
+    'model': 'sinus_g2',
+    'control_method': 'mode_scmd',
+    'autostart': True,
+    'poll_rate': 0.0,
+    'telemetry_rate': 2.0,
+    'setpoint_timeout': 2.5,
+    'setpoint_max': 0.0,
+    'expected_control_mode': '',
+    'drive_timeout': 0.0,
+    'shutdown_timeout': 4.0,
+    'frame_id': '',
+}
+
+
+def _stamps_increase(client: Client, topic: str) -> bool:
+    stamps = [seconds(message.header.stamp) for message in client.messages[topic]]
+    return len(stamps) > 3 and all(a < b for a, b in itertools.pairwise(stamps))
+
+
+def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK)
+    bench.driver('-p', 'frame_id:=drive', '-p', 'telemetry_rate:=10.0')
+    client = bench.client().connected()
+    with client.run_at(25.0):
+        status = client.wait_for('status', lambda status: status.setpoint_reached, 'reached')
+        assert status.header.frame_id == 'drive'
+        assert status.control_method == DriveStatus.MODE_SCMD
+        assert status.control_mode == DriveStatus.FREQUE
+        assert status.unit == 'Hz'
+        assert status.setpoint == 25.0
+        assert 0 <= status.setpoint_age < 2.5
+        assert not status.setpoint_clamped
+        assert status.actual == pytest.approx(25.0, abs=0.5)
+        assert status.state == DriveStatus.OPERATION_ENABLED
+        assert status.operation_enabled and status.switched_on and status.ready
+        assert status.network_control and status.network_reference
+        assert not status.reverse and not status.fault
+        assert status.valid & DriveStatus.VALID_FAULT
+        assert not status.valid & DriveStatus.VALID_RUN_INPUT_MISSING
+        assert _stamps_increase(client, 'status')
+        assert client.latest('inv_st').text == 'Bus Run'
+        assert client.latest('inv_st').kind == InvSt.STATUS
+        client.wait_for('actual_frequency', lambda m: abs(m.data - 25) < 0.5, 'frequency')
+        speed = drive.state()['speed']
+        client.wait_for('actual_speed', lambda m: abs(m.data - speed) < 30, 'speed')
+        telemetry = client.wait_for('telemetry', lambda m: abs(m.frequency - 25) < 0.5, 'telemetry')
+        assert telemetry.output_current > 1
+        assert telemetry.output_voltage > 100
+        assert telemetry.dc_link_voltage == pytest.approx(565, abs=40)
+        values = {name: getattr(telemetry, name) for name in telemetry.get_fields_and_field_types()}
+        del values['header']
+        assert not [name for name, value in values.items() if math.isnan(value)]
+    with client.setpoints(-10.0):
+        client.wait_for('status', lambda status: status.actual < -9, 'reverse')
+        assert client.latest('status').reverse
+
+
+def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench) -> None:
+    bench.simulator('--address', '7')
+    driver = bench.driver()
+    client = bench.client()
+    wait_until(lambda: len(client.messages['statistics']) > 1, 'statistics')
+    client.wait_for('status', lambda status: not status.connected, 'a status all the same')
+    assert math.isnan(client.latest('status').actual)
+    wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'diagnostics of the drive')
+    wait_until(lambda: _diagnosis(client, 'nfo_sinus_bus: line'), 'diagnostics of the line')
+    wait_until(lambda: 'BusType' in driver.text, 'advice in the log')
+    advice = driver.text
+    order = [advice.index(word) for word in ('BusType', 'S5', 'address, baud', 'parity;')]
+    assert order == sorted(order)
+    client.wait_for('statistics', lambda message: message.timeouts > 3, 'it goes on trying')
+    assert driver.text.count('BusType') == 1, 'it is said once'
+
+
+def _diagnosis(client: Client, name: str) -> DiagnosticStatus | None:
+    for message in reversed(client.messages['diagnostics']):
+        for status in message.status:
+            if status.name == name:
+                return status
+    return None
+
+
+def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
+    drive = bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+    wait_until(
+        lambda: _diagnosis(client, 'nfo_sinus: drive').level == DiagnosticStatus.OK, 'all is well'
+    )
+    drive.inject('fault', 8)
+    diagnosis = wait_until(
+        lambda: (
+            status := _diagnosis(client, 'nfo_sinus: drive')
+        ).level == DiagnosticStatus.ERROR and status,
+        'the fault',
+    )
+    assert diagnosis.message.startswith('DC High: ')
+    assert 'control.retard' in diagnosis.message
+    inv_st = client.wait_for('inv_st', lambda message: message.code == 8, 'the fault')
+    assert inv_st.kind == InvSt.FAULT
+    assert inv_st.requires_ack
+    assert inv_st.remedy
+
+
+def test_inv_st_is_there_for_late_comers(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    bench.client().connected()
+    late = bench.client()
+    late.wait_for('inv_st', lambda message: message.text == 'Stop', 'the inverter status')
+
+
+def test_quality_of_service(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+    node = client.node
+    for topic in TOPICS:
+        (info,) = node.get_publishers_info_by_topic(f'/nfo_sinus/{topic}')
+        assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE, topic
+        latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        assert latched == (topic == 'inv_st'), topic
+    (info,) = node.get_subscriptions_info_by_topic('/nfo_sinus/setpoint')
+    assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert info.qos_profile.durability == DurabilityPolicy.VOLATILE
+
+
+def test_the_settings_have_their_defaults_and_descriptions(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+    names = client.parameter_names()
+    for name, default in _SETTINGS.items():
+        assert name in names
+        assert client.parameter(name) == default
+        assert client.descriptor(name).description
+    assert client.descriptor('setpoint_timeout').floating_point_range[0].to_value == 3600
+    bus = bench.client('/nfo_sinus_bus')
+    assert bus.parameter('response_timeout') == 0.2
+    assert bus.parameter('drives') == ['nfo_sinus']
+    assert bus.descriptor('port').read_only
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'reason'),
+    [
+        ('address', 5, 'unconfigured'),
+        ('control_method', 'monitor', 'unconfigured'),
+        ('setpoint_timeout', -1.0, 'setpoint_timeout'),
+        ('drive_timeout', 0.55, 'at least 1 s'),
+        ('drive_timeout', 1.25, 'lies between two steps of the drive, 1.2 and 1.3'),
+        ('drive_timeout', 26.0, 'drive_timeout'),
+        ('expected_control_mode', 'Warp', "choose one of '', 'Freque'"),
+        ('poll_rate', 'fast', 'Wrong parameter type'),
+    ],
+)
+def test_a_setting_that_makes_no_sense_is_refused_with_the_reason(
+    bench: Bench, name: str, value: object, reason: str
+) -> None:
+    bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+    before = client.parameter(name)
+    result = client.set_parameters(**{name: value})
+    assert not result.successful
+    assert reason in result.reason
+    assert client.parameter(name) == before
+
+
+def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK)
+    bench.driver()
+    client = bench.client().connected()
+    assert client.set_parameters(setpoint_max=10, telemetry_rate=20).successful
+    assert client.parameter('setpoint_max') == 10.0
+    with client.setpoints(30.0):
+        assert client.enable().success
+        status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
+        assert status.setpoint == 10.0
+    assert client.set_parameters(drive_timeout=2).successful
+    parameters = drive.state()['parameters']
+    assert parameters['serial.sio_tot'] == 2.0
+    assert parameters['serial.auto_stop'] is True
+    writes = drive.state()['writes']
+    assert client.set_parameters(drive_timeout=2.0).successful
+    assert drive.state()['writes'] == writes, 'only a change is written'
+
+
+def test_an_integer_on_the_command_line_is_taken_for_a_double(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-p', 'setpoint_timeout:=3')
+    assert bench.client().connected().parameter('setpoint_timeout') == 3.0
+
+
+def test_lifecycle_by_hand(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-p', 'autostart:=false')
+    client = bench.client()
+    client.wait_for('status', lambda status: not status.connected, 'the node is there')
+    assert client.state() == 'unconfigured'
+    assert client.change_state(Transition.TRANSITION_CONFIGURE)
+    client.wait_for('status', lambda status: status.connected, 'connected')
+    assert client.state() == 'inactive'
+    assert not client.messages['actual_speed']
+    assert not client.enable().success
+    assert client.change_state(Transition.TRANSITION_ACTIVATE)
+    client.wait_for('actual_speed', lambda message: True, 'the speed')
+    assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+    assert client.change_state(Transition.TRANSITION_CLEANUP)
+    client.wait_for('status', lambda status: not status.connected, 'disconnected')
+    assert client.set_parameters(address=9).successful
+    assert not client.change_state(Transition.TRANSITION_CONFIGURE)
+    assert client.set_parameters(address=1).successful
+    assert client.change_state(Transition.TRANSITION_CONFIGURE)
+    assert client.change_state(Transition.TRANSITION_INACTIVE_SHUTDOWN)
+    assert client.state() == 'finalized'
+
+
+def test_monitor_writes_nothing(bench: Bench) -> None:
+    drive = bench.simulator()
+    driver = bench.driver('-p', 'control_method:=monitor', '-p', 'drive_timeout:=2.0')
+    client = bench.client().connected()
+    with client.setpoints(20.0):
+        for service in ('stop', 'quick_stop', 'fault_ack'):
+            assert 'monitor' in client.call(service).message
+        assert 'monitor' in client.enable().message
+        client.wait_for('telemetry', lambda message: True, 'telemetry flows')
+    driver.end()
+    requests = [bytes.fromhex(f['hex']) for f in bench.frames() if f['direction'] == 'request']
+    assert len(requests) > 20
+    assert {request[1] for request in requests} == {3}
+    assert drive.state()['ack_reads'] == 0
+
+
+def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
+    drive = bench.simulator('--address', '1', '--address', '2', *_QUICK)
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}\n'
+        'left: {ros__parameters: {address: 1}}\n'
+        'right: {ros__parameters: {address: 2}}\n'
+    )
+    bench.driver('--params-file', str(parameters))
+    left = bench.client('/left').connected()
+    right = bench.client('/right').connected()
+    with left.run_at(15.0), right.run_at(-15.0):
+        drive.inject('silence', 60.0, address=2)
+        right.wait_for('status', lambda status: not status.connected, 'right is lost')
+        left.wait_for('statistics', lambda m: m.silent_drives == ['right'], 'it is named')
+        seen = len(left.messages['status'])
+        wait_until(lambda: len(left.messages['status']) > seen + 50, 'left is polled on')
+        assert left.latest('status').enabled
+        assert drive.state(1)['turning']
+        response = left.call('stop')
+        assert response.success, response.message

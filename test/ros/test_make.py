@@ -1,0 +1,57 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``make demo`` and ``make run`` do what they promise."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+
+from bench import Bench
+from bench import Process
+from bench import wait_until
+
+_DEMO_TIME = 100.0
+
+
+def test_the_demo_rides_to_its_end() -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', 'nfo_sinus_driver.node.demo'],
+        capture_output=True,
+        text=True,
+        timeout=_DEMO_TIME,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    for step in ('enable: enabled', '30.0 Hz', '-20.0 Hz', 'Overload', 'acknowledged 5', 'stop:'):
+        assert step in done.stdout, done.stdout
+
+
+def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
+    command = [sys.executable, '-m', 'nfo_sinus_driver.node.make_run']
+    process = Process(command, environment, bench.folder / 'make_run.log')
+    bench.callback(process.end)
+    client = bench.client().connected()
+    with client.run_at(15.0):
+        port = re.search(r'simulator inject --link (\S+)', process.text)
+        assert port, process.text
+        process.signal(signal.SIGINT)
+        assert process.wait() == 0
+    wait_until(lambda: 'control given back' in process.text, 'the driver stopped the motor')
+    assert not os.path.exists(port[1]), 'the simulator left its port behind'

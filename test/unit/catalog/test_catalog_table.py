@@ -1,0 +1,429 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The parameter table of the NFO Sinus G2, row by row."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+import math
+
+import pytest
+
+from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import RawType
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+
+G2 = load_model('sinus_g2')
+ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
+MODBUS = [parameter for parameter in G2.values() if Protocol.MODBUS in parameter.places]
+CLASSIC = [parameter for parameter in G2.values() if Protocol.CLASSIC in parameter.places]
+
+#: The type of each setting's values, from the project's list of parameter names.
+KINDS = {
+    'motor.p_nom': float,
+    'motor.u_nom': int,
+    'motor.f_nom': int,
+    'motor.n_nom': int,
+    'motor.i_nom': float,
+    'motor.cos_phi': float,
+    'motor.r_stat': float,
+    'motor.r_rot': float,
+    'motor.l_main': float,
+    'motor.sigma': float,
+    'motor.i_magn': float,
+    'motor.i_limt': float,
+    'control.mode': str,
+    'control.accel': float,
+    'control.retard': float,
+    'control.run_dly': int,
+    'control.dc_brk': int,
+    'control.ain_set': str,
+    'control.auto_start': bool,
+    'control.energy_save': bool,
+    'control.st_mode': str,
+    'control.kp_spd': float,
+    'control.ti_spd': float,
+    'control.f_sleep': float,
+    'control.byp_fr': float,
+    'control.byp_bw': float,
+    'control.any_bus': str,
+    'pi_reg.unit': str,
+    'serial.bus_type': str,
+    'serial.address': int,
+    'serial.si_baud': str,
+    'serial.si_prot': str,
+    'serial.sio_tot': float,
+    'serial.auto_reset': bool,
+    'serial.auto_stop': bool,
+}
+
+#: Base registers that are not those of an instance: 210h + 4 (ADI - 1) and so much more.
+OFFSETS = {
+    'control.accel': 2,  # the time of a ramp, behind its speed [C46]
+    'control.retard': 2,
+    'fieldbus.inv_st': 1,  # beside the one that acknowledges
+    'fieldbus.spd_scl_denominator': 2,  # behind the numerator
+}
+
+#: The enumerations, as [M0 table 4] prints them.
+LABELS = {
+    'control.mode': {0: 'Freque', 1: 'PI-Reg', 2: 'Torque', 3: 'Speed'},
+    'control.ain_set': {
+        3: '0-20mA',
+        4: '4-20mA',
+        5: '+/-20mA',
+        6: '0-10V',
+        7: '2-10V',
+        8: '+/-10V',
+        9: 'Pot 10k',
+    },
+    'control.auto_start': {0: 'OFF', 1: 'ON'},
+    'control.energy_save': {0: 'OFF', 1: 'ON'},
+    'control.st_mode': {0: 'Release', 1: 'Brake'},
+    'control.any_bus': {3: 'PPO3'},
+    'pi_reg.unit': {
+        0: 'None',
+        1: 'Pa',
+        2: 'kPa',
+        3: 'bar',
+        4: 'rpm',
+        5: 'm³/s',
+        6: 'l/s',
+        7: 'm³/h',
+        8: 'l/h',
+        9: 'ppm',
+        10: '%',
+        11: 'V',
+        12: 'Hz',
+    },
+    'serial.bus_type': {0: 'None', 1: 'NFO', 2: 'MbusAsc', 3: 'MbusRtu', 4: 'ABCC'},
+    'serial.si_baud': {
+        16: '1200bps',
+        32: '2400bps',
+        64: '4800bps',
+        128: '9600bps',
+        256: '19200bps',
+        512: '38400 bps',
+        768: '57600 bps',
+    },
+    # the s that the manual lost in '8b Op 1' is put back [C5]
+    'serial.si_prot': {
+        0: '7b Ep 1s',
+        1: '7b Op 1s',
+        2: '7b Np 2s',
+        4: '8b Ep 1s',
+        5: '8b Op 1s',
+        6: '8b Np 2s',
+    },
+    'serial.auto_reset': {0: 'OFF', 1: 'ON'},
+    'serial.auto_stop': {0: 'OFF', 1: 'ON'},
+}
+
+#: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
+GOLDEN = [
+    ('motor.p_nom', 0x220, 'UINT32', 'kW', 1.5, (1500, 0)),
+    ('motor.p_nom', 0x220, 'UINT32', 'kW', 100.0, (0x86A0, 1)),
+    ('motor.u_nom', 0x224, 'UINT16', 'V', 400, (400,)),
+    ('motor.f_nom', 0x228, 'UINT16', 'Hz', 50, (50,)),
+    ('motor.n_nom', 0x22C, 'UINT16', 'rpm', 1440, (1440,)),
+    ('motor.i_nom', 0x230, 'UINT32', 'A', 3.4, (3400, 0)),
+    ('motor.cos_phi', 0x234, 'UINT16', '', 0.82, (820,)),
+    ('motor.r_stat', 0x238, 'UINT32', 'Ω', 4.2, (4200, 0)),
+    ('motor.l_main', 0x240, 'UINT32', 'H', 0.36, (0x7E40, 5)),
+    ('motor.sigma', 0x244, 'UINT16', '', 0.08, (80,)),
+    ('motor.i_limt', 0x24C, 'UINT32', 'A', 70.0, (4464, 1)),
+    ('control.mode', 0x29C, 'ENUM', '', 'Speed', (3,)),
+    ('control.accel', 0x27E, 'SINT32', 's', 5.0, (5000, 0)),
+    ('control.retard', 0x282, 'SINT32', 's', 60.0, (60000, 0)),
+    ('control.retard', 0x282, 'SINT32', 's', 500.0, (0xA120, 7)),
+    ('control.run_dly', 0x2BC, 'UINT16', 's', 3600, (3600,)),
+    ('control.st_mode', 0x290, 'ENUM', '', 'Brake', (1,)),
+    ('control.kp_spd', 0x2D0, 'UINT16', '', 2.0, (200,)),
+    ('control.f_sleep', 0x2D8, 'UINT16', 'Hz', 2.5, (25,)),
+    ('pi_reg.unit', 0x3AC, 'ENUM', '', 'm³/h', (7,)),
+    ('serial.address', 0x3D0, 'UINT16', '', 247, (247,)),
+    ('serial.si_baud', 0x3D4, 'ENUM', '', '57600 bps', (768,)),
+    ('serial.sio_tot', 0x3DC, 'UINT16', 's', 25.0, (250,)),
+    ('serial.auto_stop', 0x3E4, 'ENUM', '', True, (1,)),
+    ('status.frq_set', 0x3FC, 'SINT16', 'Hz', -20.0, (0xFF38,)),
+    ('status.spd_set', 0x25C, 'SINT16', 'rpm', 1440, (1440,)),
+    ('status.trq_set', 0x408, 'SINT16', '%', -200, (0xFF38,)),
+    ('status.reg_set', 0x410, 'SINT16', '', 12.5, (125,)),
+    ('fieldbus.mode', 0x294, 'UINT16', '', 3, (3,)),
+    ('fieldbus.scmd', 0x298, 'UINT16', '', 0x101, (0x101,)),
+    ('fieldbus.drive_control', 0x254, 'UINT16', '', 0xC07F, (0xC07F,)),
+]
+
+#: The same for what can only be read.
+GOLDEN_READ = [
+    ('status.u_rms', 0x3E8, 'SINT16', 'V', 231, (231,)),
+    ('status.i_rms', 0x3EC, 'SINT32', 'A', 3.25, (3250, 0)),
+    ('status.p_out', 0x3F0, 'SINT32', 'W', -1500, (0xFA24, 0xFFFF)),
+    ('status.pf', 0x3F4, 'SINT16', '', 0.82, (820,)),
+    ('status.dc_link', 0x3F8, 'SINT16', 'V', 565, (565,)),
+    ('status.frq_act', 0x400, 'SINT16', 'Hz', -0.1, (0xFFFF,)),
+    ('status.frq_act', 0x400, 'SINT16', 'Hz', 49.9, (499,)),
+    ('status.spd_act', 0x264, 'SINT16', 'rpm', -1440, (0xFA60,)),
+    ('status.trq_act', 0x40C, 'SINT16', '%', 100, (100,)),
+    ('status.pt1000', 0x418, 'SINT16', '°C', -12.5, (0xFF83,)),
+    ('status.m_temp', 0x41C, 'SINT16', '%', 87.5, (875,)),
+    ('status.op_time', 0x2A8, 'SINT32', 'h', 12345.6, (0xE240, 1)),
+    ('status.br_time', 0x420, 'SINT32', 's', 65536, (0, 1)),
+    ('status.e_out', 0x5B0, 'SINT32', 'kWh', 1.234, (1234, 0)),
+    ('status.sigma_e_out', 0x5B4, 'SINT32', 'kWh', 1520, (1520, 0)),
+    ('fieldbus.sw_ver', 0x2B0, 'UINT16', '', 4.28, (428,)),
+    ('fieldbus.nfo_ver', 0x2B4, 'UINT16', '', 4018, (4018,)),
+    ('fieldbus.inv_st', 0x2A5, 'UINT16', '', 37, (37,)),
+    ('fieldbus.inv_st_with_ack', 0x2A4, 'UINT16', '', 5, (5,)),
+    ('fieldbus.drive_status', 0x258, 'UINT32', '', 0x0337, (0x0337, 0)),
+    ('fieldbus.spd_scl_numerator', 0x268, 'SINT32', '', 1, (1, 0)),
+    ('fieldbus.spd_scl_denominator', 0x26A, 'SINT32', '', 1, (1, 0)),
+]
+
+#: The same on Classic: key, ids, type, value, words.
+GOLDEN_CLASSIC = [
+    ('motor.p_nom', (0x0008,), 'SINT16', 1.5, (150,)),
+    ('motor.i_nom', (0x0011,), 'SINT16', 3.4, (34,)),
+    ('motor.cos_phi', (0x0015,), 'SINT16', 0.82, (82,)),
+    ('motor.l_main', (0x0004,), 'SINT16', 0.36, (3600,)),
+    ('control.accel', (0x001D,), 'SINT16', 5.0, (50,)),
+    ('control.retard', (0x001C,), 'SINT16', 60.0, (600,)),
+    ('serial.sio_tot', (0x00AB,), 'SINT16', 2.5, (25,)),
+    ('status.i_rms', (0x0095,), 'SINT16', 3.25, (325,)),
+    ('status.pf', (0x00DB,), 'SINT16', 0.82, (82,)),
+    ('status.dc_link', (0x0014,), 'SINT16', 565.5, (5655,)),
+    ('status.frq_act', (0x00B6,), 'SINT16', -0.1, (0xFFFF,)),
+    ('status.op_time', (0x0027, 0x0127), 'SINT32', 12345.6, (0xE240, 1)),
+    ('status.br_time', (0x00DD, 0x00DE), 'SINT32', 65536, (0, 1)),
+    ('fieldbus.spd_scl_numerator', (0x00E2, 0x00E1), 'SINT32', 1, (1, 0)),
+    ('fieldbus.drive_status', (0x007D,), 'UINT16', 0x0337, (0x0337,)),
+]
+
+#: The 13 parameters whose scale differs between the buses [C14].
+SCALED_OTHERWISE = {
+    'motor.p_nom',
+    'motor.i_nom',
+    'motor.cos_phi',
+    'motor.r_stat',
+    'motor.r_rot',
+    'motor.l_main',
+    'motor.i_magn',
+    'motor.i_limt',
+    'control.accel',
+    'control.retard',
+    'status.i_rms',
+    'status.pf',
+    'status.dc_link',
+}
+
+
+def words_of(parameter: Parameter, protocol: Protocol, value: Fraction) -> tuple[int, ...]:
+    """The words of an exact value; fails unless it is a whole number of counts that fits."""
+    raw = value / parameter.factor(protocol)
+    assert raw.denominator == 1, f'{parameter.key}: {value} is between two counts'
+    return parameter.place(protocol).type.to_words(raw.numerator)
+
+
+def test_groups_of_the_first_session_are_whole() -> None:
+    assert {key for key in G2 if key.startswith(('motor.', 'control.', 'serial.', 'pi_reg.'))} >= {
+        *KINDS
+    }
+    assert sum(key.startswith('motor.') for key in G2) == 12
+    assert sum(key.startswith('control.') for key in G2) == 15
+    assert sum(key.startswith('serial.') for key in G2) == 7
+    assert sum(key.startswith('status.') for key in G2) == 20
+
+
+def test_keys_and_addresses_are_unique() -> None:
+    registers = [
+        register
+        for parameter in MODBUS
+        for register in range(
+            parameter.place(Protocol.MODBUS).address,
+            parameter.place(Protocol.MODBUS).address + parameter.place(Protocol.MODBUS).words,
+        )
+    ]
+    ids = [number for p in CLASSIC for number in p.place(Protocol.CLASSIC).addresses]
+    assert len(set(registers)) == len(registers)
+    assert len(set(ids)) == len(ids)
+    assert len({(parameter.group, parameter.name) for parameter in G2.values()}) == len(G2)
+
+
+@ROWS
+def test_row_is_consistent(parameter: Parameter) -> None:
+    group, _, name = parameter.key.partition('.')
+    assert group == parameter.group.lower().replace(' ', '_')
+    assert name and name == name.lower()
+    assert parameter.description
+    assert parameter.source.startswith('M0 ')
+    assert parameter.labels == LABELS.get(parameter.key, {})
+    assert bool(parameter.labels) == any(
+        place.type is RawType.ENUM for place in parameter.places.values()
+    )
+    if parameter.access is Access.READ:
+        # the drive says what is possible, so there is nothing to check
+        assert parameter.minimum is parameter.maximum is None
+    for protocol, place in parameter.places.items():
+        count = place.words if protocol is Protocol.CLASSIC else 1
+        assert len(place.addresses) == count
+        assert all(0 <= address <= 0xFFFF for address in place.addresses)
+
+
+@pytest.mark.parametrize('parameter', MODBUS, ids=lambda parameter: parameter.key)
+def test_register_follows_the_formula(parameter: Parameter) -> None:
+    register = parameter.place(Protocol.MODBUS).address
+    assert register >= 0x210
+    assert (register - 0x210) % 4 == OFFSETS.get(parameter.key, 0)
+    # no parameter reaches into the next one's registers
+    assert (register - 0x210) % 4 + parameter.place(Protocol.MODBUS).words <= 4
+
+
+@ROWS
+def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
+    for protocol in parameter.places:
+        for bound in (parameter.minimum, parameter.maximum):
+            if bound is not None:
+                words_of(parameter, protocol, bound)
+        for code in parameter.labels:
+            assert parameter.place(protocol).type.to_words(code) == (code,)
+
+
+@ROWS
+def test_kind_of_the_values(parameter: Parameter) -> None:
+    if parameter.access is Access.READ_WRITE and not parameter.key.startswith(
+        ('status.', 'fieldbus.')
+    ):
+        assert parameter.kind is KINDS[parameter.key]
+    decoded = parameter.decode((0,) * next(iter(parameter.places.values())).words, next(
+        iter(parameter.places)
+    ))
+    assert type(decoded) is parameter.kind
+
+
+def test_parameters_that_are_scaled_differently_on_the_two_buses() -> None:
+    both = [p for p in G2.values() if len(p.places) == 2]
+    differ = {p.key for p in both if p.factor(Protocol.MODBUS) != p.factor(Protocol.CLASSIC)}
+    assert differ == SCALED_OTHERWISE
+
+
+def test_what_acknowledges_by_being_read() -> None:
+    assert {key for key, row in G2.items() if row.access is Access.ACKNOWLEDGE} == {
+        'fieldbus.inv_st_with_ack',
+        'fieldbus.sio_err',
+    }
+
+
+def test_what_can_only_be_written() -> None:
+    assert {key for key, row in G2.items() if row.access is Access.WRITE} == {
+        'fieldbus.scmd',
+        'fieldbus.drv_ctrl_write_mask',
+    }
+
+
+def test_what_needs_the_motor_to_stand() -> None:
+    # type Init in [M2 table 1]: the motor's data, Mode and AinSet; all else is Init/Run
+    motor = {key for key in G2 if key.startswith('motor.')}
+    needs = {key for key, row in G2.items() if row.stopped}
+    assert needs == motor | {'control.mode', 'control.ain_set'}
+
+
+def test_what_newer_firmware_has() -> None:
+    since = {key: row.since for key, row in G2.items() if row.since is not None}
+    newer = Fraction('4.38')
+    assert since == {'status.e_out': newer, 'status.sigma_e_out': newer}
+
+
+@pytest.mark.parametrize(
+    ('key', 'minimum', 'maximum'),
+    [
+        ('motor.p_nom', 0.01, 100),
+        ('motor.u_nom', 1, 1000),
+        ('motor.f_nom', 1, 500),
+        ('motor.n_nom', 5, 32765),
+        ('motor.i_nom', 0.1, None),
+        ('motor.cos_phi', 0.01, 1),
+        ('motor.l_main', None, None),
+        ('motor.sigma', 0.001, 1),
+        ('control.accel', 0.2, 500),
+        ('control.retard', 0.2, 500),
+        ('control.run_dly', 0, 3600),
+        ('control.ti_spd', 0.01, 10),
+        ('control.byp_fr', 0, 150),
+        ('serial.sio_tot', 0, 25),
+        ('serial.address', 0, 247),
+        ('status.frq_set', -150, 150),
+        ('status.spd_set', -9000, 9000),
+        ('status.trq_set', -200, 200),
+        ('status.reg_set', -150, 150),
+    ],
+)
+def test_range_is_in_engineering_units(
+    key: str, minimum: float | None, maximum: float | None
+) -> None:
+    # the manual prints raw counts of Classic [C33]
+    row = G2[key]
+    assert (row.minimum and float(row.minimum)) == minimum
+    assert (row.maximum and float(row.maximum)) == maximum
+
+
+@pytest.mark.parametrize(
+    ('key', 'register', 'type_', 'unit', 'value', 'words'), GOLDEN + GOLDEN_READ
+)
+def test_golden_row(
+    key: str, register: int, type_: str, unit: str, value: Value, words: tuple[int, ...]
+) -> None:
+    row = G2[key]
+    place = row.place(Protocol.MODBUS)
+    assert (place.address, place.type, row.unit) == (register, RawType[type_], unit)
+    assert row.decode(words) == value
+    assert row.encode(value) == words
+
+
+@pytest.mark.parametrize(('key', 'ids', 'type_', 'value', 'words'), GOLDEN_CLASSIC)
+def test_golden_row_of_classic(
+    key: str, ids: tuple[int, ...], type_: str, value: Value, words: tuple[int, ...]
+) -> None:
+    row = G2[key]
+    place = row.place(Protocol.CLASSIC)
+    assert (place.addresses, place.type) == (ids, RawType[type_])
+    assert row.decode(words, Protocol.CLASSIC) == value
+    assert row.encode(value, Protocol.CLASSIC) == words
+
+
+def test_parameter_that_is_not_on_a_bus_says_so() -> None:
+    with pytest.raises(KeyError, match=r'control\.any_bus cannot be reached over modbus'):
+        G2['control.any_bus'].place(Protocol.MODBUS)
+    with pytest.raises(KeyError, match='cannot be reached over classic'):
+        G2['fieldbus.profidrive_status'].decode((0,), Protocol.CLASSIC)
+
+
+def test_model_is_a_mapping_of_its_parameters() -> None:
+    assert isinstance(G2, Model)
+    assert G2.name == 'sinus_g2'
+    assert len(G2) == len(list(G2)) >= 70
+    assert all(G2[key].key == key for key in G2)
+    assert 'motor.nothing' not in G2
+
+
+def test_times_of_the_ramps_are_not_the_speeds_before_them() -> None:
+    # the speed half of a ramp stands at the base and must never be written [C46]
+    registers = {parameter.place(Protocol.MODBUS).address for parameter in MODBUS}
+    assert registers.isdisjoint({0x27C, 0x27D, 0x280, 0x281})
+    assert math.isclose(float(G2['control.accel'].factor(Protocol.MODBUS)), 0.001)

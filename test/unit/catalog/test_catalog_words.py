@@ -1,0 +1,283 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Status codes, control and status words [M0 tables 14 to 19]."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.catalog import Control
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import state_of
+from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
+from nfo_sinus_driver.catalog.inv_st import BUS_RUNNING
+from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
+from nfo_sinus_driver.catalog.inv_st import LOCAL
+from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.catalog.inv_st import START_DELAY
+from nfo_sinus_driver.catalog.inv_st import TUNING
+
+G2 = load_model('sinus_g2')
+
+#: The display texts of [M0 table 19]; 41 to 44 are from [M2 table 3].
+TEXTS = [
+    'Erased',
+    'Par Fail',
+    'AC Fail',
+    'Temp Hi',
+    'PTC Temp',
+    'Overload',
+    'Ain Fail',
+    'DC Low',
+    'DC High',
+    'GND Fail',
+    'ImagnLow',
+    'Cur Low',
+    'Cur High',
+    'Run Fail',
+    'Sio Fail',
+    'Bus Fail',
+    'TunFailP',
+    'TunFailM',
+    'NFO Fail',
+    'CopReset',
+    'NfoReset',
+    'CommRest',
+    'ParRange',
+    'ExeTimeE',
+    'Stop',
+    'Wait...',
+    'Brake Ch',
+    'Cur Limt',
+    'Tuning',
+    'St still',
+    'Final fr',
+    'Loc Acc',
+    'Loc Ret',
+    'Ext Stby',
+    'Ext Run',
+    'Ext Acc',
+    'Ext Ret',
+    'Bus Stby',
+    'Bus Run',
+    'Bus Acc',
+    'Bus Ret',
+    'Bus Stby',
+    'Bus Run',
+    'Bus Acc',
+    'Bus Ret',
+    'TuningOK',
+    'RsMeasOK',
+    'ParClcOK',
+]
+#: What firmware before 4.28 shows for 37 to 40 [C3].
+OLD_TEXTS = {37: 'Sio Stby', 38: 'Sio Run', 39: 'Sio Acc', 40: 'Sio Ret'}
+
+#: The patterns of [M0 table 16], copied from the manual once more.
+PATTERNS = [
+    ('00XX XXXX X0XX 0000', State.NOT_READY_TO_SWITCH_ON),
+    ('00XX XXXX X1XX 0000', State.SWITCH_ON_DISABLED),
+    ('00XX XXXX X01X 0001', State.READY_TO_SWITCH_ON),
+    ('00XX XXXX X01X 0011', State.SWITCHED_ON),
+    ('00XX XXXX X01X 0111', State.OPERATION_ENABLED),
+    ('01XX XXXX X01X 0011', State.OPERATION_ENABLED),
+    ('10XX XXXX X01X 0111', State.STOPPING),
+    ('11XX XXXX X01X 0011', State.STOPPING),
+    ('10XX XXXX X00X 0111', State.QUICK_STOP),
+    ('11XX XXXX X00X 0011', State.QUICK_STOP),
+    ('10XX XXXX X0XX 1111', State.FAULT_REACTION_ACTIVE),
+    ('11XX XXXX X0XX 1011', State.FAULT_REACTION_ACTIVE),
+    ('00XX XXXX X0XX 1000', State.FAULTED),
+]
+
+
+def fixed_bits(printed: str) -> tuple[int, int]:
+    """Which bits a pattern of the manual fixes, and what they are."""
+    mask = fixed = 0
+    for bit in printed.replace(' ', ''):
+        mask = mask << 1 | (bit != 'X')
+        fixed = fixed << 1 | (bit == '1')
+    return mask, fixed
+
+
+@pytest.mark.parametrize('code', range(48))
+def test_inverter_status(code: int) -> None:
+    entry = G2.inv_st(code)
+    assert (entry.code, entry.text) == (code, TEXTS[code])
+    assert entry.old_text == OLD_TEXTS.get(code, TEXTS[code])
+    assert entry.requires_ack == (1 <= code <= 23 and code != 15)
+    expected = Kind.FAULT if 1 <= code <= 23 else Kind.ALARM if code == 27 else Kind.STATUS
+    assert entry.kind is expected
+    assert entry.description
+    # who reads of a fault wants to know what to do
+    assert bool(entry.remedy) == (entry.kind is not Kind.STATUS)
+
+
+@pytest.mark.parametrize(
+    ('firmware', 'old'),
+    [('4.27', True), ('3.9', True), ('4.28', False), ('4.38', False), ('5', False)],
+)
+def test_texts_of_old_firmware(firmware: str, old: bool) -> None:
+    for code, text in enumerate(TEXTS):
+        expected = OLD_TEXTS.get(code, text) if old else text
+        assert G2.inv_st_text(code, Fraction(firmware)) == expected
+
+
+def test_texts_of_firmware_as_it_is_read() -> None:
+    # SWVer comes as a binary fraction, a hair beside 4.28
+    assert G2.inv_st_text(37, Fraction(G2['fieldbus.sw_ver'].decode((428,)))) == 'Bus Stby'
+    assert G2.inv_st_text(37, Fraction(G2['fieldbus.sw_ver'].decode((427,)))) == 'Sio Stby'
+
+
+def test_texts_of_unknown_firmware() -> None:
+    assert [G2.inv_st_text(code) for code in range(48)] == TEXTS
+
+
+@pytest.mark.parametrize('code', [48, 99, 0xFFFF])
+def test_unlisted_status_code(code: int) -> None:
+    entry = G2.inv_st(code)
+    assert (entry.code, entry.text, entry.kind) == (code, f'Code {code}', Kind.STATUS)
+    assert not entry.requires_ack
+    assert G2.inv_st_text(code, Fraction('4.20')) == f'Code {code}'
+
+
+def test_groups_of_status_codes() -> None:
+    assert {code for code in range(48) if 'Stby' in TEXTS[code]} == BUS_STANDBY | {33}
+    assert {code for code in range(48) if TEXTS[code].startswith('Bus ')} == (
+        BUS_RUNNING | BUS_STANDBY | {BUS_FAIL}
+    )
+    assert {TEXTS[code] for code in LOCAL} == {
+        'Stop',
+        'St still',
+        'Final fr',
+        'Loc Acc',
+        'Loc Ret',
+        'Ext Stby',
+        'Ext Run',
+        'Ext Acc',
+        'Ext Ret',
+    }
+    assert [TEXTS[code] for code in (START_DELAY, TUNING, SIO_FAIL, BUS_FAIL)] == [
+        'Wait...',
+        'Tuning',
+        'Sio Fail',
+        'Bus Fail',
+    ]
+    assert not BUS_RUNNING & BUS_STANDBY
+    assert not LOCAL & (BUS_RUNNING | BUS_STANDBY)
+
+
+def test_codes_of_mode() -> None:
+    assert {mode.name: mode.value for mode in Mode} == {'INHIBIT': 0, 'STOP': 1, 'EXT': 2, 'BUS': 3}
+
+
+def test_codes_of_scmd() -> None:
+    # [M0 table 18]
+    printed = {
+        'STOP': 0x00,
+        'ANALOG_F': 0x03,
+        'ANALOG_R': 0x05,
+        'OP_MODE': 0x41,
+        'TERMINAL': 0x81,
+        'FIELDBUS': 0x101,
+        'FULL_TUNING': 0x201,
+        'BASIC_TUNING': 0x301,
+        'RS_MEASURE': 0x401,
+        'PAR_CALC': 0x501,
+        'ERASE_E_LOG': 0x800,
+        'RESET_E_OUT': 0x900,
+    }
+    fixed = [0x0B, 0x0D, 0x13, 0x15, 0x1B, 0x1D, 0x23, 0x25, 0x2B, 0x2D, 0x33, 0x35, 0x3B, 0x3D]
+    names = [f'FIX_{number}_{way}' for number in range(1, 8) for way in 'FR']
+    assert {code.name: code.value for code in Scmd} == {
+        **printed,
+        **dict(zip(names, fixed, strict=True)),
+    }
+
+
+def test_bits_of_the_words() -> None:
+    # [M0 tables 14 and 15]; 8 and 9 of the one, 7, 12 and 13 of the other are reserved
+    assert {bit.name: bit.value.bit_length() - 1 for bit in Control} == {
+        'SWITCH_ON': 0,
+        'ENABLE_VOLTAGE': 1,
+        'DISABLE_QUICK_STOP': 2,
+        'ENABLE_OP': 3,
+        'ENABLE_RFG': 4,
+        'UNLOCK_RFG': 5,
+        'USE_REF_FOR_RFG': 6,
+        'RESET_MALFUNCTION': 7,
+        'EVENT_TRIGGERED_OP': 10,
+        'OVERRIDE_COAST': 11,
+        'AUTO_INIT': 12,
+        'ENABLE_REV_OP': 13,
+        'NET_CTRL': 14,
+        'NET_REF': 15,
+    }
+    assert {bit.name: bit.value.bit_length() - 1 for bit in Status} == {
+        'READY_TO_SWITCH_ON': 0,
+        'SWITCHED_ON': 1,
+        'OP_ENABLED': 2,
+        'FAULTED': 3,
+        'VOLTAGE_ENABLED': 4,
+        'QUICK_STOP_DISABLED': 5,
+        'SWITCH_ON_DISABLED': 6,
+        'REF_FROM_NET': 8,
+        'CTRL_FROM_NET': 9,
+        'SETPOINT_REACHED': 10,
+        'LIMIT_ACTIVE': 11,
+        'REV_OP_ENABLED': 14,
+        'STOPPING': 15,
+    }
+
+
+@pytest.mark.parametrize(('printed', 'state'), PATTERNS)
+@given(free=st.integers(0, 0xFFFF))
+def test_state_of_a_pattern(printed: str, state: State, free: int) -> None:
+    mask, fixed = fixed_bits(printed)
+    assert state_of(fixed | free & ~mask & 0xFFFF) is state
+
+
+def test_no_word_is_two_states() -> None:
+    counts = dict.fromkeys(State, 0)
+    patterns = [(*fixed_bits(printed), state) for printed, state in PATTERNS]
+    for word in range(0x10000):
+        states = {state for mask, fixed, state in patterns if word & mask == fixed}
+        assert len(states) <= 1, f'{word:04X}'
+        assert state_of(word) is next(iter(states), State.UNKNOWN), f'{word:04X}'
+        counts[state_of(word)] += 1
+    assert all(counts.values())
+
+
+def test_words_that_are_no_state() -> None:
+    # forward and reverse at once, and a status word of ones
+    assert state_of(0x4027) is State.UNKNOWN
+    assert state_of(0xFFFF) is State.UNKNOWN
+
+
+def test_faulted_bit_is_set_in_the_fault_states_alone() -> None:
+    for word in range(0x10000):
+        faulty = state_of(word) in (State.FAULTED, State.FAULT_REACTION_ACTIVE)
+        if state_of(word) is not State.UNKNOWN:
+            assert faulty == bool(word & Status.FAULTED)

@@ -1,0 +1,478 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""One transaction after the other on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+
+from hypothesis import example
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+import pymodbus_opinion as opinion
+import pytest
+from virtual_wire import Fate
+from virtual_wire import Slave
+from virtual_wire import Wire
+
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NotReady
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.rtu_link import LATEST_ANSWER
+from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.settings import LineSettings
+
+TIMEOUT = 0.1
+SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
+UNIT = 1
+#: Probes of one word and of two, as a drive has them.
+ONE = Address((0x2A5,), 1)
+TWO = Address((0x258,), 2)
+A = Address((0x400,), 1)
+B = Address((0x264,), 1)
+C = Address((0x3EC,), 2)
+D = Address((0x2A8,), 2)
+
+
+class Bench:
+    """A link on a virtual line; everything done with it happens in virtual time."""
+
+    def __init__(
+        self,
+        fates: list[Fate] | None = None,
+        settings: LineSettings = SETTINGS,
+        probes: tuple[Address, ...] = (ONE, TWO),
+    ) -> None:
+        self.wire = Wire(settings)
+        self.slave = Slave(self.wire, iter(fates or []))
+        self.link = RtuLink(self.wire, settings)
+        with self.wire.time():
+            self.link.open()
+        self.link.use_probes(UNIT, probes)
+
+    def read(self, address: Address, unit: int = UNIT) -> Reply:
+        with self.wire.time():
+            return self.link.read(unit, address)
+
+    def write(self, address: Address, *words: int, unit: int = UNIT) -> Reply:
+        with self.wire.time():
+            return self.link.write(unit, address, words)
+
+    def expect(self, error: type[LinkError], action: Callable[[], object]) -> LinkError:
+        with pytest.raises(error) as raised:
+            action()
+        assert type(raised.value) is error
+        return raised.value
+
+    @property
+    def asked(self) -> list[int]:
+        """The registers of all requests so far."""
+        return [register for _, _, register, _ in self.slave.requests]
+
+    def answer_of(self, number: int) -> tuple[int, ...]:
+        """What the slave says to the request with this number."""
+        _, _, register, count = self.slave.requests[number]
+        return self.slave.words(register, count, number)
+
+
+# --- plain transactions ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('lump', [False, True])
+def test_read_and_write(lump: bool) -> None:
+    bench = Bench([Fate(lump=lump)] * 4)
+    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(C).words == bench.answer_of(1)
+    assert bench.write(A, 5).words == ()
+    assert bench.write(C, 5, 6).words == ()
+    assert [request[1:] for request in bench.slave.requests] == [
+        (3, 0x400, 1),
+        (3, 0x3EC, 2),
+        (6, 0x400, 1),
+        (16, 0x3EC, 2),
+    ]
+    bench.wire.check_gaps()
+
+
+def test_reply_says_when_its_last_byte_came() -> None:
+    bench = Bench([Fate(0.5)])
+    assert bench.read(A).arrived == bench.wire.seen[-1][0] == bench.wire.now
+
+
+@pytest.mark.parametrize('baud', BAUD_RATES)
+@pytest.mark.parametrize('what', ['answer', 'refuse', 'drop', 'damage', 'double'])
+def test_silence_between_frames(baud: int, what: str) -> None:
+    line = LineSettings(baud_rate=baud, response_timeout=TIMEOUT)
+    bench = Bench([Fate(what=what)] * 3, line)
+    for _ in range(3):
+        for act in (lambda: bench.read(A), lambda: bench.write(B, 1)):
+            with contextlib.suppress(LinkError):
+                act()
+    assert len(bench.wire.sent) >= 5
+    bench.wire.check_gaps()
+    # and not much longer than needed: nothing is done but waiting for t3.5
+    assert line.frame_gap == pytest.approx(max(0.00175, 3.5 * 11 / baud), rel=0.15)
+
+
+def test_no_time_is_lost_between_frames() -> None:
+    bench = Bench()
+    for _ in range(3):
+        bench.read(A)
+    frames = zip(bench.wire.sent, bench.wire.sent[1:], strict=False)
+    took = 15 * SETTINGS.char_time + SETTINGS.frame_gap
+    assert [after[0] - before[0] for before, after in frames] == pytest.approx([took] * 2)
+
+
+def test_first_frame_keeps_the_silence_too() -> None:
+    bench = Bench()
+    opened = bench.wire.now
+    bench.read(A)
+    assert bench.wire.sent[0][0] - opened >= SETTINGS.frame_gap
+
+
+@pytest.mark.parametrize('action', ['read', 'write'])
+@pytest.mark.parametrize('baud', [1200, 19200, 57600])
+def test_time_out_counts_from_the_end_of_the_request(action: str, baud: int) -> None:
+    line = LineSettings(baud_rate=baud, response_timeout=TIMEOUT)
+    bench = Bench([Fate(what='drop')], line)
+    error = bench.expect(
+        NoAnswer, lambda: bench.read(A) if action == 'read' else bench.write(C, 1, 2)
+    )
+    assert error.maybe_done
+    ((start, frame),) = bench.wire.sent
+    end = start + len(frame) * line.char_time
+    assert bench.wire.now - end == pytest.approx(TIMEOUT)
+
+
+def test_answer_just_in_time_is_taken_whole() -> None:
+    # the first byte counts: a long answer at 1200 bit/s takes longer than the time-out itself
+    line = LineSettings(baud_rate=1200, response_timeout=0.02)
+    bench = Bench([Fate(0.5)], line)
+    assert bench.read(C).words == bench.answer_of(0)
+
+
+def test_answer_with_a_pause_inside() -> None:
+    # adapters hand bytes over in lumps
+    bench = Bench()
+    frame = opinion.read_answer(UNIT, [77])
+
+    def far_end(request: bytes, end: float) -> None:
+        bench.wire.arrive(end, frame[:3], lump=True)
+        bench.wire.arrive(end + 0.02, frame[3:], lump=True)
+
+    bench.wire.far_end = far_end
+    assert bench.read(A).words == (77,)
+
+
+@pytest.mark.parametrize('cut', [1, 3, 6])
+def test_answer_that_stops_in_the_middle(cut: int) -> None:
+    bench = Bench()
+
+    def far_end(request: bytes, end: float) -> None:
+        bench.wire.arrive(end, opinion.read_answer(UNIT, [77])[:cut])
+
+    bench.wire.far_end = far_end
+    error = bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert error.maybe_done
+    assert f'{cut} bytes' in str(error)
+    assert bench.wire.now - bench.wire.sent[0][0] < 2 * TIMEOUT
+
+
+def test_damaged_answer() -> None:
+    bench = Bench([Fate(what='damage')])
+    assert bench.expect(DamagedAnswer, lambda: bench.read(A)).maybe_done
+
+
+def test_refusal() -> None:
+    bench = Bench([Fate(what='refuse'), Fate(what='refuse')])
+    for number, action in enumerate([lambda: bench.read(A), lambda: bench.write(A, 1)]):
+        error = bench.expect(Refused, action)
+        assert isinstance(error, Refused)
+        assert error.code == bench.slave.code(number)
+        assert not error.maybe_done
+    # a refusal is an answer: there is nothing to doubt
+    assert bench.read(A).words == bench.answer_of(2)
+    assert len(bench.asked) == 3
+
+
+def test_closing_forgets_all_doubts() -> None:
+    bench = Bench([Fate(what='drop')])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.link.close()
+    assert not bench.wire.is_open
+    with bench.wire.time():
+        bench.link.open()
+    assert bench.read(A).words == bench.answer_of(1)
+    assert bench.asked == [0x400, 0x400]
+
+
+def test_lost_port_is_passed_on() -> None:
+    bench = Bench()
+
+    def gone(*_: object) -> bytes:
+        raise PortError('gone')
+
+    bench.wire.write = gone  # type: ignore[method-assign]
+    bench.expect(PortError, lambda: bench.read(A))
+    bench.wire.read = gone  # type: ignore[method-assign]
+    bench.expect(PortError, lambda: bench.read(A))
+
+
+# --- doubt ----------------------------------------------------------------------------------------
+
+
+def test_late_answer_is_not_taken_for_the_next_one() -> None:
+    bench = Bench([Fate(1.5)])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    # the answer to A, of the same shape as one to B, is still on its way
+    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.asked == [0x400, 0x258, 0x264]
+    assert bench.read(B).words == bench.answer_of(3)
+    assert len(bench.asked) == 4
+
+
+@pytest.mark.parametrize(('first', 'probe'), [(A, TWO), (C, ONE)])
+def test_probe_has_another_shape(first: Address, probe: Address) -> None:
+    bench = Bench([Fate(what='drop')])
+    bench.expect(NoAnswer, lambda: bench.read(first))
+    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.asked[1] == probe.numbers[0]
+
+
+def test_nothing_is_sent_while_both_probes_are_in_doubt() -> None:
+    bench = Bench([Fate(what='drop'), Fate(what='drop')])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    assert bench.asked == [0x400, 0x258]
+    error = bench.expect(NotReady, lambda: bench.read(A))
+    assert isinstance(error, NotReady)
+    assert not error.maybe_done
+    assert len(bench.wire.sent) == 2
+    assert error.until == pytest.approx(bench.wire.now + (LATEST_ANSWER - 1) * TIMEOUT, abs=0.01)
+    # the other drives on the line are none the worse for it
+    bench.link.use_probes(2, (ONE, TWO))
+    assert bench.read(A, unit=2).words == bench.answer_of(2)
+    bench.wire.now = error.until
+    assert bench.read(A).words == bench.answer_of(3)
+
+
+def test_unit_without_probes_is_left_alone() -> None:
+    bench = Bench([Fate(what='drop')], probes=())
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    error = bench.expect(NotReady, lambda: bench.read(B))
+    assert isinstance(error, NotReady)
+    bench.wire.now = error.until
+    assert bench.read(B).words == bench.answer_of(1)
+
+
+def test_write_goes_out_at_once_even_in_doubt() -> None:
+    bench = Bench([Fate(what='drop'), Fate(what='drop')])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    before = bench.wire.now
+    assert bench.write(A, 0).words == ()
+    assert bench.wire.sent[-1][0] - before <= SETTINGS.frame_gap + 1e-9
+    assert bench.asked[2:] == [0x400]
+
+
+def test_late_answer_before_a_write_is_passed_over() -> None:
+    bench = Bench([Fate(1.2)])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    assert bench.write(B, 5).words == ()
+    # units answer in order, so the doubt is over
+    assert bench.read(A).words == bench.answer_of(2)
+    assert len(bench.asked) == 3
+
+
+def test_late_answer_to_a_write_does_not_end_the_doubt() -> None:
+    # found by the property below: the first write's answer is taken for the second one's, and
+    # the answer to the probe between them is still to come
+    bench = Bench([Fate(2.9), Fate(2.9), Fate()])
+    bench.expect(NoAnswer, lambda: bench.write(B, 5))
+    bench.expect(NoAnswer, lambda: bench.read(C))
+    assert bench.asked[1:] == [0x2A5]
+    assert bench.write(B, 5).words == ()
+    assert read_or_none(bench, A) in (None, bench.answer_of(len(bench.asked) - 1))
+
+
+def read_or_none(bench: Bench, address: Address) -> tuple[int, ...] | None:
+    try:
+        return bench.read(address).words
+    except LinkError:
+        return None
+
+
+def test_refusal_is_not_taken_for_that_of_another_request() -> None:
+    # the first write is refused late, within the time of the second
+    bench = Bench([Fate(1.5, 'refuse'), Fate()])
+    bench.expect(NoAnswer, lambda: bench.write(A, 5))
+    assert bench.write(B, 5).words == ()
+
+
+def test_refusal_of_another_function_is_believed_in_doubt() -> None:
+    bench = Bench([Fate(what='drop'), Fate(what='refuse')])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    error = bench.expect(Refused, lambda: bench.write(A, 5))
+    assert isinstance(error, Refused)
+    assert error.code == bench.slave.code(1)
+
+
+def test_refused_probe_is_an_answer() -> None:
+    # it says that the line can be believed, and nothing about the request behind it
+    bench = Bench([Fate(what='drop'), Fate(what='refuse'), Fate()])
+    bench.expect(NoAnswer, lambda: bench.write(A, 5))
+    assert bench.read(B).words == bench.answer_of(2)
+
+
+@pytest.mark.parametrize('lump', [False, True])
+def test_doubled_answer_is_noticed(lump: bool) -> None:
+    bench = Bench([Fate(what='double', lump=lump)])
+    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.asked == [0x400, 0x258, 0x264]
+
+
+def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
+    bench = Bench()
+    bench.read(A)
+    bench.wire.arrive(bench.wire.now, opinion.read_answer(UNIT, [99]))
+    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.asked == [0x400, 0x258, 0x264]
+    bench.wire.check_gaps()
+
+
+def test_bytes_before_the_first_request_are_nothing() -> None:
+    bench = Bench()
+    bench.wire.arrive(bench.wire.now, b'\xff\x00')
+    assert bench.read(A).words == bench.answer_of(0)
+    bench.wire.check_gaps()
+
+
+def test_doubt_of_one_unit_is_not_that_of_another() -> None:
+    bench = Bench([Fate(1.5)])
+    bench.link.use_probes(2, (ONE, TWO))
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    assert bench.read(B, unit=2).words == bench.answer_of(1)
+    assert [request[0] for request in bench.slave.requests] == [1, 2]
+
+
+# --- a line that never ends -----------------------------------------------------------------------
+
+
+def babble(bench: Bench, byte: int, period: float) -> None:
+    for number in range(int(10 / period)):
+        bench.wire.arrive(bench.wire.now + number * period, bytes((byte,)))
+
+
+@pytest.mark.parametrize('byte', [0x00, 0x01, 0x55, 0xFF])
+@pytest.mark.parametrize('action', ['read', 'write'])
+def test_babbling_line_is_no_reason_to_hang(byte: int, action: str) -> None:
+    bench = Bench()
+    bench.wire.far_end = lambda frame, end: None
+    babble(bench, byte, SETTINGS.frame_gap / 2)
+    start = bench.wire.now
+    act: Callable[[], object] = {
+        'read': lambda: bench.read(A),
+        'write': lambda: bench.write(A, 1),
+    }[action]
+    error = bench.expect(DamagedAnswer, act)
+    assert 'never silent' in str(error)
+    assert bench.wire.sent == []
+    assert bench.wire.now - start < 2 * TIMEOUT
+
+
+def test_line_that_begins_to_babble_is_no_reason_to_hang() -> None:
+    bench = Bench()
+    bench.wire.far_end = lambda frame, end: babble(bench, 0x55, SETTINGS.char_time)
+    start = bench.wire.now
+    bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert bench.wire.now - start < 3 * TIMEOUT
+    bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert bench.wire.now - start < 6 * TIMEOUT
+
+
+# --- whatever the slave does ----------------------------------------------------------------------
+
+FATES = st.lists(
+    st.builds(
+        Fate,
+        st.one_of(st.just(0.0), st.floats(0, 3)),
+        st.sampled_from(['answer', 'answer', 'answer', 'drop', 'refuse', 'damage', 'double']),
+        st.booleans(),
+    ),
+    max_size=25,
+)
+#: Something to do, and how long to wait before it, in time-outs.
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(['A', 'B', 'C', 'D', 'write A', 'write B', 'write C']),
+        st.one_of(st.just(0.0), st.just(0.0), st.floats(0, 4)),
+    ),
+    max_size=25,
+)
+NAMES = {'A': A, 'B': B, 'C': C, 'D': D}
+
+
+def lumps_or_doubles(fates: list[Fate]) -> Iterator[Fate]:
+    """Double no answer that comes in a lump late: nobody could tell it from the right one."""
+    for fate in fates:
+        yield Fate(fate.delay, fate.what, fate.lump and fate.what != 'double')
+
+
+@hypothesis_settings(max_examples=400)
+@given(FATES, STEPS)
+@example([Fate(2.9), Fate(2.9)], [('write B', 0.0), ('C', 0.0), ('write B', 0.0), ('A', 0.0)])
+@example([Fate(1.5), Fate(1.5), Fate(1.5)], [('A', 0.0), ('B', 0.0), ('B', 0.0), ('B', 0.0)])
+@example([Fate(1.5, 'refuse'), Fate(what='drop')], [('A', 0.0), ('B', 0.0), ('B', 0.0)])
+def test_every_answer_belongs_to_its_request(
+    fates: list[Fate], steps: list[tuple[str, float]]
+) -> None:
+    bench = Bench(list(lumps_or_doubles(fates)))
+    sent = bench.wire.sent
+    for what, pause in steps:
+        bench.wire.now += pause * TIMEOUT
+        address = NAMES[what[-1]]
+        before = len(sent)
+        is_write = what.startswith('write')
+        try:
+            if is_write:
+                assert bench.write(address, *(7,) * address.words).words == ()
+            else:
+                words = bench.read(address).words
+                assert bench.asked[-1] == address.numbers[0]
+                assert words == bench.answer_of(len(sent) - 1)
+        except Refused as refusal:
+            assert bench.asked[-1] == address.numbers[0]
+            assert refusal.code == bench.slave.code(len(sent) - 1)
+        except NotReady as refusal:
+            assert not is_write
+            assert len(sent) == before
+            assert refusal.until > bench.wire.now
+        except (NoAnswer, DamagedAnswer):
+            pass
+        assert len(sent) - before <= (1 if is_write else 2)
+        if is_write:
+            assert len(sent) == before + 1
+    bench.wire.check_gaps()

@@ -1,0 +1,175 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A line and a slave in virtual time: nothing here ever waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+from dataclasses import dataclass
+import heapq
+import itertools
+from types import SimpleNamespace
+from unittest import mock
+
+import pymodbus_opinion as opinion
+
+from nfo_sinus_driver.link import rtu_link
+from nfo_sinus_driver.link.settings import LineSettings
+
+#: More looks at the clock than any honest transaction takes: the link hangs.
+_PATIENCE = 100_000
+
+
+class Wire:
+    """
+    The port of an :class:`RtuLink`, and the clock that it sees.
+
+    :ivar sent: every frame sent, and when it began.
+    :ivar seen: when bytes were read, and how many.
+    :ivar far_end: called with each frame and the time at which its last byte is sent.
+    """
+
+    def __init__(self, settings: LineSettings) -> None:
+        self.settings = settings
+        self.now = 1000.0
+        self.sent: list[tuple[float, bytes]] = []
+        self.seen: list[tuple[float, int]] = []
+        self.far_end: Callable[[bytes, float], None] = lambda frame, end: None
+        self.is_open = False
+        self._arrivals: list[tuple[float, int, bytes]] = []
+        self._order = itertools.count()
+        self._looks = 0
+
+    def monotonic(self) -> float:
+        self._looks += 1
+        assert self._looks < _PATIENCE, 'the link hangs'
+        return self.now
+
+    @contextlib.contextmanager
+    def time(self) -> Iterator[None]:
+        """Let the link see this clock."""
+        with mock.patch.object(rtu_link, 'time', SimpleNamespace(monotonic=self.monotonic)):
+            yield
+
+    def arrive(self, at: float, data: bytes, *, lump: bool = False) -> float:
+        """Let bytes come, the first one's end a character after ``at``; return the last's."""
+        char_time = self.settings.char_time
+        end = at + len(data) * char_time
+        if lump:
+            self._put(end, data)
+        else:
+            for number, byte in enumerate(data, start=1):
+                self._put(at + number * char_time, bytes((byte,)))
+        return end
+
+    def _put(self, at: float, data: bytes) -> None:
+        heapq.heappush(self._arrivals, (at, next(self._order), data))
+
+    def open(self) -> None:
+        self.is_open = True
+
+    def close(self) -> None:
+        self.is_open = False
+
+    def write(self, data: bytes) -> None:
+        self.sent.append((self.now, data))
+        self._looks = 0
+        self.far_end(data, self.now + len(data) * self.settings.char_time)
+
+    def read(self, until: float) -> bytes:
+        if not self._arrivals or self._arrivals[0][0] > max(until, self.now):
+            self.now = max(until, self.now)
+            return b''
+        self.now = max(self.now, self._arrivals[0][0])
+        data = b''
+        while self._arrivals and self._arrivals[0][0] <= self.now:
+            data += heapq.heappop(self._arrivals)[2]
+        self.seen.append((self.now, len(data)))
+        return data
+
+    def check_gaps(self) -> None:
+        """Every frame must begin t3.5 after whatever was on the line before, as far as seen."""
+        ends = [(at + len(frame) * self.settings.char_time, at) for at, frame in self.sent]
+        ends += [(at, at) for at, _ in self.seen]
+        for start, _ in self.sent:
+            before = [end for end, began in ends if began < start]
+            if before:
+                assert start - max(before) >= self.settings.frame_gap - 1e-9
+
+
+@dataclass(frozen=True)
+class Fate:
+    """
+    What becomes of one request.
+
+    :ivar delay: how long the slave takes, in time-outs.
+    :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
+        ``double``.
+    """
+
+    delay: float = 0.0
+    what: str = 'answer'
+    lump: bool = False
+
+
+GOOD = Fate()
+
+
+class Slave:
+    """
+    Answers in order, each request as its fate says; a value tells which request it answers.
+
+    :ivar requests: every request that arrived: unit, function, register, count.
+    """
+
+    def __init__(self, wire: Wire, fates: Iterator[Fate] | None = None) -> None:
+        self._wire = wire
+        self._fates = fates or itertools.repeat(GOOD)
+        self._free = 0.0
+        self.requests: list[tuple[int, int, int, int]] = []
+        wire.far_end = self._take
+
+    @staticmethod
+    def words(register: int, count: int, number: int) -> tuple[int, ...]:
+        """What a register holds when the request with this number is carried out."""
+        return tuple((register * 7 + number * 131 + word * 57) & 0xFFFF for word in range(count))
+
+    @staticmethod
+    def code(number: int) -> int:
+        """With which code the request with this number is refused."""
+        return number % 200 + 20
+
+    def _take(self, frame: bytes, end: float) -> None:
+        number = len(self.requests)
+        unit, function, register, count, words = opinion.decoded(frame)
+        self.requests.append((unit, function, register, count))
+        fate = next(self._fates, GOOD)
+        if fate.what == 'drop':
+            return
+        if fate.what == 'refuse':
+            answer = opinion.exception(unit, function, self.code(number))
+        elif function == 3:
+            answer = opinion.read_answer(unit, self.words(register, count, number))
+        else:
+            answer = opinion.write_answer(unit, register, words)
+        if fate.what == 'damage':
+            answer = answer[:-1] + bytes((answer[-1] ^ 1,))
+        if fate.what == 'double':
+            answer += answer
+        start = max(self._free, end + fate.delay * self._wire.settings.response_timeout)
+        self._free = self._wire.arrive(start, answer, lump=fate.lump)

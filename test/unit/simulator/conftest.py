@@ -1,0 +1,148 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import select
+import shutil
+import tempfile
+import time
+import tty
+
+import pytest
+
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.simulator import pymodbus_compat
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.refusal import Refused
+
+
+class Bench:
+    """A drive on the bench: commands by name, and time that passes when told."""
+
+    def __init__(self, **options):
+        self.drive = SimulatedDrive(**options)
+
+    def write(self, key, value):
+        parameter = self.drive.model[key]
+        words = parameter.encode(value)
+        self.drive.write(parameter.place(Protocol.MODBUS).address, words)
+
+    def read(self, key):
+        parameter = self.drive.model[key]
+        place = parameter.place(Protocol.MODBUS)
+        return parameter.decode(self.drive.read(place.address, place.words))
+
+    def mode(self, code):
+        self.write('fieldbus.mode', code)
+
+    def scmd(self, code):
+        self.write('fieldbus.scmd', code)
+
+    def run(self, setpoint, seconds=0.0):
+        """Take control, run by the bus, and let time pass."""
+        self.mode(3)
+        self.write('status.frq_set', setpoint)
+        self.scmd(0x101)
+        self.drive.advance(seconds)
+
+    @contextmanager
+    def refuses(self, reason):
+        """Expect that the drive refuses what happens in this block, and why."""
+        with pytest.raises(Refused) as caught:
+            yield
+        assert caught.value.reason is reason
+
+    @property
+    def state(self):
+        return self.drive.phase.value
+
+    @property
+    def inv_st(self):
+        return self.read('fieldbus.inv_st')
+
+    @property
+    def running(self):
+        return self.drive.motor.driven
+
+
+class Master:
+    """The other end of a line: writes requests and reads what comes back."""
+
+    def __init__(self, port):
+        self.fd = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(self.fd)
+
+    def close(self):
+        os.close(self.fd)
+
+    def send(self, data):
+        os.write(self.fd, data)
+
+    def receive(self, count=256, timeout=2.0):
+        """Return ``count`` bytes, or what came within the time."""
+        data = b''
+        end = time.monotonic() + timeout
+        while len(data) < count:
+            ready, _, _ = select.select([self.fd], [], [], max(0.0, end - time.monotonic()))
+            if not ready:
+                break
+            data += os.read(self.fd, 4096)
+        return data
+
+    def ask(self, address, pdu, count=256, timeout=2.0):
+        self.send(frame(address, pdu))
+        return self.receive(count, timeout)
+
+
+def frame(address, pdu):
+    body = bytes([address]) + bytes(pdu)
+    return body + pymodbus_compat.crc(body)
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+@pytest.fixture
+def make_bench():
+    return Bench
+
+
+@pytest.fixture
+def make_frame():
+    return frame
+
+
+@pytest.fixture
+def open_master():
+    masters = []
+
+    def open_(port):
+        masters.append(Master(port))
+        return masters[-1]
+
+    yield open_
+    for master in masters:
+        master.close()
+
+
+@pytest.fixture
+def folder():
+    """A folder with a short name: the path of a Unix socket has 107 characters at most."""
+    path = Path(tempfile.mkdtemp(prefix='sim'))
+    yield path
+    shutil.rmtree(path)

@@ -1,0 +1,277 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Faults, their acknowledgement, and a bus that falls silent."""
+
+import pytest
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.simulator.refusal import Reason
+
+MODEL = load_model('sinus_g2')
+FAULTS = [code for code in range(48) if MODEL.inv_st(code).kind is Kind.FAULT]
+SERIAL = {14, 15}
+
+
+def acknowledge(bench):
+    return bench.read('fieldbus.inv_st_with_ack')
+
+
+@pytest.mark.parametrize('code', FAULTS)
+def test_a_fault_stops_the_motor_and_shows(bench, code):
+    bench.run(20, 5)
+    bench.drive.trip(code)
+    assert not bench.running
+    assert bench.state == 'FAULT_REACTION_ACTIVE'
+    assert bench.read('fieldbus.drive_status') & 0x8008 == 0x8008
+    bench.drive.advance(0.1)
+    assert bench.state == 'FAULTED'
+    assert bench.read('fieldbus.drive_status') & 0x8008 == 0x0008
+    assert bench.inv_st == code
+    assert bench.read('fieldbus.mode') == (1 if code in SERIAL else 3)
+    bench.drive.advance(100)
+    assert bench.inv_st == code
+    assert not bench.drive.motor.turning
+
+
+@pytest.mark.parametrize('code', [code for code in FAULTS if code not in SERIAL])
+def test_an_acknowledged_fault_lets_the_standing_command_run_again(bench, code):
+    bench.run(20, 5)
+    bench.drive.trip(code)
+    bench.drive.advance(20)
+    assert acknowledge(bench) == code
+    assert bench.drive.ack_reads == 1
+    assert bench.running
+    assert bench.inv_st == 39
+
+
+def test_the_start_delay_runs_again_after_a_fault(bench):
+    bench.write('control.run_dly', 3)
+    bench.run(20, 10)
+    bench.drive.trip(5)
+    bench.drive.advance(10)
+    acknowledge(bench)
+    assert bench.inv_st == 25
+    bench.drive.advance(3.1)
+    assert bench.running
+
+
+def test_a_stop_cannot_be_given_while_a_fault_stands(bench):
+    bench.run(20, 5)
+    bench.drive.trip(5)
+    for key, value in [
+        ('fieldbus.scmd', 0),
+        ('fieldbus.mode', 1),
+        ('fieldbus.mode', 3),
+        ('status.frq_set', 0),
+        ('control.accel', 5.0),
+    ]:
+        with bench.refuses(Reason.STATE):
+            bench.write(key, value)
+    assert bench.read('status.frq_set') == 20
+
+
+def test_a_drive_that_takes_writes_in_spite_of_a_fault(bench):
+    bench.drive.refuses_writes_when_faulted = False
+    bench.run(20, 5)
+    bench.drive.trip(5)
+    bench.scmd(0)
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert not bench.running
+
+
+def test_a_fault_whose_cause_lasts_is_not_acknowledged(bench):
+    bench.drive.trip(3, cause_present=True)
+    assert acknowledge(bench) == 3
+    assert bench.inv_st == 3
+    bench.drive.end_fault_causes()
+    assert bench.inv_st == 3
+    assert acknowledge(bench) == 3
+    assert bench.inv_st == 24
+    assert bench.drive.ack_reads == 2
+
+
+def test_reading_without_ack_acknowledges_nothing(bench):
+    bench.drive.trip(3)
+    for _ in range(3):
+        assert bench.read('fieldbus.inv_st') == 3
+    assert bench.drive.ack_reads == 0
+
+
+def test_reading_with_ack_is_counted_even_without_a_fault(bench):
+    assert acknowledge(bench) == 24
+    assert bench.drive.ack_reads == 1
+
+
+def test_sio_fail_is_acknowledged_by_mode_stop_alone(bench):
+    bench.run(20, 5)
+    bench.drive.trip(14)
+    bench.drive.advance(20)
+    assert acknowledge(bench) == 14
+    assert bench.inv_st == 14
+    for code in (2, 3):
+        with bench.refuses(Reason.STATE):
+            bench.mode(code)
+    bench.mode(1)
+    assert bench.inv_st == 24
+    bench.mode(3)
+    assert bench.inv_st == 37
+    assert not bench.running
+
+
+def test_bus_fail_clears_with_the_acknowledging_read(bench):
+    bench.run(20, 5)
+    bench.drive.trip(15)
+    bench.drive.advance(20)
+    assert acknowledge(bench) == 15
+    assert bench.inv_st == 24
+    bench.drive.advance(1)
+    assert not bench.running
+
+
+def test_the_first_of_several_faults_shows(bench):
+    bench.drive.trip(3, cause_present=True)
+    bench.drive.trip(5)
+    assert bench.inv_st == 3
+    acknowledge(bench)
+    assert bench.drive.faults.codes == [3]
+    bench.drive.end_fault_causes()
+    acknowledge(bench)
+    assert bench.inv_st == 24
+    assert [entry.code for entry in bench.drive.faults.log] == [5, 3]
+
+
+def test_a_fault_is_acknowledged_by_drive_control(bench):
+    bench.write('fieldbus.drive_control', 0x4006)
+    bench.drive.trip(5)
+    bench.drive.advance(1)
+    bench.write('fieldbus.drive_control', 0x4086)
+    assert bench.state == 'READY_TO_SWITCH_ON'
+    bench.drive.trip(5)
+    bench.drive.advance(1)
+    bench.write('fieldbus.drive_control', 0x4086)  # no edge
+    assert bench.state == 'FAULTED'
+
+
+def test_the_log_keeps_what_happened_when(bench):
+    for code in [5] * 130 + [7]:
+        bench.drive.trip(code)
+        acknowledge(bench)
+        bench.drive.advance(36)
+    log = bench.drive.faults.log
+    assert len(log) == 128
+    assert log[0].code == 7
+    assert log[1].code == 5
+    assert log[0].op_time - log[1].op_time == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize('code', [0, 24, 27, 38, 45, 99])
+def test_what_is_no_fault_cannot_be_injected(bench, code):
+    with pytest.raises(ValueError, match='no fault'):
+        bench.drive.trip(code)
+
+
+def test_a_power_cycle_ends_a_fault_whose_cause_is_gone(bench):
+    bench.drive.trip(5)
+    bench.drive.trip(7, cause_present=True)
+    bench.drive.power_cycle(0.1)
+    bench.drive.advance(1)
+    assert bench.drive.faults.codes == [7]
+    assert bench.state == 'FAULTED'
+    bench.drive.end_fault_causes()
+    bench.drive.power_cycle(0.1)
+    bench.drive.advance(1)
+    assert bench.inv_st == 24
+
+
+def test_a_fault_under_the_terminals_runs_again_when_acknowledged(bench):
+    bench.mode(2)
+    bench.drive.advance(5)
+    bench.drive.trip(5)
+    bench.drive.advance(5)
+    assert bench.read('fieldbus.mode') == 2
+    acknowledge(bench)
+    assert bench.running
+
+
+# ---- SioTot and AutoStop ----
+
+
+def watched(bench, *, auto_stop, sio_tot=2.0):
+    bench.write('serial.sio_tot', sio_tot)
+    bench.write('serial.auto_stop', auto_stop)
+    bench.write('control.retard', 60.0)
+    bench.run(20, 0.5)
+    bench.drive.heard()
+    return bench
+
+
+def test_a_silent_bus_stops_the_motor_with_auto_stop(bench):
+    watched(bench, auto_stop=True)
+    bench.drive.advance(1.9)
+    assert bench.running
+    bench.drive.advance(0.2)
+    assert not bench.running
+    assert bench.inv_st == 14
+    assert bench.read('fieldbus.mode') == 1
+    bench.drive.advance(15)
+    assert not bench.drive.motor.turning
+
+
+def test_every_valid_frame_keeps_it_going(bench):
+    watched(bench, auto_stop=True)
+    for _ in range(10):
+        bench.drive.advance(1.5)
+        bench.drive.heard()
+    assert bench.running
+    assert bench.inv_st == 38
+
+
+@pytest.mark.parametrize('settings', [{'auto_stop': False}, {'auto_stop': True, 'sio_tot': 0}])
+def test_without_auto_stop_or_time_the_motor_runs_on(bench, settings):
+    watched(bench, **settings)
+    bench.drive.advance(600)
+    assert bench.running
+    assert bench.inv_st == 38
+    assert bench.read('status.frq_act') == 20
+
+
+def test_a_drive_that_the_bus_does_not_control_does_not_mind(bench):
+    bench.write('serial.sio_tot', 1.0)
+    bench.write('serial.auto_stop', True)
+    bench.drive.advance(10)
+    assert bench.inv_st == 24
+    bench.mode(2)
+    bench.drive.advance(10)
+    assert bench.running
+
+
+def test_the_time_counts_from_taking_control(bench):
+    bench.write('serial.sio_tot', 1.0)
+    bench.write('serial.auto_stop', True)
+    bench.drive.advance(10)
+    bench.mode(3)
+    bench.drive.advance(0.9)
+    assert bench.inv_st == 37
+    bench.drive.advance(0.2)
+    assert bench.inv_st == 14
+
+
+def test_a_silent_drive_hears_nothing_and_times_out(bench):
+    watched(bench, auto_stop=True)
+    bench.drive.silence(5)
+    bench.drive.advance(2.1)
+    assert bench.inv_st == 14

@@ -1,0 +1,188 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every state and exit of [M0 table 16]."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.catalog import Control
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.catalog import state_of
+from nfo_sinus_driver.simulator.state_machine import Conditions
+from nfo_sinus_driver.simulator.state_machine import Phase
+from nfo_sinus_driver.simulator.state_machine import StateMachine
+
+POWER = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
+ON = POWER | Control.SWITCH_ON
+FORWARD = ON | Control.ENABLE_OP
+REVERSE = ON | Control.ENABLE_REV_OP
+BOTH = FORWARD | REVERSE
+
+MOVING = Conditions(at_zero=False, voltage=True)
+RESTING = Conditions()
+NOT_READY = Conditions(initialised=False)
+FAULT = Conditions(fault=True)
+FAULT_MOVING = Conditions(fault=True, at_zero=False, voltage=True)
+COASTING = Conditions(brake=False, at_zero=False, voltage=True)
+RELEASED = Conditions(brake=False, at_zero=False)
+BRAKED = Conditions(at_zero=True, voltage=True)
+
+
+def machine_in(phase, word=FORWARD):
+    machine = StateMachine()
+    machine.update(word, NOT_READY)
+    machine.phase = phase
+    return machine
+
+
+# from, control word, conditions, to, the control word before
+EXITS = [
+    ('NOT_READY_TO_SWITCH_ON', ON, NOT_READY, 'NOT_READY_TO_SWITCH_ON', ON),
+    ('NOT_READY_TO_SWITCH_ON', 0, RESTING, 'SWITCH_ON_DISABLED', 0),
+    ('SWITCH_ON_DISABLED', ON, RESTING, 'SWITCH_ON_DISABLED', ON),
+    ('SWITCH_ON_DISABLED', POWER, RESTING, 'READY_TO_SWITCH_ON', ON),
+    ('SWITCH_ON_DISABLED', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
+    ('SWITCH_ON_DISABLED', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0),
+    ('SWITCH_ON_DISABLED', ON | Control.AUTO_INIT, RESTING, 'SWITCHED_ON', 0),
+    ('READY_TO_SWITCH_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', 0),
+    ('READY_TO_SWITCH_ON', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
+    ('READY_TO_SWITCH_ON', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0),
+    ('READY_TO_SWITCH_ON', ON, RESTING, 'SWITCHED_ON', 0),
+    ('SWITCHED_ON', ON, RESTING, 'SWITCHED_ON', ON),
+    ('SWITCHED_ON', POWER, MOVING, 'SWITCHED_ON', ON),
+    ('SWITCHED_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', ON),
+    ('SWITCHED_ON', Control.SWITCH_ON, RESTING, 'SWITCH_ON_DISABLED', ON),
+    ('SWITCHED_ON', FORWARD, RESTING, 'OPERATION_ENABLED', ON),
+    ('SWITCHED_ON', REVERSE, RESTING, 'OPERATION_ENABLED', ON),
+    ('SWITCHED_ON', BOTH, RESTING, 'SWITCHED_ON', ON),
+    ('SWITCHED_ON', FORWARD | Control.EVENT_TRIGGERED_OP, RESTING, 'SWITCHED_ON', FORWARD),
+    ('SWITCHED_ON', FORWARD | Control.EVENT_TRIGGERED_OP, RESTING, 'OPERATION_ENABLED', ON),
+    ('SWITCHED_ON', REVERSE | Control.EVENT_TRIGGERED_OP, RESTING, 'OPERATION_ENABLED', FORWARD),
+    ('OPERATION_ENABLED', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD),
+    ('OPERATION_ENABLED', BOTH, MOVING, 'OPERATION_ENABLED', FORWARD),
+    ('OPERATION_ENABLED', ON & ~Control.ENABLE_VOLTAGE, MOVING, 'QUICK_STOP', FORWARD),
+    ('OPERATION_ENABLED', ON & ~Control.DISABLE_QUICK_STOP, MOVING, 'QUICK_STOP', FORWARD),
+    ('OPERATION_ENABLED', FORWARD & ~Control.SWITCH_ON, MOVING, 'SHUTDOWN', FORWARD),
+    ('OPERATION_ENABLED', ON, MOVING, 'DISABLE', FORWARD),
+    ('DISABLE', ON, MOVING, 'DISABLE', ON),
+    ('DISABLE', Control.SWITCH_ON, MOVING, 'QUICK_STOP', ON),
+    ('DISABLE', POWER, MOVING, 'SHUTDOWN', ON),
+    ('DISABLE', REVERSE, MOVING, 'OPERATION_ENABLED', ON),
+    ('DISABLE', ON, BRAKED, 'SWITCHED_ON', ON),
+    ('DISABLE', ON | Control.OVERRIDE_COAST, MOVING, 'SWITCHED_ON', ON),
+    ('SHUTDOWN', POWER, MOVING, 'SHUTDOWN', ON),
+    ('SHUTDOWN', POWER, BRAKED, 'SHUTDOWN', ON),
+    ('SHUTDOWN', POWER, COASTING, 'SHUTDOWN', ON),
+    ('SHUTDOWN', POWER, RELEASED, 'READY_TO_SWITCH_ON', ON),
+    ('SHUTDOWN', 0, MOVING, 'QUICK_STOP', ON),
+    ('SHUTDOWN', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD),
+    ('QUICK_STOP', FORWARD, MOVING, 'QUICK_STOP', ON),
+    ('QUICK_STOP', 0, RESTING, 'SWITCH_ON_DISABLED', ON),
+    ('FAULT_REACTION_ACTIVE', ON, FAULT_MOVING, 'FAULT_REACTION_ACTIVE', ON),
+    ('FAULT_REACTION_ACTIVE', ON, FAULT, 'FAULTED', ON),
+    ('FAULTED', ON, FAULT, 'FAULTED', ON),
+    ('FAULTED', ON, RESTING, 'SWITCH_ON_DISABLED', ON),
+]
+
+
+@pytest.mark.parametrize(('begin', 'word', 'conditions', 'end', 'before'), EXITS)
+def test_exit(begin, word, conditions, end, before):
+    machine = machine_in(Phase[begin], Control(before))
+    machine.update(Control(word), conditions)
+    assert machine.phase is Phase[end]
+
+
+@pytest.mark.parametrize('phase', [phase for phase in Phase if phase is not Phase.FAULTED])
+def test_a_fault_is_entered_from_everywhere(phase):
+    machine = machine_in(phase)
+    machine.update(FORWARD, FAULT_MOVING)
+    assert machine.phase is Phase.FAULT_REACTION_ACTIVE
+    assert not machine.driven
+
+
+def test_braking_in_shutdown_lets_go_at_zero_and_stays_off():
+    machine = machine_in(Phase.OPERATION_ENABLED)
+    machine.update(POWER, MOVING)
+    assert machine.phase is Phase.SHUTDOWN
+    assert machine.driven
+    machine.update(POWER, BRAKED)
+    assert not machine.driven
+    machine.update(POWER, MOVING)
+    assert not machine.driven
+    machine.update(POWER, RESTING)
+    assert machine.phase is Phase.READY_TO_SWITCH_ON
+
+
+@pytest.mark.parametrize(
+    ('word', 'conditions'), [(POWER, COASTING), (POWER | Control.OVERRIDE_COAST, MOVING)]
+)
+def test_shutdown_may_coast(word, conditions):
+    machine = machine_in(Phase.OPERATION_ENABLED)
+    machine.update(word, conditions)
+    assert machine.phase is Phase.SHUTDOWN
+    assert not machine.driven
+
+
+@pytest.mark.parametrize(
+    ('phase', 'rises', 'resets'),
+    [
+        (Phase.FAULTED, True, True),
+        (Phase.FAULTED, False, False),
+        (Phase.FAULT_REACTION_ACTIVE, True, False),
+        (Phase.OPERATION_ENABLED, True, False),
+    ],
+)
+def test_only_a_rising_bit_7_resets_and_only_when_faulted(phase, rises, resets):
+    machine = machine_in(phase, Control(0) if rises else Control.RESET_MALFUNCTION)
+    assert machine.asks_reset(Control.RESET_MALFUNCTION) is resets
+
+
+SHOWN = {
+    Phase.DISABLE: State.STOPPING,
+    Phase.SHUTDOWN: State.STOPPING,
+}
+
+
+@given(
+    phase=st.sampled_from(list(Phase)),
+    word=st.integers(0, 0xFFFF),
+    reverse=st.booleans(),
+)
+def test_the_status_word_shows_the_state(phase, word, reverse):
+    machine = machine_in(phase, Control(word))
+    machine.direction = -1 if reverse else 1
+    shown = state_of(int(machine.status()))
+    assert shown is SHOWN.get(phase, State.__members__.get(phase.value))
+
+
+@pytest.mark.parametrize(('word', 'bit'), [(FORWARD, 'OP_ENABLED'), (REVERSE, 'REV_OP_ENABLED')])
+def test_the_direction_is_kept_while_it_stops(word, bit):
+    machine = machine_in(Phase.SWITCHED_ON, ON)
+    machine.update(word, RESTING)
+    machine.update(ON, MOVING)
+    assert machine.phase is Phase.DISABLE
+    assert machine.status() & Status[bit]
+    assert machine.status() & Status.STOPPING
+
+
+@given(st.lists(st.tuples(st.integers(0, 0xFFFF), st.tuples(*[st.booleans()] * 5))))
+def test_any_words_in_any_conditions_leave_it_in_a_state(inputs):
+    machine = StateMachine()
+    for word, (initialised, fault, brake, at_zero, voltage) in inputs:
+        machine.update(Control(word), Conditions(initialised, fault, brake, at_zero, voltage))
+        assert machine.phase in Phase
+        assert not (machine.driven and fault)
