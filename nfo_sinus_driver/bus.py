@@ -80,8 +80,12 @@ class Priority(enum.IntEnum):
 _FOREGROUND = (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
 
 
-class Cancelled(Exception):
-    """Raised inside a coroutine whose task was cancelled."""
+class Cancelled(BaseException):
+    """
+    Raised inside a coroutine whose task was cancelled.
+
+    Not an ``Exception``, so that a coroutine that survives every mistake still ends.
+    """
 
 
 class Transfer:
@@ -120,6 +124,9 @@ class Task:
         self._coroutine = coroutine
         self.future: Future[Any] = Future()
         self.cancelled = False
+        #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.
+        self.running = False
+        self.cancel_due = False
         #: Tells timers of earlier pauses from that of the present one.
         self.pause = 0
         self.asleep = False
@@ -130,6 +137,7 @@ class Task:
 
     def step(self, value: Any, error: BaseException | None) -> Transfer | _Pause | None:
         """Run it up to what it awaits next; ``None`` when it has ended."""
+        self.running = True
         try:
             if error is not None:
                 awaited = self._coroutine.throw(error)
@@ -142,6 +150,8 @@ class Task:
         else:
             assert isinstance(awaited, (Transfer, _Pause))
             return awaited
+        finally:
+            self.running = False
         return None
 
 
@@ -232,6 +242,11 @@ class Bus:
             slot.pending = True
             self._enter(slot)
 
+    @property
+    def alive(self) -> bool:
+        """The worker works."""
+        return self._thread.is_alive()
+
     def statistics(self) -> Statistics:
         """Return the counters and times of the line."""
         return self._recorder.statistics()
@@ -301,6 +316,9 @@ class Bus:
         if task.future.done() or task.cancelled:
             return
         task.cancelled = True
+        if task.running:
+            task.cancel_due = True
+            return
         for queue in self._queues.values():
             for entry in [entry for entry in queue if entry[0] is task]:
                 queue.remove(entry)
@@ -399,8 +417,8 @@ class Bus:
         caller, self._current = self._current, task
         awaited = task.step(value, error)
         self._current = caller
-        if awaited is not None and self._closed:
-            # it would wait for ever
+        if awaited is not None and (self._closed or task.cancel_due):
+            task.cancel_due = False
             self._advance(task, None, Cancelled())
             return
         if awaited is None:

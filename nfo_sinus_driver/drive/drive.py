@@ -97,6 +97,7 @@ class Drive:
             method = ModeScmd(self._registers)
             self._motion = Motion(bus, self._inverter, method, self._setpoint)
         self._active = False
+        self._barred = False
         self._misses = 0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
@@ -153,12 +154,17 @@ class Drive:
         self._bus.call(lambda: self._set_active(True))
 
     def deactivate(self) -> Future[str]:
-        """Stop the motor and only keep watch."""
+        """Stop the motor and only keep watch; it cannot be enabled until it is active again."""
+        return self._run(self._deactivate())
+
+    def stop_for_good(self) -> Future[str]:
+        """Stop the motor; it can never be enabled again."""
+        self._barred = True
         return self._run(self._deactivate())
 
     def enable(self) -> Future[str]:
         """Take control and run at set-point 0, then follow set-points that come in."""
-        return self._run(self._command(lambda motion: motion.enable(), connected=True))
+        return self._run(self._enable())
 
     def stop(self) -> Future[str]:
         """Stop as the drive's StMode says; control is kept."""
@@ -217,6 +223,12 @@ class Drive:
         answer: str = await command(self._motion)
         return answer
 
+    async def _enable(self) -> str:
+        # looked at on the bus, where a deactivation cannot come between
+        if self._barred or not self._active:
+            raise DriveError('the drive is not active')
+        return await self._command(lambda motion: motion.enable(), connected=True)
+
     async def _connect_first(self) -> str:
         if self._poll_task is None:
             await self._connect()
@@ -263,9 +275,9 @@ class Drive:
 
     async def _deactivate(self) -> str:
         self._set_active(False)
-        if self._motion is None or not self._inverter.connected:
+        if self._motion is None:
             return 'only watched'
-        if self._inverter.seen is not None and not self._inverter.seen.from_bus:
+        if not self._motion.concerned:
             return 'the bus has no control of this drive'
         return await self._motion.stop()
 
@@ -301,6 +313,9 @@ class Drive:
                     await self._connect()
             except (LinkError, DriveError) as error:
                 self._miss(error)
+            except Exception as error:
+                # a drive that is no longer watched must not go on running
+                self._miss(DriveError(f'error in the driver: {error!r}'))
             took = time.monotonic() - started
             if self._inverter.connected and self._active:
                 self._bus.note_cycle(self._unit, took)

@@ -93,15 +93,15 @@ class ModeScmd:
         try:
             await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)
             if control_mode:
-                await self._registers.write(SETPOINT_KEYS[control_mode], 0, Priority.STOP)
+                await self._registers.write(
+                    SETPOINT_KEYS[control_mode], 0, Priority.STOP, once=True
+                )
         except Refused:
             if await self.in_control(Priority.STOP):
                 raise
 
     async def quick_stop(self, control_mode: str) -> None:
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
-        if not await self.in_control(Priority.STOP):
-            return
         await self._registers.write('fieldbus.mode', Mode.STOP, Priority.STOP)
         if control_mode:
             # a drive may well refuse a set-point while the bus has no control

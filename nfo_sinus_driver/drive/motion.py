@@ -106,9 +106,10 @@ class Motion:
             await self._arm()
         except Cancelled:
             raise DriveError('it was stopped while it was being enabled') from None
-        except (DriveError, LinkError) as error:
+        except Exception as error:
+            # whatever went wrong, a run command may stand by now
             self._withdraw()
-            raise DriveError(str(error)) from error
+            raise DriveError(str(error) or repr(error)) from error
         finally:
             self._arming = None
         return 'enabled; it follows set-points that arrive from now on'
@@ -124,8 +125,10 @@ class Motion:
         await self._finish_withdrawal(self._withdraw())
         seen = self._inverter.seen
         text = self._inverter.describe()
+        if self._held_by_fault:
+            return f'stopped by fault {text}; the drive takes no command until it is acknowledged'
         if seen is None or not seen.from_bus:
-            return f'the bus has no control of this drive, so there was nothing to stop ({text})'
+            return self._no_control()
         if not seen.driven:
             return f'stopped ({text})'
         coasts = await self._inverter.read_label('control.st_mode') == 'Release'
@@ -137,8 +140,11 @@ class Motion:
 
         :raises DriveError: the drive does not confirm it; the stop is tried on and on.
         """
+        ours = self.concerned
         self.disarm()
         try:
+            if not ours and not await self._method.in_control(Priority.STOP):
+                return self._no_control()
             await self._method.quick_stop(self._inverter.control_mode)
             await self._await_status(lambda seen: not seen.driven, Priority.STOP, _PATIENCE)
         except (DriveError, LinkError) as error:
@@ -159,10 +165,15 @@ class Motion:
         fault = inverter.model.inv_st(seen.code)
         if not seen.faulted and fault.kind is Kind.STATUS:
             return f'nothing to acknowledge ({inverter.describe()})'
+        ours = self.concerned
         self.disarm()
         name = inverter.describe()
-        await self._method.acknowledge(seen.code)
-        self._withdraw()
+        try:
+            await self._method.acknowledge(seen.code)
+        finally:
+            # even if no answer came, the drive may be free to run now
+            if ours:
+                self._withdraw()
         try:
             await self._await_status(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
@@ -185,6 +196,11 @@ class Motion:
         if not await self._method.in_control(Priority.SERVICE):
             return 'control is not ours'
         stopped = await self.stop()
+        if self._held_by_fault:
+            raise DriveError(
+                f'fault {self._inverter.describe()} stands and the drive takes no command: '
+                'a run command may still stand in it when the fault is acknowledged'
+            )
         try:
             await self._await_status(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
@@ -193,6 +209,13 @@ class Motion:
             stopped = 'released to coast, for the time-out of the drive would end the ramp'
         await self._method.release()
         return f'{stopped}; control given back'
+
+    @property
+    def concerned(self) -> bool:
+        """The motor runs by us, or may do so, or at least the bus has control of it."""
+        seen = self._inverter.seen
+        ours = self.armed or self.stopping or self._arming is not None
+        return ours or seen is None or seen.from_bus
 
     # --- what happens by itself ---------------------------------------------------------------
 
@@ -305,7 +328,7 @@ class Motion:
 
     async def _keep_withdrawing(self) -> None:
         complain_at = time.monotonic() + _PATIENCE
-        while not await self._withdrawn():
+        while not await self._tried_withdrawing():
             if self._held_by_fault:
                 complain_at = time.monotonic() + _PATIENCE
             elif time.monotonic() >= complain_at:
@@ -322,19 +345,23 @@ class Motion:
         self._held_by_fault = False
         self._changed_at = time.monotonic()
 
+    async def _tried_withdrawing(self) -> bool:
+        try:
+            return await self._withdrawn()
+        except Exception as error:
+            # even a mistake of ours must not end the trying
+            self._unconfirmed = str(error) or repr(error)
+            return False
+
     async def _withdrawn(self) -> bool:
         """Try once; true when the drive took it and says that it stops."""
         self._again = False
         refusal = ''
         try:
-            try:
-                await self._method.stop(self._inverter.control_mode)
-            except Refused as error:
-                refusal = str(error)
-            seen = await self._inverter.look(Priority.STOP)
-        except LinkError as error:
-            self._unconfirmed = str(error)
-            return False
+            await self._method.stop(self._inverter.control_mode)
+        except Refused as error:
+            refusal = str(error)
+        seen = await self._inverter.look(Priority.STOP, once=True)
         # a drive with a fault may refuse everything; it stands, but would go on afterwards
         self._held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
         self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
@@ -362,6 +389,10 @@ class Motion:
         if not seen.runs:
             return f'the drive stopped by itself, RUN input lost? ({self._inverter.describe()})'
         return ''
+
+    def _no_control(self) -> str:
+        text = self._inverter.describe()
+        return f'the bus has no control of this drive, so there was nothing to stop ({text})'
 
     def _tell(self, severity: Severity, text: str) -> None:
         self._inverter.tell(severity, text)

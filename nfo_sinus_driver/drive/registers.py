@@ -68,6 +68,12 @@ class Registers:
         """
         return self.model[key].quantise(value, self._protocol)
 
+    def number(self, key: str, words: Words) -> float:
+        """Return the value of words as the drive understands them."""
+        value = self.model[key].decode(words, self._protocol)
+        assert not isinstance(value, str), key
+        return float(value)
+
     async def read(self, key: str, priority: Priority, *, once: bool = False) -> Value:
         """
         Read a parameter.

@@ -32,6 +32,7 @@ from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s.
 _REWRITE_PERIOD = 1.0
@@ -64,7 +65,6 @@ class Setpoint:
         self._request: tuple[float, float] = (NAN, -math.inf)
         self.control_mode = ''
         self._armed_at = math.inf
-        self._asked = 0.0
         self._written: tuple[int, ...] = ()
         self._written_at = 0.0
         self._watch: Task | None = None
@@ -152,7 +152,6 @@ class Setpoint:
         words = self._registers.nearest_words(key, limited)
         if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
             return None
-        self._asked = limited
         return self._bus.write(
             self._unit, self._registers.address(key), words, Priority.SETPOINT
         )
@@ -164,16 +163,28 @@ class Setpoint:
             assert transfer.words is not None
             self._written = transfer.words
             self._written_at = time.monotonic()
-            self.commanded = self._asked
+            self.commanded = self._value(transfer.words)
         elif isinstance(error, Refused):
-            self._refused(f'it refused set-point {self._asked:g}: {error}')
+            assert transfer.words is not None
+            self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
         else:
             # asking a silent drive again at once would starve its neighbours
             self._inverter.answering = False
             self._waits_for_answer = True
             self._written = ()
 
+    def _value(self, words: Words) -> float:
+        """Return the set-point that words mean to the drive, after its own rounding."""
+        return self._registers.number(SETPOINT_KEYS[self.control_mode], words)
+
     async def _watch_age(self) -> None:
+        try:
+            await self._watch_age_for_ever()
+        except Exception as error:
+            # a set-point that nobody watches must not be followed
+            self._refused(f'error in the driver: {error!r}')
+
+    async def _watch_age_for_ever(self) -> None:
         while True:
             timeout = self._inverter.settings.setpoint_timeout
             last = max(self._request[1], self._armed_at)
@@ -193,7 +204,7 @@ class Setpoint:
             key = SETPOINT_KEYS[self.control_mode]
             before = self._request
             try:
-                await self._registers.write(key, 0, Priority.STOP)
+                await self._registers.write(key, 0, Priority.STOP, once=True)
             except Refused as error:
                 self._refused(f'it refused set-point 0: {error}')
                 return

@@ -156,7 +156,7 @@ class RtuLink:
                 if now >= self._line_end + gap:
                     return
                 continue
-            self._line_end = now
+            self._line_end = max(self._line_end, now)
             if self._last is not None:
                 self._distrust(self._last)
             if now > give_up:
@@ -180,6 +180,8 @@ class RtuLink:
         if not late:
             # units answer in order: whatever was still to come has come before this
             self._doubts.pop(request.unit, None)
+            # and the request has left, even where the port is faster than its settings say
+            self._line_end = reply.arrived
         if late or answer.received:
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._distrust(request)
@@ -202,13 +204,9 @@ class RtuLink:
                     continue
                 break
             came += len(data)
-            self._line_end = now
-            try:
-                words = answer.feed(data)
-            except Refused:
-                if believe_refusal:
-                    raise
-                words = answer.feed(b'')
+            # what comes while the request still leaves is no answer to it
+            self._line_end = max(self._line_end, now)
+            words = self._feed(answer, data, believe_refusal)
             if words is not None:
                 return Reply(words, now)
             missing = max(1, request.answer_length - answer.received)
@@ -216,3 +214,13 @@ class RtuLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
+
+    @staticmethod
+    def _feed(answer: rtu.AnswerReader, data: bytes, believe_refusal: bool) -> Words | None:
+        while True:
+            try:
+                return answer.feed(data)
+            except Refused:
+                if believe_refusal:
+                    raise
+                data = b''

@@ -101,8 +101,8 @@ class DriverProcess:
 
     @property
     def alive(self) -> bool:
-        """The nodes still work."""
-        return self._thread.is_alive()
+        """The nodes and the bus still work."""
+        return self._thread.is_alive() and self._bus_node.line.bus.alive
 
     def stop(self) -> bool:
         """
@@ -131,8 +131,8 @@ class DriverProcess:
     def _stop_motors(self) -> bool:
         begun = time.monotonic()
         connected = [node for node in self._drives if node.drive.identity is not None]
-        # all are told before the first is waited for
-        stops = [(node, node.drive.stop()) for node in connected if _may_run(node)]
+        # all are told before the first is waited for, and nobody can enable any of them again
+        stops = [(node, node.drive.stop_for_good()) for node in connected]
         unconfirmed = [node for node, future in stops if not _confirmed(node, future, begun)]
         releases = [
             (node, node.drive.disconnect(_time_left(node, begun)))
@@ -141,11 +141,6 @@ class DriverProcess:
         ]
         unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         return not unconfirmed
-
-
-def _may_run(node: DriveNode) -> bool:
-    status = node.drive.snapshot.status
-    return node.settings.control_method != 'monitor' and (status is None or status.from_bus)
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
@@ -220,4 +215,4 @@ def _await_end(process: DriverProcess) -> None:
             log.info(f'{name}: stopping the motors')
             return
         log.warning(f'{name} ignored: a suspended driver would leave the motors running')
-    log.error('the executor has ended by itself: stopping the motors')
+    log.error('a part of the driver has ended by itself: stopping the motors')
