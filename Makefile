@@ -23,7 +23,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros build clean
+.PHONY: help setup demo run test lint types unit ros mutants build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -60,6 +60,9 @@ unit: setup ## tests without ROS, with the current and with the oldest pymodbus
 ros: setup ## end-to-end tests with rclpy
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
 	@tools/run python $(PYTEST) -n 2 test/ros
+
+mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
+	@tools/run python test/mutants/run.py
 
 build: ## build both packages again
 	@rm -rf build install

@@ -105,6 +105,26 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     assert state['fault'], 'the drive stopped for another reason'
 
 
+def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    bench.driver('-p', 'drive_timeout:=1.0', '-p', 'poll_rate:=0.2')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        running = drive.state()['time']
+        # with a poll every five seconds only, it is the keeping alive that prevents the fault
+        state = drive.wait_for(
+            lambda state: state['fault'] or state['time'] > running + 3.0, timeout=PATIENCE
+        )
+        assert not state['fault']
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+        stopped = drive.state()['time']
+        state = drive.wait_for(
+            lambda state: state['fault'] or state['time'] > stopped + 3.0, timeout=PATIENCE
+        )
+    assert not state['fault']
+    assert state['mode'] == 3, 'control is still ours, and that makes this a test'
+
+
 def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
     bench.simulator()
     driver = bench.driver()

@@ -331,6 +331,20 @@ def test_refusal_is_not_taken_for_that_of_another_request() -> None:
     assert bench.write(B, 5).words == ()
 
 
+def test_several_late_refusals_at_once() -> None:
+    # an adapter hands over in one lump what two earlier writes were refused with
+    bench = Bench([Fate(what='drop'), Fate(what='drop')])
+    bench.expect(NoAnswer, lambda: bench.write(A, 5))
+    bench.expect(NoAnswer, lambda: bench.write(B, 5))
+    lump = opinion.exception(UNIT, 6, 3) * 2 + opinion.write_answer(UNIT, D.numbers[0], [5])
+
+    def far_end(request: bytes, end: float) -> None:
+        bench.wire.arrive(end, lump, lump=True)
+
+    bench.wire.far_end = far_end
+    assert bench.write(D, 5).words == ()
+
+
 def test_refusal_of_another_function_is_believed_in_doubt() -> None:
     bench = Bench([Fate(what='drop'), Fate(what='refuse')])
     bench.expect(NoAnswer, lambda: bench.read(A))
@@ -415,11 +429,12 @@ def test_line_that_begins_to_babble_is_no_reason_to_hang() -> None:
 
 # --- whatever the slave does ----------------------------------------------------------------------
 
+WHAT = ['answer', 'answer', 'answer', 'drop', 'refuse', 'damage', 'double', 'refuse twice']
 FATES = st.lists(
     st.builds(
         Fate,
         st.one_of(st.just(0.0), st.floats(0, 3)),
-        st.sampled_from(['answer', 'answer', 'answer', 'drop', 'refuse', 'damage', 'double']),
+        st.sampled_from(WHAT),
         st.booleans(),
     ),
     max_size=25,
@@ -438,7 +453,8 @@ NAMES = {'A': A, 'B': B, 'C': C, 'D': D}
 def lumps_or_doubles(fates: list[Fate]) -> Iterator[Fate]:
     """Double no answer that comes in a lump late: nobody could tell it from the right one."""
     for fate in fates:
-        yield Fate(fate.delay, fate.what, fate.lump and fate.what != 'double')
+        twice = fate.what in ('double', 'refuse twice')
+        yield Fate(fate.delay, fate.what, fate.lump and not twice)
 
 
 @hypothesis_settings(max_examples=400)

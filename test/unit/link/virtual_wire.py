@@ -119,7 +119,7 @@ class Fate:
 
     :ivar delay: how long the slave takes, in time-outs.
     :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
-        ``double``.
+        ``double``, ``refuse twice``.
     """
 
     delay: float = 0.0
@@ -161,7 +161,7 @@ class Slave:
         fate = next(self._fates, GOOD)
         if fate.what == 'drop':
             return
-        if fate.what == 'refuse':
+        if fate.what.startswith('refuse'):
             answer = opinion.exception(unit, function, self.code(number))
         elif function == 3:
             answer = opinion.read_answer(unit, self.words(register, count, number))
@@ -169,7 +169,7 @@ class Slave:
             answer = opinion.write_answer(unit, register, words)
         if fate.what == 'damage':
             answer = answer[:-1] + bytes((answer[-1] ^ 1,))
-        if fate.what == 'double':
+        if fate.what in ('double', 'refuse twice'):
             answer += answer
         start = max(self._free, end + fate.delay * self._wire.settings.response_timeout)
         self._free = self._wire.arrive(start, answer, lump=fate.lump)

@@ -1,0 +1,292 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ways to break the laws of the house in the driver, and the tests that have to notice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_WAYS_OUT = 'test/ros/test_ways_out.py'
+_NO_RESTART = 'test/ros/test_no_restart.py'
+_INTERFACE = 'test/ros/test_interface.py'
+_TRACE = 'test/ros/test_trace.py'
+_RTU_LINK = 'test/unit/link/test_rtu_link.py'
+
+_MOTION = 'nfo_sinus_driver/drive/motion.py'
+_SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
+_DRIVE = 'nfo_sinus_driver/drive/drive.py'
+_METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
+_NODE = 'nfo_sinus_driver/node/drive_node.py'
+_MAIN = 'nfo_sinus_driver/node/main.py'
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """
+    One broken copy.
+
+    :ivar law: the number of the law in docs/architecture.md that it breaks.
+    :ivar old: what stands in the file, once.
+    :ivar tests: what has to fail, as arguments of pytest.
+    """
+
+    law: int
+    what: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f'law {self.law}: {self.what}'
+
+
+MUTANTS = (
+    Mutant(
+        1,
+        'polling acknowledges faults',
+        'nfo_sinus_driver/drive/inverter.py',
+        "'fieldbus.inv_st', priority, once=once",
+        "'fieldbus.inv_st_with_ack', priority, once=once",
+        (_TRACE,),
+    ),
+    Mutant(
+        2,
+        'a fault does not disarm',
+        _MOTION,
+        '        if seen.faulted:\n            fault = self._inverter.model',
+        '        if False:\n            fault = self._inverter.model',
+        (_NO_RESTART, '-k', 'fault_and_ack'),
+    ),
+    Mutant(
+        2,
+        'a keypad STOP does not disarm',
+        _MOTION,
+        '        if not seen.from_bus:\n            by =',
+        '        if False:\n            by =',
+        (_NO_RESTART, '-k', 'keypad or mode_changed'),
+    ),
+    Mutant(
+        2,
+        'a lost RUN input does not disarm',
+        _MOTION,
+        "        if not seen.runs:\n            return f'the drive stopped",
+        "        if False:\n            return f'the drive stopped",
+        (_NO_RESTART, '-k', 'run_input'),
+    ),
+    Mutant(
+        2,
+        'a lost line does not disarm',
+        _DRIVE,
+        '                self._motion.lost()',
+        '                pass',
+        (_NO_RESTART, '-k', 'line_gone'),
+    ),
+    Mutant(
+        2,
+        'a restarted driver lets run what runs',
+        _MOTION,
+        '        if await self._method.in_control(Priority.SERVICE):\n            self._withdraw()',
+        '        self._changed_at = float("inf")',
+        (_NO_RESTART, '-k', 'restarted_driver'),
+    ),
+    Mutant(
+        2,
+        'the run command is not taken back before an acknowledgement',
+        _METHOD,
+        "await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)",
+        'pass',
+        (_NO_RESTART, '-k', 'fault_and_ack'),
+    ),
+    Mutant(
+        2,
+        'set-points from before enable count',
+        _SETPOINT,
+        '        if at <= self._armed_at:\n            return None\n',
+        '',
+        (_NO_RESTART, '-k', 'from_before_enable'),
+    ),
+    Mutant(
+        2,
+        'a refused enable leaves its run command standing',
+        _MOTION,
+        'a run command may stand by now\n            self._withdraw()',
+        'a run command may stand by now',
+        (_NO_RESTART, '-k', 'without_run_input'),
+    ),
+    Mutant(
+        2,
+        'no set-point 0 before a run command',
+        _MOTION,
+        '        await self._method.zero_setpoint(control_mode, Priority.SERVICE)\n',
+        '',
+        (_TRACE,),
+    ),
+    Mutant(
+        3,
+        'SIGHUP is left to the system',
+        _MAIN,
+        '        signal.SIGHUP,\n',
+        '',
+        (_WAYS_OUT, '-k', 'SIGHUP'),
+    ),
+    Mutant(
+        3,
+        'Ctrl-Z suspends the driver',
+        _MAIN,
+        'signal.SIG_BLOCK, _ENDING | _SUSPENDING',
+        'signal.SIG_BLOCK, _ENDING',
+        (_WAYS_OUT, '-k', 'ctrl_z'),
+    ),
+    Mutant(
+        3,
+        'an exit does not stop the motor',
+        _MAIN,
+        '        confirmed = self._stop_motors()',
+        '        confirmed = True',
+        (_WAYS_OUT, '-k', 'SIGTERM'),
+    ),
+    Mutant(
+        3,
+        'deactivate does not stop the motor',
+        _NODE,
+        "        self._stop_for('deactivated', self._drive.deactivate)\n",
+        '',
+        (_WAYS_OUT, '-k', 'deactivate'),
+    ),
+    Mutant(
+        3,
+        'a lifecycle shutdown does not stop the motor',
+        _NODE,
+        "            self._stop_for('shut down', self._drive.stop)\n"
+        "            self._stop_for('shut down', self._disconnect)\n",
+        '            pass\n',
+        (_WAYS_OUT, '-k', 'lifecycle_shutdown'),
+    ),
+    Mutant(
+        3,
+        'an old set-point is followed for ever',
+        _SETPOINT,
+        'left = last + timeout - time.monotonic() if timeout else math.inf',
+        'left = math.inf',
+        (_WAYS_OUT, '-k', 'no_longer_refreshed'),
+    ),
+    Mutant(
+        3,
+        'a stop that is not confirmed is not said',
+        _MAIN,
+        '        return not unconfirmed\n',
+        '        return True\n',
+        (_WAYS_OUT, '-k', 'dead_line'),
+    ),
+    Mutant(
+        3,
+        'a stop waits behind everything else',
+        _METHOD,
+        "write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)",
+        "write('fieldbus.scmd', Scmd.STOP, Priority.REFRESH, once=True)",
+        ('test/ros/test_urgency.py', '-k', 'nothing_is_sent'),
+    ),
+    Mutant(
+        4,
+        'parameters are written although they do not change',
+        'nfo_sinus_driver/drive/drive_timeout.py',
+        '        if registers.words(key, value) != registers.words(key, before[key])',
+        '        if True',
+        (_INTERFACE, '-k', 'take_effect'),
+    ),
+    Mutant(
+        4,
+        'a monitor writes',
+        _DRIVE,
+        "        if settings.control_method != 'monitor':",
+        '        if True:',
+        (_INTERFACE, '-k', 'monitor'),
+    ),
+    Mutant(
+        5,
+        'a request reaches over its parameter',
+        'nfo_sinus_driver/drive/registers.py',
+        '        return Address(place.addresses, place.words)',
+        '        return Address(place.addresses, 2)',
+        (_TRACE,),
+    ),
+    Mutant(
+        6,
+        'control is given back by MODE = Ext',
+        _METHOD,
+        "            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)\n\n"
+        '    async def acknowledge',
+        "            await self._registers.write('fieldbus.mode', Mode.EXT, Priority.SERVICE)\n\n"
+        '    async def acknowledge',
+        (_TRACE,),
+    ),
+    Mutant(
+        7,
+        'what nobody measured is 0',
+        'nfo_sinus_driver/drive/snapshot.py',
+        'NAN = math.nan',
+        'NAN = 0.0',
+        (_INTERFACE, '-k', 'before_anybody_answers'),
+    ),
+    Mutant(
+        8,
+        'a late answer is believed',
+        'nfo_sinus_driver/link/rtu_link.py',
+        '        if isinstance(request, rtu.Read) and doubt is not None:',
+        '        if False:',
+        (_RTU_LINK,),
+    ),
+    Mutant(
+        8,
+        'the check sum of an answer is not looked at',
+        'nfo_sinus_driver/link/rtu.py',
+        '            and crc(buffer[start : end - 2]) == buffer[end - 2 : end]\n',
+        '',
+        ('test/unit/link/test_rtu_codec.py',),
+    ),
+    Mutant(
+        8,
+        'frames follow each other without a gap',
+        'nfo_sinus_driver/link/settings.py',
+        '        return 0.00175 if self.baud_rate > 19200 else 3.5 * 11 / self.baud_rate',
+        '        return 0.0',
+        (_RTU_LINK,),
+    ),
+    Mutant(
+        9,
+        'an idle bus is silent longer than the time-out of the drive',
+        _DRIVE,
+        '            period = min(period, inverter.sio_tot * _KEEP_ALIVE_SHARE)',
+        '            pass',
+        (_WAYS_OUT, '-k', 'kept_alive'),
+    ),
+    Mutant(
+        9,
+        'a clean exit leaves the time-out of the drive to strike',
+        _MOTION,
+        '        await self._method.release()\n',
+        '',
+        (_WAYS_OUT, '-k', 'leaves_no_fault'),
+    ),
+    Mutant(
+        10,
+        'the README does not say what is a safety function',
+        'README.md',
+        'safety function',
+        'function',
+        ('test/unit/test_docs.py',),
+    ),
+)

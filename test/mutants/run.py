@@ -1,0 +1,96 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+``make mutants``: break the laws in copies of the project, one by one; each time a test must fail.
+
+A long campaign, and therefore not part of ``make test``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import tempfile
+
+from mutants import MUTANTS
+from mutants import Mutant
+
+_ROOT = Path(__file__).resolve().parents[2]
+_PYTEST = (sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', '-p', 'timeout')
+_FAILED = 1
+
+
+def main() -> int:
+    """Try every mutant; return 1 if one was not noticed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--only', default='', help='only those whose name contains this')
+    only = parser.parse_args().only
+    survivors = []
+    for mutant in MUTANTS:
+        if only not in str(mutant):
+            continue
+        noticed = _is_noticed(mutant)
+        print(f'{"noticed " if noticed else "SURVIVED"}  {mutant}', flush=True)
+        if not noticed:
+            survivors.append(mutant)
+    print(f'{len(survivors)} survived')
+    return 1 if survivors else 0
+
+
+def _is_noticed(mutant: Mutant) -> bool:
+    with tempfile.TemporaryDirectory(prefix='nfo_sinus_mutant_') as folder:
+        copy = Path(folder) / 'copy'
+        _copy_project(copy)
+        file = copy / mutant.file
+        text = file.read_text(encoding='utf-8')
+        if mutant.old not in text:
+            raise SystemExit(f'{mutant}: {mutant.file} does not say any more:\n{mutant.old}')
+        file.write_text(text.replace(mutant.old, mutant.new), encoding='utf-8')
+        # the processes that a test starts import the copy, too
+        path = os.pathsep.join((str(copy), os.environ.get('PYTHONPATH', '')))
+        done = subprocess.run(
+            (*_PYTEST, *mutant.tests),
+            cwd=copy,
+            env={**os.environ, 'PYTHONPATH': path, 'PYTHONDONTWRITEBYTECODE': '1'},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if done.returncode not in (0, _FAILED):
+        raise SystemExit(f'{mutant}: pytest did not run\n{done.stdout}{done.stderr}')
+    return done.returncode == _FAILED
+
+
+def _copy_project(target: Path) -> None:
+    listed = subprocess.run(
+        ('git', 'ls-files', '--cached', '--others', '--exclude-standard'),
+        cwd=_ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for name in listed.stdout.splitlines():
+        source = _ROOT / name
+        if source.is_file():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(source, target / name)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

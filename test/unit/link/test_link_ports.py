@@ -1,0 +1,554 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Real ports: pseudo-terminals, and a TCP socket on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import errno
+import fcntl
+import os
+from pathlib import Path
+import select
+import socket
+import termios
+import threading
+import time
+import tty
+from types import SimpleNamespace
+
+import pytest
+
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import serial_port
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.rtu import Read
+from nfo_sinus_driver.link.rtu import crc
+from nfo_sinus_driver.link.rtu import encode
+from nfo_sinus_driver.link.serial_port import SerialPort
+from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.url_port import UrlPort
+
+#: No honest wait here takes this long, on any machine, s.
+PATIENCE = 30.0
+EVERY_BYTE = bytes(range(256))
+
+
+class Pty:
+    """A pseudo-terminal: ``far`` is the drive's end, ``path`` what the driver opens."""
+
+    def __init__(self) -> None:
+        self.far, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.path = os.ttyname(self._near)
+
+    def receive(self, count: int) -> bytes:
+        data = b''
+        while len(data) < count:
+            assert select.select([self.far], [], [], PATIENCE)[0], f'only {len(data)} bytes came'
+            data += os.read(self.far, 4096)
+        return data
+
+    def hang_up(self) -> None:
+        for end in (self.far, self._near):
+            if end >= 0:
+                os.close(end)
+        self.far = self._near = -1
+
+
+@pytest.fixture
+def pty() -> Iterator[Pty]:
+    pty = Pty()
+    yield pty
+    pty.hang_up()
+
+
+@pytest.fixture
+def port(pty: Pty) -> Iterator[SerialPort]:
+    port = SerialPort(pty.path, LineSettings())
+    port.open()
+    yield port
+    port.close()
+
+
+def read(port: SerialPort | UrlPort, count: int) -> bytes:
+    """Read as many bytes, however they are cut."""
+    deadline = time.monotonic() + PATIENCE
+    data = b''
+    while len(data) < count and time.monotonic() < deadline:
+        data += port.read(deadline)
+    return data
+
+
+def descriptors() -> set[str]:
+    return set(os.listdir('/proc/self/fd'))
+
+
+# --- serial ports ---------------------------------------------------------------------------------
+
+
+def test_bytes_go_both_ways(pty: Pty, port: SerialPort) -> None:
+    port.write(EVERY_BYTE)
+    assert pty.receive(256) == EVERY_BYTE
+    os.write(pty.far, EVERY_BYTE)
+    assert read(port, 256) == EVERY_BYTE
+
+
+def test_read_gives_up_when_its_time_is_over(port: SerialPort) -> None:
+    start = time.monotonic()
+    assert port.read(start + 0.02) == b''
+    assert time.monotonic() >= start + 0.02
+    assert port.read(start - 5) == b''
+
+
+def test_read_after_its_time_still_takes_what_is_there(pty: Pty, port: SerialPort) -> None:
+    os.write(pty.far, b'x')
+    assert read(port, 1) == b'x'
+    os.write(pty.far, b'y')
+    deadline = time.monotonic() + PATIENCE
+    data = b''
+    while not data and time.monotonic() < deadline:
+        data = port.read(0.0)
+    assert data == b'y'
+
+
+@pytest.mark.parametrize(
+    'char_format', [f'{bits}{parity}{stop}' for bits in '78' for parity in 'EON' for stop in '12']
+)
+def test_every_format_is_tolerated_by_a_pseudo_terminal(pty: Pty, char_format: str) -> None:
+    port = SerialPort(pty.path, LineSettings(char_format=char_format))
+    # a second time, too: this is where the C library says EINVAL
+    for _ in range(2):
+        port.open()
+        port.write(EVERY_BYTE)
+        assert pty.receive(256) == EVERY_BYTE
+        os.write(pty.far, EVERY_BYTE)
+        assert read(port, 256) == EVERY_BYTE
+        port.close()
+
+
+@pytest.mark.parametrize('baud', BAUD_RATES)
+def test_every_baud_rate_is_set(pty: Pty, baud: int) -> None:
+    port = SerialPort(pty.path, LineSettings(baud_rate=baud, char_format='8N1'))
+    port.open()
+    attributes = termios.tcgetattr(pty.far)
+    assert attributes[4] == attributes[5] == getattr(termios, f'B{baud}')
+    port.close()
+
+
+def test_line_is_set_raw(pty: Pty) -> None:
+    # somebody has left echo and line editing on
+    attributes = termios.tcgetattr(pty.far)
+    attributes[0] |= termios.ICRNL | termios.IXON | termios.ISTRIP
+    attributes[1] |= termios.OPOST | termios.ONLCR
+    attributes[3] |= termios.ECHO | termios.ICANON | termios.ISIG
+    termios.tcsetattr(pty.far, termios.TCSANOW, attributes)
+    port = SerialPort(pty.path, LineSettings())
+    port.open()
+    os.write(pty.far, EVERY_BYTE)
+    assert read(port, 256) == EVERY_BYTE
+    port.write(EVERY_BYTE)
+    assert pty.receive(256) == EVERY_BYTE
+    port.close()
+
+
+def test_bytes_from_before_are_not_read(pty: Pty) -> None:
+    os.write(pty.far, b'old')
+    port = SerialPort(pty.path, LineSettings())
+    port.open()
+    os.write(pty.far, b'new')
+    assert read(port, 3) == b'new'
+    port.close()
+
+
+def test_rs485_is_best_effort(pty: Pty) -> None:
+    port = SerialPort(pty.path, LineSettings(rs485=True))
+    port.open()
+    port.write(b'x')
+    assert pty.receive(1) == b'x'
+    port.close()
+
+
+def test_absent_port_names_those_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = SerialPort('/dev/ttyNONE', LineSettings())
+    monkeypatch.setattr(serial_port, '_ports', lambda: ['/dev/ttyACM0', '/dev/ttyUSB7'])
+    with pytest.raises(PortError) as error:
+        port.open()
+    assert str(error.value) == (
+        '/dev/ttyNONE does not exist: is the adapter plugged in? '
+        'Ports there are: /dev/ttyACM0, /dev/ttyUSB7'
+    )
+    monkeypatch.setattr(serial_port, '_ports', list)
+    with pytest.raises(PortError, match='Ports there are: none'):
+        port.open()
+
+
+def test_ports_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = {
+        '/dev': ['null', 'ttyUSB0', 'tty1', 'ttyACM3', 'ttyS0'],
+        '/dev/serial/by-id': ['usb-FTDI'],
+    }
+    path = SimpleNamespace(isdir=folders.__contains__)
+    monkeypatch.setattr(serial_port, 'os', SimpleNamespace(listdir=folders.get, path=path))
+    assert serial_port._ports() == ['/dev/serial/by-id/usb-FTDI', '/dev/ttyACM3', '/dev/ttyUSB0']
+    del folders['/dev/serial/by-id']
+    assert serial_port._ports() == ['/dev/ttyACM3', '/dev/ttyUSB0']
+
+
+def test_what_is_no_serial_port(tmp_path: Path) -> None:
+    before = descriptors()
+    (tmp_path / 'file').write_text('')
+    for path in (tmp_path / 'file', Path('/dev/null')):
+        with pytest.raises(PortError, match=f'{path} is not a serial port'):
+            SerialPort(str(path), LineSettings()).open()
+    with pytest.raises(PortError, match='cannot be opened'):
+        SerialPort(str(tmp_path), LineSettings()).open()
+    assert descriptors() == before
+
+
+@pytest.mark.parametrize(
+    ('number', 'message'),
+    [
+        (errno.EACCES, 'no permission to use {}: add yourself to its group'),
+        (errno.EBUSY, '{} is in use by another process'),
+        (errno.EIO, '{} cannot be opened: Input/output error'),
+    ],
+)
+def test_port_that_cannot_be_opened(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, number: int, message: str
+) -> None:
+    def refuse(*_: object) -> int:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, 'open', refuse)
+    with pytest.raises(PortError) as error:
+        SerialPort(pty.path, LineSettings()).open()
+    monkeypatch.undo()
+    assert str(error.value).startswith(message.format(pty.path))
+
+
+def test_port_in_use(pty: Pty, port: SerialPort) -> None:
+    before = descriptors()
+    second = SerialPort(pty.path, LineSettings())
+    with pytest.raises(PortError, match=f'{pty.path} is in use by another process'):
+        second.open()
+    assert descriptors() == before
+    # the first one is none the worse for it
+    port.write(b'x')
+    assert pty.receive(1) == b'x'
+    port.close()
+    second.open()
+    second.close()
+
+
+def test_port_locked_as_pyserial_does(pty: Pty) -> None:
+    other = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    port = SerialPort(pty.path, LineSettings())
+    with pytest.raises(PortError, match='is in use by another process'):
+        port.open()
+    os.close(other)
+    port.open()
+    port.close()
+
+
+def test_adapter_that_cannot_do_the_settings(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise termios.error(errno.EINVAL, 'Invalid argument')
+
+    monkeypatch.setattr(serial_port.termios, 'tcsetattr', refuse)
+    monkeypatch.setattr(serial_port, '_is_pty', lambda fd: False)
+    before = descriptors()
+    with pytest.raises(PortError, match=r'cannot do 19200 bit/s 7O2 .* choose a rate and format'):
+        SerialPort(pty.path, LineSettings(char_format='7O2')).open()
+    assert descriptors() == before
+
+
+@pytest.mark.parametrize('call', ['tcgetattr', 'tcflush', 'tcsetattr'])
+def test_adapter_that_goes_away_while_it_is_opened(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    def gone(*_: object) -> None:
+        raise termios.error(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(serial_port.termios, call, gone)
+    monkeypatch.setattr(serial_port, '_is_pty', lambda fd: False)
+    before = descriptors()
+    with pytest.raises(PortError):
+        SerialPort(pty.path, LineSettings()).open()
+    assert descriptors() == before
+
+
+def test_port_that_cannot_be_locked(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object) -> None:
+        raise OSError(errno.ENOLCK, 'No locks available')
+
+    monkeypatch.setattr(serial_port.fcntl, 'flock', gone)
+    with pytest.raises(PortError):
+        SerialPort(pty.path, LineSettings()).open()
+
+
+def test_hang_up_is_noticed(pty: Pty, port: SerialPort) -> None:
+    pty.hang_up()
+    with pytest.raises(PortError, match=f'{pty.path} was lost'):
+        read(port, 1)
+    with pytest.raises(PortError, match=f'{pty.path} was lost'):
+        port.write(b'x')
+    port.close()
+    port.close()
+
+
+def test_hang_up_while_waiting(pty: Pty, port: SerialPort) -> None:
+    timer = threading.Timer(0.05, pty.hang_up)
+    timer.start()
+    with pytest.raises(PortError, match='was lost'):
+        port.read(time.monotonic() + PATIENCE)
+    timer.join()
+
+
+def test_closed_port(pty: Pty) -> None:
+    port = SerialPort(pty.path, LineSettings())
+    for use in (lambda: port.write(b'x'), lambda: port.read(0.0)):
+        with pytest.raises(PortError, match='is not open'):
+            use()
+    port.close()
+    port.open()
+    port.close()
+    with pytest.raises(PortError, match='is not open'):
+        port.read(0.0)
+
+
+def test_long_write_in_parts(pty: Pty, port: SerialPort) -> None:
+    data = EVERY_BYTE * 512
+    got = bytearray()
+    reader = threading.Thread(target=lambda: got.extend(pty.receive(len(data))))
+    reader.start()
+    port.write(data)
+    reader.join(PATIENCE)
+    assert bytes(got) == data
+
+
+def test_write_that_takes_long_but_goes_on(
+    pty: Pty, port: SerialPort, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # one byte a call, half a second each
+    clock = iter(range(10_000))
+    monkeypatch.setattr(
+        serial_port, 'time', SimpleNamespace(monotonic=lambda: next(clock) * 0.5)
+    )
+    write = os.write
+    monkeypatch.setattr(serial_port.os, 'write', lambda fd, data: write(fd, data[:1]))
+    port.write(b'slowly')
+    monkeypatch.undo()
+    assert pty.receive(6) == b'slowly'
+
+
+def test_port_that_takes_nothing(port: SerialPort, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> int:
+        raise BlockingIOError
+
+    monkeypatch.setattr(serial_port.os, 'write', full)
+    monkeypatch.setattr(serial_port.select, 'select', lambda *_: ([], [], []))
+    with pytest.raises(PortError, match='takes no more bytes'):
+        port.write(b'x')
+
+
+# --- ports reached by URL -------------------------------------------------------------------------
+
+
+class Server:
+    """A serial device server on this machine that takes one client after another."""
+
+    def __init__(self) -> None:
+        self.listener = socket.create_server(('127.0.0.1', 0))
+        self.listener.settimeout(PATIENCE)
+        self.url = f'socket://127.0.0.1:{self.listener.getsockname()[1]}'
+        self.client: socket.socket | None = None
+
+    def accept(self) -> socket.socket:
+        self.client, _ = self.listener.accept()
+        self.client.settimeout(PATIENCE)
+        return self.client
+
+    def close(self) -> None:
+        self.listener.close()
+        if self.client is not None:
+            self.client.close()
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    server = Server()
+    yield server
+    server.close()
+
+
+def received(client: socket.socket, count: int) -> bytes:
+    data = b''
+    while len(data) < count:
+        data += client.recv(4096)
+    return data
+
+
+def test_bytes_go_both_ways_over_tcp(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    client = server.accept()
+    port.write(EVERY_BYTE)
+    assert received(client, 256) == EVERY_BYTE
+    client.sendall(EVERY_BYTE)
+    assert read(port, 256) == EVERY_BYTE
+    port.close()
+    port.close()
+    assert client.recv(1) == b''
+
+
+def test_read_over_tcp_gives_up_when_its_time_is_over(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    start = time.monotonic()
+    assert port.read(start + 0.02) == b''
+    assert time.monotonic() >= start + 0.02
+    assert port.read(start - 5) == b''
+    port.close()
+
+
+def test_device_server_that_is_not_there(server: Server) -> None:
+    server.close()
+    port = UrlPort(server.url, LineSettings())
+    with pytest.raises(PortError, match=f'{server.url} cannot be opened .*refused.*switched on'):
+        port.open()
+    with pytest.raises(PortError, match='is not open'):
+        port.write(b'x')
+
+
+@pytest.mark.parametrize('url', ['nonsense://127.0.0.1:1', 'socket://127.0.0.1', 'socket://:x'])
+def test_url_that_is_none(url: str) -> None:
+    with pytest.raises(PortError, match=f'{url} cannot be opened'):
+        UrlPort(url, LineSettings()).open()
+
+
+def test_device_server_that_goes_away(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    server.accept().close()
+    with pytest.raises(PortError, match=f'{server.url} was lost'):
+        read(port, 1)
+    port.close()
+    # and comes back
+    port.open()
+    server.accept().sendall(b'again')
+    assert read(port, 5) == b'again'
+    port.close()
+
+
+def test_write_to_a_device_server_that_goes_away(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    server.accept().close()
+    deadline = time.monotonic() + PATIENCE
+    with pytest.raises(PortError, match=f'{server.url} was lost'):
+        # the first write may still go out: the other side's farewell takes its time
+        while time.monotonic() < deadline:
+            port.write(b'x')
+    port.close()
+
+
+# --- the whole link -------------------------------------------------------------------------------
+
+
+def answer_one_read(far: int | socket.socket) -> None:
+    fd = far if isinstance(far, int) else far.fileno()
+    request = encode(Read(1, 0x2A5, 1))
+    data = b''
+    while len(data) < len(request):
+        assert select.select([fd], [], [], PATIENCE)[0]
+        data += os.read(fd, 100)
+    assert data == request
+    body = b'\x01\x03\x02\x00\x25'
+    os.write(fd, body + crc(body))
+
+
+def test_link_over_a_serial_port(pty: Pty) -> None:
+    link = open_link('modbus_rtu', pty.path, LineSettings(response_timeout=10))
+    link.open()
+    drive = threading.Thread(target=answer_one_read, args=(pty.far,))
+    drive.start()
+    assert link.read(1, Address((0x2A5,), 1)).words == (37,)
+    drive.join()
+    link.close()
+
+
+def test_link_over_tcp(server: Server) -> None:
+    link = open_link('modbus_rtu', server.url, LineSettings(response_timeout=10))
+    link.open()
+    drive = threading.Thread(target=answer_one_read, args=(server.accept(),))
+    drive.start()
+    assert link.read(1, Address((0x2A5,), 1)).words == (37,)
+    drive.join()
+    link.close()
+
+
+def test_unknown_protocol() -> None:
+    with pytest.raises(ValueError, match="unknown protocol 'profibus': choose one of modbus_rtu"):
+        open_link('profibus', '/dev/null', LineSettings())
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('char_format', 'bits', 'parity', 'stop', 'char_bits'),
+    [
+        ('8E1', 8, 'E', 1, 11),
+        ('8N2', 8, 'N', 2, 11),
+        ('7O1', 7, 'O', 1, 10),
+        ('8N1', 8, 'N', 1, 10),
+    ],
+)
+def test_line_settings(
+    char_format: str, bits: int, parity: str, stop: int, char_bits: int
+) -> None:
+    line = LineSettings(baud_rate=9600, char_format=char_format)
+    assert (line.data_bits, line.parity, line.stop_bits) == (bits, parity, stop)
+    assert line.char_time == pytest.approx(char_bits / 9600)
+
+
+@pytest.mark.parametrize('baud', BAUD_RATES)
+def test_silence_between_two_frames(baud: int) -> None:
+    # [MODBUS over Serial Line V1.02, 2.5.1.1]: 3.5 characters of 11 bits, fixed above 19200
+    gap = LineSettings(baud_rate=baud).frame_gap
+    assert gap == pytest.approx(38.5 / baud if baud <= 19200 else 0.00175)
+
+
+@pytest.mark.parametrize(
+    ('setting', 'message'),
+    [
+        ({'baud_rate': 115200}, 'the drive knows 1200, 2400'),
+        ({'baud_rate': 0}, 'the drive knows'),
+        ({'char_format': '8e1'}, 'write data bits, parity and stop bits'),
+        ({'char_format': '9N1'}, 'such as 8E1'),
+        ({'char_format': '8E1 '}, 'such as 8E1'),
+        ({'response_timeout': 0.0}, '0.01 to 10 s'),
+        ({'response_timeout': 10.1}, '0.01 to 10 s'),
+        ({'response_timeout': float('nan')}, '0.01 to 10 s'),
+    ],
+)
+def test_settings_that_no_drive_has(setting: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        LineSettings(**setting)  # type: ignore[arg-type]
