@@ -189,6 +189,8 @@ class Bus:
             priority: deque() for priority in Priority
         }
         self._slots: deque[Slot] = deque()
+        #: A slot was written last.
+        self._slot_went = False
         self._timers: list[tuple[float, int, Task, int]] = []
         self._order = itertools.count()
         self._credit = 0.0
@@ -440,11 +442,18 @@ class Bus:
         )
         if self._send_from(Priority.STOP):
             return True
-        if not background_due and (
-            self._write_slot() or any(self._send_from(priority) for priority in _FOREGROUND)
-        ):
+        if not background_due and self._send_in_foreground():
             return True
         return any(self._send_from(priority) for priority in tuple(self._background))
+
+    def _send_in_foreground(self) -> bool:
+        # set-points may come faster than the line can carry them, and who then no longer polls
+        # does not see the fault that should stop the motor: so every other turn is for the rest
+        slot_went, self._slot_went = self._slot_went, False
+        if not slot_went and self._write_slot():
+            self._slot_went = True
+            return True
+        return any(self._send_from(priority) for priority in _FOREGROUND) or self._write_slot()
 
     def _send_from(self, priority: Priority) -> bool:
         queue = self._queues[priority]

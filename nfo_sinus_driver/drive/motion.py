@@ -131,7 +131,7 @@ class Motion:
             return self._no_control()
         if not seen.driven:
             return f'stopped ({text})'
-        coasts = await self._inverter.read_label('control.st_mode') == 'Release'
+        coasts = await self._inverter.read_label('control.st_mode', Priority.STOP) == 'Release'
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
     async def quick_stop(self) -> str:

@@ -26,6 +26,7 @@ import termios
 import time
 
 from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.port_holders import holders
 from nfo_sinus_driver.link.settings import LineSettings
 
 # Linux ioctls that Python's termios module does not name
@@ -68,8 +69,10 @@ class SerialPort:
             if self._settings.rs485:
                 _switch_transmitter_by_port(fd)
             termios.tcflush(fd, termios.TCIOFLUSH)
-        except BaseException:
+        except BaseException as error:
             os.close(fd)
+            if isinstance(error, (OSError, termios.error)):
+                raise PortError(f'{self._path} cannot be opened: {error.args[-1]}') from error
             raise
         self._fd = fd
 
@@ -90,7 +93,8 @@ class SerialPort:
         try:
             while data:
                 data = data[self._write_some(fd, data) :]
-                if data and not select.select((), (fd,), (), deadline - time.monotonic())[1]:
+                wait = max(0.0, deadline - time.monotonic())
+                if data and not select.select((), (fd,), (), wait)[1]:
                     raise PortError(f'{self._path} takes no more bytes: is the adapter stuck?')
         except OSError as error:
             raise self._lost(error) from error
@@ -191,7 +195,8 @@ def _open_device(path: str) -> int:
 
 
 def _busy(path: str) -> PortError:
-    return PortError(f'{path} is in use by another process: stop that one first')
+    who = ', '.join(holders(path)) or 'another process'
+    return PortError(f'{path} is in use by {who}: end that first, or choose another port')
 
 
 def _ports() -> list[str]:

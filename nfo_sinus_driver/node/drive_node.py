@@ -134,6 +134,11 @@ class DriveNode(LifecycleNodeMixin, Node):
         except DriveError as error:
             self._complain_of_start(str(error))
             return TransitionCallbackReturn.FAILURE
+        if not self._is_for(self._drive.settings):
+            self.get_logger().info('the settings were changed meanwhile: beginning anew')
+            self._stop_for('let go', self._disconnect)
+            return TransitionCallbackReturn.FAILURE
+        self._drive.settings = self.settings
         self._autostart_complaint = ''
         return TransitionCallbackReturn.SUCCESS
 
@@ -210,6 +215,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         """Log why the drive cannot be configured, once for each reason."""
         if not self._autostarting:
             self.get_logger().error(text)
+        elif self._line.bus.port_error is not None:
+            # the bus node says so already, for all its drives
+            self._autostart_complaint = text
         elif text != self._autostart_complaint:
             self._autostart_complaint = text
             self.get_logger().error(f'{text}; trying again for ever')
@@ -243,7 +251,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         del values['retries']
         changed = {parameter.name: parameter.value for parameter in parameters}
         for name in _ONLY_UNCONFIGURED:
-            if changed.get(name, values[name]) != values[name] and self.state != 'unconfigured':
+            if changed.get(name, values[name]) != values[name] and not self._is_loose:
                 raise ValueError(
                     f'{name} can only be changed while the node is unconfigured: '
                     'deactivate it and clean it up first'
@@ -260,9 +268,18 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.settings = self._settings_with(parameters)
-        unconfigured = self.state == 'unconfigured'
-        if not unconfigured:
+        if not self._is_loose:
             self._drive.settings = self.settings
+
+    @property
+    def _is_loose(self) -> bool:
+        """No drive belongs to the node yet; one that is being looked for does not count."""
+        return self.state in ('unconfigured', 'configuring')
+
+    def _is_for(self, settings: DriveSettings) -> bool:
+        return all(
+            getattr(settings, name) == getattr(self.settings, name) for name in _ONLY_UNCONFIGURED
+        )
 
     # --- commands -----------------------------------------------------------------------------
 
@@ -317,6 +334,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self.state != 'active':
             response.success = False
             response.message = f'the node is {self.state}: activate it first'
+            if self._autostart_complaint:
+                response.message = f'the drive has not answered yet: {self._autostart_complaint}'
             return response
         return self._answer(response, self._drive.enable, _LONGEST_COMMAND)
 

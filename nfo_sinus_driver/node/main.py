@@ -39,6 +39,8 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.overrides import unknown_nodes
+from nfo_sinus_driver.node.overrides import unknown_parameters
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
 _GROUPS_OF_A_DRIVE = 7
@@ -77,7 +79,7 @@ _log = logging.getLogger(__name__)
 class DriverProcess:
     """The nodes of one bus, spun until somebody ends them."""
 
-    def __init__(self, single_name: str | None) -> None:
+    def __init__(self, arguments: list[str], single_name: str | None) -> None:
         self._bus_node = BusNode()
         names = self._bus_node.drive_names
         if single_name is not None:
@@ -87,12 +89,19 @@ class DriverProcess:
         for name in names:
             line.drives.append(DriveNode(name, line))
         self._drives = line.drives
+        self._warn_of_unknown_names(arguments)
         threads = _GROUPS_OF_A_DRIVE * len(names) + _GROUPS_OF_THE_BUS
         self._executor = MultiThreadedExecutor(threads)
         for node in (self._bus_node, *self._drives):
             self._executor.add_node(node)
         self._spinning = True
         self._thread = threading.Thread(target=self._spin, name='executor', daemon=True)
+
+    def _warn_of_unknown_names(self, arguments: list[str]) -> None:
+        nodes = (self._bus_node, *self._drives)
+        names = [node.get_name() for node in nodes]
+        for warning in (*unknown_nodes(arguments, names), *unknown_parameters(nodes)):
+            self._bus_node.get_logger().warning(warning)
 
     def start(self) -> None:
         """Open the port and let the nodes work."""
@@ -175,7 +184,10 @@ def _check_names(names: list[str]) -> None:
     if not names:
         raise ValueError('drives names no drive: give at least one name')
     for name in names:
-        validate_node_name(name)
+        try:
+            validate_node_name(name)
+        except InvalidNodeNameException as error:
+            raise ValueError(f'drives names {name!r}, which is no node name: {error}') from error
         if names.count(name) > 1:
             raise ValueError(f'drives names {name} more than once: every drive needs its own name')
         if name == 'nfo_sinus_bus':
@@ -190,9 +202,10 @@ def main(args: list[str] | None = None) -> int:
     arguments, single_name = take_out_node_name(sys.argv if args is None else args)
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        process = DriverProcess(single_name)
-    except (ParameterException, InvalidNodeNameException, ValueError) as error:
-        rclpy.logging.get_logger('nfo_sinus_driver').fatal(f'cannot start: {error}')
+        process = DriverProcess(arguments, single_name)
+    except (ParameterException, ValueError) as error:
+        text = ' '.join(str(error).split())
+        rclpy.logging.get_logger('nfo_sinus_driver').fatal(f'cannot start: {text}')
         rclpy.shutdown()
         return 2
     process.start()

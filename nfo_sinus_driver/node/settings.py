@@ -30,6 +30,9 @@ from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
+#: What YAML makes of a character format without quotes.
+_FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}
+
 SettingValue = bool | int | float | str | list[str]
 
 
@@ -189,22 +192,30 @@ def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue
         try:
             node.declare_parameter(setting.name, setting.default, setting.descriptor())
         except InvalidParameterTypeException:
-            if not isinstance(setting.default, float):
-                raise
-            _declare_from_integer(node, setting)
+            _declare_from_number(node, setting)
     return {setting.name: node.get_parameter(setting.name).value for setting in settings}
 
 
-def _declare_from_integer(node: Node, setting: Setting) -> None:
-    """Take an override of 5 for 5.0; the types of ROS parameters are stricter than people."""
+def _declare_from_number(node: Node, setting: Setting) -> None:
+    """
+    Take an override of 5 for 5.0, and of 8E1 for '8E1'.
+
+    The types of ROS parameters are stricter than people, and YAML takes 8E1 for eighty.
+
+    :raises InvalidParameterTypeException: the override is of another type altogether.
+    """
     dynamic = ParameterDescriptor(dynamic_typing=True)
     given = node.declare_parameter(setting.name, setting.default, dynamic).value
     node.undeclare_parameter(setting.name)
-    if isinstance(given, bool) or not isinstance(given, int):
+    meant: SettingValue
+    if isinstance(setting.default, float) and type(given) is int:
+        meant = float(given)
+    elif setting.name == 'char_format' and given in _FORMATS_THAT_ARE_NUMBERS:
+        meant = _FORMATS_THAT_ARE_NUMBERS[given]
+    else:
         node.declare_parameter(setting.name, setting.default, setting.descriptor())
-    node.declare_parameter(
-        setting.name, float(given), setting.descriptor(), ignore_override=True
-    )
+        return
+    node.declare_parameter(setting.name, meant, setting.descriptor(), ignore_override=True)
 
 
 def integers_to_doubles(

@@ -112,10 +112,10 @@ MUTANTS = (
     ),
     Mutant(
         2,
-        'set-points from before enable count',
+        'a set-point from before enable is taken over',
         _SETPOINT,
-        '        if at <= self._armed_at:\n            return None\n',
-        '',
+        '        self._armed_at = time.monotonic()\n',
+        '        self._armed_at = 0.0\n        self._bus.request(self._slot)\n',
         (_NO_RESTART, '-k', 'from_before_enable'),
     ),
     Mutant(
@@ -146,8 +146,8 @@ MUTANTS = (
         3,
         'Ctrl-Z suspends the driver',
         _MAIN,
-        'signal.SIG_BLOCK, _ENDING | _SUSPENDING',
-        'signal.SIG_BLOCK, _ENDING',
+        '_SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))',
+        '_SUSPENDING: frozenset[signal.Signals] = frozenset()',
         (_WAYS_OUT, '-k', 'ctrl_z'),
     ),
     Mutant(
@@ -197,7 +197,7 @@ MUTANTS = (
         _METHOD,
         "write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)",
         "write('fieldbus.scmd', Scmd.STOP, Priority.REFRESH, once=True)",
-        ('test/ros/test_urgency.py', '-k', 'nothing_is_sent'),
+        ('test/unit/drive/test_stop_first.py',),
     ),
     Mutant(
         4,
@@ -205,7 +205,7 @@ MUTANTS = (
         'nfo_sinus_driver/drive/drive_timeout.py',
         '        if registers.words(key, value) != registers.words(key, before[key])',
         '        if True',
-        (_INTERFACE, '-k', 'take_effect'),
+        (_INTERFACE, '-k', 'has_already'),
     ),
     Mutant(
         4,

@@ -147,7 +147,7 @@ class Bench(contextlib.ExitStack):
         self.trace = folder / 'trace.jsonl'
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
         self.domain = domain
-        self._drivers = 0
+        self._drivers: list[Process] = []
 
     def simulator(self, *arguments: str) -> Simulated:
         """Start a simulated line; return what looks into it."""
@@ -161,12 +161,18 @@ class Bench(contextlib.ExitStack):
 
     def driver(self, *arguments: str) -> Process:
         """Start a driver on the line; ``-p name:=value`` arguments may follow."""
-        self._drivers += 1
         settings = ['-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}']
         command = [_executable('driver'), '--ros-args', *settings, *arguments]
-        process = Process(command, self._environment, self.folder / f'driver{self._drivers}.log')
+        log = self.folder / f'driver{len(self._drivers)}.log'
+        process = Process(command, self._environment, log)
+        self._drivers.append(process)
         self.callback(process.end)
         return process
+
+    @property
+    def log(self) -> str:
+        """What the newest driver said so far."""
+        return self._drivers[-1].text
 
     def client(self, name: str = '/nfo_sinus') -> Client:
         """Return a client of one drive node."""

@@ -224,6 +224,13 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
     assert drive.state()['writes'] == writes, 'only a change is written'
 
 
+def test_what_the_drive_has_already_is_not_written(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'serial.sio_tot=2', '--set', 'serial.auto_stop=ON')
+    bench.driver('-p', 'drive_timeout:=2.0')
+    bench.client().connected()
+    assert not drive.state()['writes']
+
+
 def test_an_integer_on_the_command_line_is_taken_for_a_double(bench: Bench) -> None:
     bench.simulator()
     bench.driver('-p', 'setpoint_timeout:=3')

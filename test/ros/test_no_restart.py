@@ -53,6 +53,7 @@ def _turns_after_enable(drive: Simulated, client: Client) -> None:
 def _fault_and_acknowledgement(bench: Bench, drive: Simulated, client: Client) -> None:
     drive.inject('fault', 5)
     client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
+    wait_until(lambda: 'stopped: fault 5 Overload' in bench.log, 'the reason in the log')
     assert 'Overload' in client.enable().message
     assert client.call('fault_ack').message == 'acknowledged 5 Overload'
 
@@ -86,7 +87,8 @@ def _power_cycle(bench: Bench, drive: Simulated, client: Client) -> None:
 
 def _line_gone_for_five_seconds(bench: Bench, drive: Simulated, client: Client) -> None:
     drive.inject('line-dead', 5.0)
-    client.wait_for('status', lambda status: not status.connected, 'the line is gone')
+    status = client.wait_for('status', lambda status: not status.connected, 'the line is gone')
+    assert not status.enabled
     assert drive.state()['turning'], 'the drive runs on, and that is what makes this a test'
     client.wait_for('status', lambda status: status.connected, 'the line is back')
 
@@ -167,6 +169,7 @@ def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None
         refused = client.enable()
         assert not refused.success
         assert 'RUN input is not active' in refused.message
+        drive.wait_for(lambda state: state['scmd'] == 0, timeout=PATIENCE)
         drive.inject('run', True)
         _stays_still(drive)
 

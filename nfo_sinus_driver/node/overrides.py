@@ -1,0 +1,101 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Finds what was given to the nodes and nobody takes: a misspelt parameter, a misspelt node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Iterator
+import difflib
+import itertools
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+import yaml
+
+_PARAMS_FILE = '--params-file'
+_PARAMETERS = 'ros__parameters'
+
+
+def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
+    """
+    Return a warning for each parameter that was given and that no node declares.
+
+    What is given without a node's name reaches every node, so one that declares it is enough.
+    """
+    nodes = list(nodes)
+    declared = {name for node in nodes for name in _declared(node)}
+    unknown: dict[str, set[str]] = {}
+    for node in nodes:
+        # rclpy has no other way to see the overrides that nobody declared
+        for name in node._parameter_overrides:
+            if name not in declared:
+                unknown.setdefault(name, set()).add(node.get_name())
+    for name, names in sorted(unknown.items()):
+        yield (
+            f'parameter {name} was given to {", ".join(sorted(names))}, but there is none of that '
+            f'name{_did_you_mean(name, declared)}'
+        )
+    for node in nodes:
+        others = declared - _declared(node)
+        misplaced = set(node._parameter_overrides) & others
+        # given to all of them, it reaches the right one too
+        for name in sorted(misplaced):
+            if not all(name in other._parameter_overrides for other in nodes):
+                yield f'parameter {name} was given to {node.get_name()}, which has none such'
+
+
+def _declared(node: Node) -> set[str]:
+    return set(node.get_parameters_by_prefix(''))
+
+
+def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
+    """Return a warning for each section of a parameter file that no node is named by."""
+    names = set(names)
+    for flag, path in itertools.pairwise(arguments):
+        if flag == _PARAMS_FILE:
+            for section in _sections(_load(path)):
+                name = section.rsplit('/', 1)[-1]
+                if '*' not in name and name not in names:
+                    yield (
+                        f'{path} has parameters for {section}, but the nodes here are '
+                        f'{", ".join(sorted(names))}{_did_you_mean(name, names)}'
+                    )
+
+
+def _load(path: str) -> Any:
+    try:
+        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except (OSError, yaml.YAMLError):
+        # ROS has said so itself by now
+        return None
+
+
+def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
+    """Return the names of the nodes that a parameter file speaks of."""
+    if not isinstance(tree, dict):
+        return
+    for key, value in tree.items():
+        name = f'{prefix}/{key}'.replace('//', '/') if prefix else str(key)
+        if isinstance(value, dict) and _PARAMETERS in value:
+            yield name
+        else:
+            yield from _sections(value, name)
+
+
+def _did_you_mean(name: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, list(known), n=2)
+    return f'; did you mean {" or ".join(close)}?' if close else ''

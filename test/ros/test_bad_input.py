@@ -1,0 +1,289 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Wrong input of every kind: one clear message that names the remedy, and nothing moves."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+import stat
+import subprocess
+import sys
+
+from bench import A_WHILE
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import Process
+from bench import holds_for
+from bench import wait_until
+import pytest
+
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
+_CANNOT_START = 2
+
+
+def _says(driver: Process, *parts: str) -> None:
+    """Wait until the driver has said all parts in one line, and see that it says it once."""
+    wait_until(
+        lambda: any(all(part in line for part in parts) for line in driver.text.splitlines()),
+        f'{parts} in the log',
+    )
+    lines = [line for line in driver.text.splitlines() if all(part in line for part in parts)]
+    assert len(lines) == 1, lines
+
+
+def _untouched(drive: Simulated) -> None:
+    state = drive.state()
+    assert not state['turning']
+    assert not state['writes']
+    assert not state['command_writes']
+
+
+# --- the port -----------------------------------------------------------------------------------
+
+
+def test_an_absent_port_is_waited_for(bench: Bench) -> None:
+    driver = bench.driver()
+    _says(driver, bench.port, 'does not exist', 'plugged in', 'trying again')
+    bench.simulator()
+    bench.client().connected()
+
+
+def test_a_busy_port_is_waited_for_and_its_holder_is_named(bench: Bench) -> None:
+    drive = bench.simulator()
+    holder = subprocess.Popen(
+        [
+            sys.executable,
+            '-c',
+            'import fcntl, sys\n'
+            'port = open(sys.argv[1], "rb+", buffering=0)\n'
+            'fcntl.flock(port, fcntl.LOCK_EX)\n'
+            'print("held", flush=True)\n'
+            'sys.stdin.read()\n',
+            bench.port,
+        ],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    with holder:
+        assert holder.stdout is not None
+        assert holder.stdin is not None
+        assert holder.stdout.readline() == b'held\n'
+        driver = bench.driver()
+        _says(driver, bench.port, 'in use by', f'(pid {holder.pid})', 'end that first')
+        _untouched(drive)
+        holder.stdin.close()
+    bench.client().connected()
+
+
+def test_a_second_driver_on_the_port_is_told_who_has_it(bench: Bench) -> None:
+    bench.simulator()
+    first = bench.driver()
+    bench.client().connected()
+    second = bench.driver('-r', '__ns:=/second')
+    _says(second, 'in use by driver (pid ')
+    assert first.running
+
+
+def test_what_is_no_serial_port_is_named_so(bench: Bench) -> None:
+    Path(bench.port).write_text('no port')
+    _says(bench.driver(), bench.port, 'is not a serial port')
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may open everything')
+def test_a_port_without_permission_names_the_remedy(bench: Bench) -> None:
+    drive = bench.simulator()
+    device = os.path.realpath(bench.port)
+    os.chmod(device, 0)
+    driver = bench.driver()
+    _says(driver, 'no permission', 'dialout')
+    _untouched(drive)
+    os.chmod(device, stat.S_IRUSR | stat.S_IWUSR)
+    bench.client().connected()
+
+
+# --- the line -----------------------------------------------------------------------------------
+
+
+def _checks_in_order(text: str) -> None:
+    line = next(line for line in text.splitlines() if 'BusType' in line)
+    words = ('BusType', 'jumper S5', 'the address,', 'baud', 'parity')
+    places = [line.index(word) for word in words]
+    assert places == sorted(places)
+
+
+def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
+    drive = bench.simulator('--address', '3')
+    driver = bench.driver('-p', 'address:=4')
+    _says(driver, 'nobody answers at address 4', 'BusType', 'trying again')
+    _checks_in_order(driver.text)
+    client = bench.client()
+    assert 'has not answered yet' in client.enable().message
+    _untouched(drive)
+    assert client.set_parameters(address=3).successful
+    client.connected()
+
+
+def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Bench) -> None:
+    # the simulated drive hears nothing of a line whose format is not its own
+    drive = bench.simulator('--set', 'serial.si_prot=8b Op 1s', '--boot-time', '0.1')
+    drive.inject('power-cycle')
+    drive.wait_for(lambda state: not state['silent'], timeout=PATIENCE)
+    driver = bench.driver()
+    _says(driver, 'nobody answers at address 1')
+    _checks_in_order(driver.text)
+    _untouched(drive)
+
+
+def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
+    drive = bench.simulator()
+    drive.inject('damage', 1000000)
+    driver = bench.driver()
+    _says(driver, 'is no answer', 'baud rate', 'parity')
+    _untouched(drive)
+    drive.inject('heal')
+    bench.client().connected()
+
+
+# --- set-points and commands --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_a_setpoint_that_is_no_number_is_ignored_with_one_warning(
+    bench: Bench, value: float
+) -> None:
+    drive = bench.simulator(*_QUICK)
+    driver = bench.driver()
+    client = bench.client().connected()
+    assert client.enable().success
+    with client.setpoints(value):
+        _says(driver, 'set-point', 'not a finite number')
+        holds_for(A_WHILE, lambda: not drive.state()['turning'], 'standstill')
+    assert driver.text.count('not a finite number') == 1
+
+
+def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1')
+    driver = bench.driver('-p', 'setpoint_max:=12.0')
+    client = bench.client().connected()
+    assert client.enable().success
+    with client.setpoints(-4000.0):
+        status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
+        assert status.setpoint == -12.0
+        client.wait_for('status', lambda status: abs(status.actual + 12) < 0.3, '-12 Hz')
+        _says(driver, 'set-point -4000 is limited to -12')
+        assert client.set_parameters(setpoint_max=0.0).successful
+        client.wait_for('status', lambda status: status.setpoint == -150, "the drive's limit")
+    assert drive.state()['setpoint'] == -150
+
+
+def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) -> None:
+    drive = bench.simulator()
+    drive.inject('fault', 4, standing=True)
+    bench.driver()
+    client = bench.client().connected()
+    refused = client.enable()
+    assert not refused.success
+    for part in ('4 PTC Temp', 'thermistor', 'Let the motor cool', '~/fault_ack'):
+        assert part in refused.message
+    assert drive.state()['scmd'] == 0
+    assert not drive.state()['turning']
+
+
+def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.mode=Speed')
+    bench.driver('-p', 'expected_control_mode:=Freque')
+    client = bench.client().connected()
+    refused = client.enable()
+    assert not refused.success
+    assert 'control mode Speed, expected is Freque' in refused.message
+    _untouched(drive)
+
+
+# --- settings -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'parts'),
+    [
+        (['-p', 'address:=0'], ['address', '1', '247']),
+        (['-p', 'address:=one'], ['address', 'INTEGER']),
+        (['-p', 'setpoint_timeout:=-1.0'], ['setpoint_timeout']),
+        (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
+        (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
+        (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
+        (['-p', 'protocol:=canopen'], ['protocol', 'modbus_rtu']),
+        (['-p', 'baud_rate:=12345'], ['baud_rate', '57600']),
+        (['-p', 'char_format:=9X1'], ['char_format', '8E1']),
+        (['-p', 'drives:=[one, one]'], ['one', 'its own name']),
+        (['-p', 'drives:=[nfo_sinus_bus]'], ['nfo_sinus_bus']),
+        (['-p', 'drives:=["1st"]'], ['1st']),
+        (['-p', 'drives:=[one, two]'], ['address 1', 'belongs to one', 'address of its own']),
+        (['-p', 'drives:=[one, two]', '-r', '__node:=x'], ['x', '2 drives', 'drives']),
+    ],
+    ids=lambda value: ' '.join(value[1::2]) if value[0] in ('-p', '-r') else '',
+)
+def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
+    bench: Bench, arguments: list[str], parts: list[str]
+) -> None:
+    drive = bench.simulator()
+    driver = bench.driver(*arguments)
+    assert driver.wait() == _CANNOT_START
+    lines = [line for line in driver.text.splitlines() if 'cannot start' in line]
+    assert len(lines) == 1, driver.text
+    for part in parts:
+        assert part in lines[0]
+    assert 'Traceback' not in driver.text
+    _untouched(drive)
+
+
+def test_a_character_format_needs_no_quotes(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-p', 'char_format:=8E1')
+    assert bench.client('/nfo_sinus_bus').parameter('char_format') == '8E1'
+
+
+def test_unknown_names_in_a_parameter_file_are_warned_about(bench: Bench) -> None:
+    parameters = bench.folder / 'misspelt.yaml'
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {respons_timeout: 0.3}}\n'
+        'nfo_sinus: {ros__parameters: {setpoint_timout: 1.0, retries: 3}}\n'
+        'nfo_sinsu: {ros__parameters: {address: 2}}\n'
+    )
+    bench.simulator()
+    driver = bench.driver('--params-file', str(parameters))
+    client = bench.client().connected()
+    _says(driver, 'setpoint_timout', 'did you mean', 'setpoint_timeout')
+    _says(driver, 'respons_timeout', 'did you mean', 'response_timeout')
+    _says(driver, 'retries was given to nfo_sinus, which has none such')
+    _says(driver, 'nfo_sinsu', 'did you mean', 'nfo_sinus')
+    assert 'port was given' not in driver.text, 'what the command line gives to all is no mistake'
+    assert client.parameter('setpoint_timeout') == 2.5
+
+
+def test_a_name_for_the_whole_process_becomes_the_name_of_the_single_drive(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-r', '__node:=belt')
+    client: Client = bench.client('/belt').connected()
+    nodes = wait_until(
+        lambda: len(client.node.get_node_names()) > 2 and client.node.get_node_names(), 'nodes'
+    )
+    assert 'belt' in nodes
+    assert 'nfo_sinus_bus' in nodes
+    assert nodes.count('belt') == 1
