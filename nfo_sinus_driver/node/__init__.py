@@ -12,3 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """ROS 2 and nothing else: parameters, topics, services, action, diagnostics, lifecycle."""
+
+import os
+
+# A field of a wrong type would end the whole process by an assertion in C, with the motors
+# running; checked in Python it is an exception. It is looked at when the messages are imported.
+os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')

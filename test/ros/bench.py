@@ -166,6 +166,7 @@ class Bench(contextlib.ExitStack):
         log = self.folder / f'driver{len(self._drivers)}.log'
         process = Process(command, self._environment, log)
         self._drivers.append(process)
+        self.callback(_no_traceback, process)
         self.callback(process.end)
         return process
 
@@ -334,6 +335,11 @@ class Client(contextlib.ExitStack):
 def seconds(stamp: Time) -> float:
     """Return a time stamp as a number."""
     return stamp.sec + stamp.nanosec * 1e-9
+
+
+def _no_traceback(process: Process) -> None:
+    """Fail if the driver met an error of its own, which it survives but must not have."""
+    assert 'Traceback' not in process.text, process.text
 
 
 def _executable(name: str) -> str:
