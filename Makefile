@@ -23,7 +23,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants build clean
+.PHONY: help setup demo run test lint types unit ros mutants bench build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -32,7 +32,7 @@ help: ## list the targets
 setup: ## set up .venv, and build into install
 	@tools/setup
 
-demo: setup ## a short ride: driver and simulated drive, from enable to stop
+demo: setup ## a short ride of a simulated drive, from enable to stop, recorded and drawn
 	@tools/run python -m nfo_sinus_driver.node.demo
 
 run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
@@ -63,6 +63,12 @@ ros: setup ## end-to-end tests with rclpy
 
 mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
 	@tools/run python test/mutants/run.py
+
+# Not a part of setup: only the comparison needs other masters.
+bench: setup ## measure its speed, and that of others (half an hour; BENCH=--quick: 3 minutes)
+	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
+		--disable-pip-version-check --requirement=benchmark/requirements.txt
+	@tools/run python benchmark/run.py $(BENCH)
 
 build: ## build both packages again
 	@rm -rf build install

@@ -17,13 +17,16 @@ Start the driver: one serial line, one node for each drive on it.
     ros2 launch nfo_sinus_driver driver.launch.py port:=/dev/ttyUSB0
     ros2 launch nfo_sinus_driver driver.launch.py params_file:=conveyor.yaml namespace:=line1
 
-The node has no ``name=``. It would rename every node of the process, and the process has several:
-the bus node and one for each drive. Name the drives by the parameter ``drives`` of
-``nfo_sinus_bus`` in the parameter file.
+The node action has no ``name=``: it would rename every node of the process, and the process has
+several, the bus node and one for each drive. The drives are named by the parameter ``drives`` of
+``nfo_sinus_bus`` instead.
 
-It is not respawned. A driver that ended did so because somebody ended it, or for a reason that
-should be looked at; a new one would not run the motors anyway until they are enabled.
+The driver is not respawned. When it ended, somebody ended it or something is wrong that a person
+should look at; and a new one lets no motor turn before it is enabled anyway.
 """
+
+import json
+import tempfile
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -33,80 +36,72 @@ from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-#: Launch arguments that override a parameter of the parameter file, and where it belongs.
+#: Launch arguments that overrule a parameter of the same name in the parameter file: for which
+#: nodes, and what it is.
 OVERRIDES = {
-    'port': '/**/nfo_sinus_bus:port',
-    'baud_rate': '/**/nfo_sinus_bus:baud_rate',
-    'char_format': '/**/nfo_sinus_bus:char_format',
-    'address': 'address',
-    'drive_timeout': 'drive_timeout',
+    'port': ('/**/nfo_sinus_bus', str, 'serial port'),
+    'baud_rate': ('/**/nfo_sinus_bus', int, 'bit rate, bit/s'),
+    'char_format': ('/**/nfo_sinus_bus', str, 'character format, such as 8E1'),
+    'address': ('/**', int, 'address of the drive, where there is one'),
 }
 
 
 def generate_launch_description():
     """Return the launch description."""
     single = PathJoinSubstitution([FindPackageShare('nfo_sinus_driver'), 'config', 'single.yaml'])
+    declare = DeclareLaunchArgument
+    overrides = [
+        declare(name, default_value='', description=f'{what}; empty: as the parameter file says')
+        for name, (_, _, what) in OVERRIDES.items()
+    ]
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                'params_file', default_value=single, description='parameter file (YAML)'
-            ),
-            DeclareLaunchArgument(
-                'namespace', default_value='', description='namespace of all nodes'
-            ),
-            DeclareLaunchArgument(
-                'port', default_value='', description="serial port; '': as the parameter file says"
-            ),
-            DeclareLaunchArgument(
-                'baud_rate', default_value='', description="bit/s; '': as the parameter file says"
-            ),
-            DeclareLaunchArgument(
-                'char_format',
-                default_value='',
-                description="such as 8E1; '': as the parameter file says",
-            ),
-            DeclareLaunchArgument(
-                'address',
-                default_value='',
-                description="address of a single drive; '': as the parameter file says",
-            ),
-            DeclareLaunchArgument(
-                'drive_timeout',
-                default_value='',
-                description="of every drive, s; '': as the parameter file says",
-            ),
-            DeclareLaunchArgument(
-                'log_level', default_value='info', description='debug, info, warn or error'
-            ),
-            DeclareLaunchArgument(
+            declare('params_file', default_value=single, description='parameter file'),
+            declare('namespace', default_value='', description='namespace of all nodes'),
+            *overrides,
+            declare('log_level', default_value='info', description='debug, info, warn or error'),
+            declare(
                 'exit_timeout',
                 default_value='15',
-                description='how long the driver may take to stop the motors before launch kills '
-                'it, s; more than shutdown_timeout and 5',
+                description='how long the driver may take to stop its motors before launch kills '
+                'it, s; at least 10 more than the parameter shutdown_timeout',
             ),
-            OpaqueFunction(function=_driver),
+            OpaqueFunction(function=_start_driver),
         ]
     )
 
 
-def _driver(context):
-    """Return the driver with the overrides that were given."""
-    overrides = []
-    for argument, parameter in OVERRIDES.items():
-        value = LaunchConfiguration(argument).perform(context)
-        if value:
-            overrides += ['-p', f'{parameter}:={value}']
+def _start_driver(context):
+    """Return the driver, with the overrides that were given."""
+    exit_timeout = LaunchConfiguration('exit_timeout')
     return [
         Node(
             package='nfo_sinus_driver',
             executable='driver',
             namespace=LaunchConfiguration('namespace'),
-            parameters=[LaunchConfiguration('params_file')],
-            ros_arguments=['--log-level', LaunchConfiguration('log_level'), *overrides],
+            parameters=[LaunchConfiguration('params_file'), *_overrides(context)],
+            ros_arguments=['--log-level', LaunchConfiguration('log_level')],
             output='screen',
             respawn=False,
-            # the time between the signals by which launch ends a process
-            sigterm_timeout=LaunchConfiguration('exit_timeout'),
-            sigkill_timeout=LaunchConfiguration('exit_timeout'),
+            # launch sends SIGINT, then SIGTERM, then SIGKILL, this far apart
+            sigterm_timeout=exit_timeout,
+            sigkill_timeout=exit_timeout,
         )
     ]
+
+
+def _overrides(context):
+    """Return a parameter file with the overrides that were given, in a list; or an empty list."""
+    sections = {}
+    for name, (nodes, type_, _) in OVERRIDES.items():
+        given = LaunchConfiguration(name).perform(context)
+        if given:
+            section = sections.setdefault(nodes, {'ros__parameters': {}})
+            section['ros__parameters'][name] = type_(given)
+    if not sections:
+        return []
+    # not a dictionary: launch_ros puts that under '/**', which a section for the bus node in the
+    # parameter file would overrule; JSON, for in plain YAML 8E1 is a number
+    with tempfile.NamedTemporaryFile('w', prefix='nfo_sinus_', delete=False) as file:
+        json.dump(sections, file)
+    return [file.name]

@@ -17,7 +17,8 @@ Start a simulated drive and the driver for it, to try things without hardware.
     ros2 launch nfo_sinus_driver simulation.launch.py
     ros2 run nfo_sinus_driver simulator inject --link /tmp/nfo_sinus fault 5
 
-There is no waiting for the simulated drive: the driver tries its port until it is there.
+The driver needs not wait for the simulated drive: it tries the port until it is there. At the end
+the drive has to outlast the driver, which stops the motor first; see below.
 """
 
 import signal
@@ -25,13 +26,75 @@ import signal
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import EmitEvent
-from launch.actions import IncludeLaunchDescription
+from launch.actions import ExecuteProcess
 from launch.actions import RegisterEventHandler
 from launch.actions import Shutdown
 from launch.event_handlers import OnProcessExit
+from launch.events import matches_action
 from launch.events.process import SignalProcess
-from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
-from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
-from launch_ros.substitutions import FindPackageShare
+from launch_ros.substitutions import ExecutableInPackage
+
+_EXIT_TIMEOUT = '15'
+#: Runs a command that Ctrl-C does not end, whether terminal or launch pass it on; SIGTERM does.
+_OUTLASTS_INTERRUPTS = (
+    'sh',
+    '-c',
+    'trap "" INT; setsid "$0" "$@" & pid=$!; trap "kill $pid" TERM; wait $pid || wait $pid',
+)
+
+
+def generate_launch_description():
+    """Return the launch description."""
+    link = LaunchConfiguration('link')
+    baud_rate = LaunchConfiguration('baud_rate')
+    # no node, so not to be given ROS arguments
+    simulator = ExecuteProcess(
+        cmd=[
+            *_OUTLASTS_INTERRUPTS,
+            ExecutableInPackage('simulator', 'nfo_sinus_driver'),
+            '--link',
+            link,
+            '--baud',
+            baud_rate,
+            '--paced',
+        ],
+        name='simulator',
+        output='screen',
+        sigterm_timeout=_EXIT_TIMEOUT,
+        sigkill_timeout=_EXIT_TIMEOUT,
+        on_exit=Shutdown(reason='the simulated drive has ended'),
+    )
+    driver = Node(
+        package='nfo_sinus_driver',
+        executable='driver',
+        namespace=LaunchConfiguration('namespace'),
+        parameters=[{'port': link, 'baud_rate': baud_rate, 'drive_timeout': 2.0}],
+        output='screen',
+        respawn=False,
+        sigterm_timeout=_EXIT_TIMEOUT,
+        sigkill_timeout=_EXIT_TIMEOUT,
+        on_exit=Shutdown(reason='the driver has ended'),
+    )
+    end_simulator = EmitEvent(
+        event=SignalProcess(
+            signal_number=signal.SIGTERM, process_matcher=matches_action(simulator)
+        )
+    )
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                'link', default_value='/tmp/nfo_sinus', description='port to serve and to use'
+            ),
+            DeclareLaunchArgument(
+                'baud_rate', default_value='57600', description='bit rate of the line, bit/s'
+            ),
+            DeclareLaunchArgument(
+                'namespace', default_value='', description='namespace of all nodes'
+            ),
+            simulator,
+            driver,
+            RegisterEventHandler(OnProcessExit(target_action=driver, on_exit=[end_simulator])),
+        ]
+    )

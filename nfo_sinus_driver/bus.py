@@ -27,10 +27,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from collections.abc import Coroutine
-from collections.abc import Generator
 from concurrent.futures import Future
 import ctypes
-import enum
 import functools
 import heapq
 import itertools
@@ -40,8 +38,15 @@ import time
 from typing import Any
 from typing import TypeVar
 
+from nfo_sinus_driver.jobs import Cancelled
+from nfo_sinus_driver.jobs import Pause
+from nfo_sinus_driver.jobs import Priority
+from nfo_sinus_driver.jobs import Slot
+from nfo_sinus_driver.jobs import Task
+from nfo_sinus_driver.jobs import Transfer
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -52,6 +57,8 @@ from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
+
+__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Task', 'Transfer']
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -64,114 +71,10 @@ BACKGROUND_SHARE = 0.2
 _MOST_CREDIT = 0.005
 
 _PR_SET_TIMERSLACK = 29
-
-
-class Priority(enum.IntEnum):
-    """How urgent a transaction is; the least goes first."""
-
-    STOP = 0
-    SETPOINT = 1
-    SERVICE = 2
-    POLL = 3
-    TELEMETRY = 4
-    REFRESH = 5
+_NOWHERE = Address((), 0)
 
 
 _FOREGROUND = (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
-
-
-class Cancelled(BaseException):
-    """
-    Raised inside a coroutine whose task was cancelled.
-
-    Not an ``Exception``, so that a coroutine that survives every mistake still ends.
-    """
-
-
-class Transfer:
-    """One transaction that a coroutine awaits: a read, or a write if ``words`` is given."""
-
-    __slots__ = ('address', 'priority', 'unit', 'words')
-
-    def __init__(
-        self, unit: int, address: Address, priority: Priority, words: Words | None = None
-    ) -> None:
-        self.unit = unit
-        self.address = address
-        self.priority = priority
-        self.words = words
-
-    def __await__(self) -> Generator[Transfer, Reply, Reply]:
-        return (yield self)
-
-
-class _Pause:
-    """A wait until a moment, or until the task is woken."""
-
-    __slots__ = ('until',)
-
-    def __init__(self, until: float) -> None:
-        self.until = until
-
-    def __await__(self) -> Generator[_Pause, None, None]:
-        yield self
-
-
-class Task:
-    """A coroutine on the bus; :attr:`future` has its result."""
-
-    def __init__(self, coroutine: Coroutine[Any, Any, Any]) -> None:
-        self._coroutine = coroutine
-        self.future: Future[Any] = Future()
-        self.cancelled = False
-        #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.
-        self.running = False
-        self.cancel_due = False
-        #: Tells timers of earlier pauses from that of the present one.
-        self.pause = 0
-        self.asleep = False
-        #: Tasks that wait for the end of this one.
-        self.joiners: list[Task] = []
-        # nobody may cancel the future behind the worker's back
-        self.future.set_running_or_notify_cancel()
-
-    def step(self, value: Any, error: BaseException | None) -> Transfer | _Pause | None:
-        """Run it up to what it awaits next; ``None`` when it has ended."""
-        self.running = True
-        try:
-            if error is not None:
-                awaited = self._coroutine.throw(error)
-            else:
-                awaited = self._coroutine.send(value)
-        except StopIteration as end:
-            self.future.set_result(end.value)
-        except BaseException as failure:
-            self.future.set_exception(failure)
-        else:
-            assert isinstance(awaited, (Transfer, _Pause))
-            return awaited
-        finally:
-            self.running = False
-        return None
-
-
-class Slot:
-    """
-    A place for one pending write of which only the latest counts, such as a set-point.
-
-    :param make: called by the worker at the moment of sending; returns what to write now, or
-        ``None`` if there is nothing to write any more.
-    :param done: called by the worker with the error, or ``None`` when the unit took it.
-    """
-
-    def __init__(
-        self,
-        make: Callable[[], Transfer | None],
-        done: Callable[[Transfer, LinkError | None], None],
-    ) -> None:
-        self.make = make
-        self.done = done
-        self.pending = False
 
 
 class Bus:
@@ -280,9 +183,27 @@ class Bus:
         """
         return Transfer(unit, address, priority, words)
 
-    def sleep(self, seconds: float) -> _Pause:
+    async def identify(self, unit: int, priority: Priority) -> Identification:
+        """
+        Ask a unit who it is, one transaction at a time, and none of them twice (to be awaited).
+
+        What it refuses to say or does not answer stays empty.
+
+        :raises PortError: the port is not open.
+        """
+        inquiry = self._link.identify(unit)
+        while not inquiry.done:
+            try:
+                await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
+            except PortError:
+                raise
+            except LinkError as error:
+                _log.debug('unit %d does not say who it is: %s', unit, error)
+        return inquiry.found
+
+    def sleep(self, seconds: float) -> Pause:
         """Let time pass (to be awaited)."""
-        return _Pause(time.monotonic() + seconds)
+        return Pause(time.monotonic() + seconds)
 
     @property
     def current(self) -> Task:
@@ -359,11 +280,11 @@ class Bus:
         while not self._stopping:
             try:
                 self._work_once()
-            except Exception:
+            except BaseException:
                 # a mistake in a callback must not take every drive on the line with it
                 _log.exception('error in the bus worker; it goes on')
         self._is_open = False
-        self._link.close()
+        self._close_link()
         self._closed = True
         self._take_in()
         for task in tuple(self._tasks):
@@ -417,7 +338,7 @@ class Bus:
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
         """Step a task and file what it awaits next."""
         caller, self._current = self._current, task
-        awaited = task.step(value, error)
+        awaited = task.awaited = task.step(value, error)
         self._current = caller
         if awaited is not None and (self._closed or task.cancel_due):
             task.cancel_due = False
@@ -491,12 +412,12 @@ class Bus:
             self._advance(task, reply, None)
 
     def _resume(self, task: Task, transfer: Transfer) -> None:
-        if not task.cancelled:
+        if task.awaited is transfer:
             self._queues[transfer.priority].append((task, transfer))
 
     def _later(self, until: float, function: Callable[[], None]) -> None:
         async def wait() -> None:
-            await _Pause(until)
+            await Pause(until)
             function()
 
         self.spawn(wait())
@@ -504,7 +425,9 @@ class Bus:
     def _transact(self, transfer: Transfer) -> Reply:
         started = time.monotonic()
         try:
-            if transfer.words is None:
+            if transfer.send is not None:
+                reply = transfer.send()
+            elif transfer.words is None:
                 reply = self._link.read(transfer.unit, transfer.address)
             else:
                 reply = self._link.write(transfer.unit, transfer.address, transfer.words)
@@ -513,10 +436,10 @@ class Bus:
         except LinkError as error:
             self._account(transfer, started, error)
             raise
-        except Exception as error:
+        except BaseException as error:
             # a mistake in the link must reach the one who asked, not leave him waiting
             _log.exception('error in the link')
-            raise LinkError(f'error in the link: {error}') from error
+            raise LinkError(f'error in the link: {error!r}') from error
         self._account(transfer, started, None)
         return reply
 
@@ -549,12 +472,22 @@ class Bus:
             self._link.open()
         except PortError as error:
             self._lose_port(error)
+        except BaseException as error:
+            _log.exception('error in the link')
+            self._lose_port(PortError(f'error in the link: {error!r}'))
         else:
             self._is_open = True
             self._recorder.opened()
 
+    def _close_link(self) -> None:
+        try:
+            self._link.close()
+        except BaseException:
+            # who waits for an answer must be told all the same
+            _log.exception('error in the link')
+
     def _lose_port(self, error: PortError) -> None:
-        self._link.close()
+        self._close_link()
         self._is_open = False
         self._port_error = error
         self._reopen_at = time.monotonic() + REOPEN_PERIOD

@@ -34,8 +34,10 @@ elif [ "${ROS_DISTRO-}" != jazzy ]; then
 fi
 export PATH=$nfo_sinus_root/install/nfo_sinus_driver/lib/nfo_sinus_driver:$PATH
 export PATH=$nfo_sinus_root/.venv/bin:$PATH
-# Nothing outside the clone is changed, so the logs of nodes stay in it too.
+# Nothing outside the clone is changed, so the logs of nodes stay in it too, and so does the list
+# of fonts that matplotlib keeps.
 export ROS_LOG_DIR=${ROS_LOG_DIR:-$nfo_sinus_root/.venv/log/ros}
+export MPLCONFIGDIR=${MPLCONFIGDIR:-$nfo_sinus_root/.venv/matplotlib}
 
 . "$nfo_sinus_root/install/setup.bash"
 unset nfo_sinus_root

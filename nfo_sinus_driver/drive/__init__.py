@@ -16,6 +16,7 @@
 
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -29,6 +30,7 @@ __all__ = [
     'Drive',
     'DriveError',
     'DriveSettings',
+    'Identity',
     'InverterStatus',
     'Listener',
     'Severity',

@@ -16,9 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Coroutine
 from concurrent.futures import Future
-import dataclasses
+import logging
+import math
 import time
 from typing import Any
 from typing import TypeVar
@@ -28,12 +30,14 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.drive_timeout import set_drive_timeout
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.mode_scmd import ModeScmd
 from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
@@ -44,27 +48,26 @@ from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
+_log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
 #: How often a drive is looked at while its node is not active, s.
 _IDLE_PERIOD = 0.5
 #: How often the control mode is read; it can only change while the motor stands, s.
 _MODE_PERIOD = 1.0
-#: How often a drive that does not answer is tried again, s.
+#: How often the status is read at least while the motor runs, s.
+_WATCH_PERIOD = 0.2
+#: How often a drive that does not answer is tried again, at first and at last, s.
 _RECONNECT_PERIOD = 1.0
+_SLOWEST_RECONNECT = 4.0
 #: The bus is silent for no more than this share of the drive's own time-out.
 _KEEP_ALIVE_SHARE = 1 / 3
 #: The value that is polled beside frequency and speed, by control mode.
 _ACTUAL_KEYS = {'Torque': 'status.trq_act', 'PI-Reg': 'status.reg_act'}
 
-_SILENCE_ADVICE = (
-    'check in this order: BusType in the drive (MbusRtu; NFO is the factory setting), '
-    'jumper S5 (RS232 or RS485), the address, baud rate and parity'
-)
 _MONITOR = 'control_method is monitor: this driver only reads; set control_method to mode_scmd'
 
 
@@ -99,12 +102,16 @@ class Drive:
         self._active = False
         self._barred = False
         self._misses = 0
+        #: How often in a row nobody answered an attempt to connect.
+        self._silences = 0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint = ''
+        self._told_timeout = ''
+        self._told_fault = 0
         self._poll_task: Task | None = None
         self._telemetry_task: Task | None = None
-        self._snapshot = self._take_snapshot(None)
+        self._snapshot = take_picture(self._inverter, self._setpoint, None)
 
     # --- any thread ---------------------------------------------------------------------------
 
@@ -137,9 +144,14 @@ class Drive:
         """A stop was asked for that the drive has not confirmed yet."""
         return self._motion is not None and self._motion.stopping
 
-    def connect(self) -> Future[str]:
-        """Identify the drive, make sure that nothing runs unasked, and watch it from then on."""
-        return self._run(self._connect_first())
+    def connect(self, *, patient: bool = True) -> Future[str]:
+        """
+        Identify the drive, make sure that nothing runs unasked, and watch it from then on.
+
+        :param patient: repeat the first request when nobody answers; who tries again anyway saves
+            the other drives on the line that time.
+        """
+        return self._run(lambda: self._connect_first(patient))
 
     def disconnect(self, timeout: float) -> Future[str]:
         """
@@ -147,7 +159,7 @@ class Drive:
 
         :param timeout: how long the motor may take to stand before it is left to its ramp, s.
         """
-        return self._run(self._disconnect(timeout))
+        return self._run(lambda: self._disconnect(timeout))
 
     def activate(self) -> None:
         """Poll at full rate and measure."""
@@ -155,32 +167,36 @@ class Drive:
 
     def deactivate(self) -> Future[str]:
         """Stop the motor and only keep watch; it cannot be enabled until it is active again."""
-        return self._run(self._deactivate())
+        return self._run(lambda: self._deactivate())
 
-    def stop_for_good(self) -> Future[str]:
-        """Stop the motor; it can never be enabled again."""
+    def stop_for_good(self, patience: float) -> Future[str]:
+        """
+        Stop the motor; it can never be enabled again.
+
+        :param patience: how long the drive may take to confirm it, s.
+        """
         self._barred = True
-        return self._run(self._deactivate())
+        return self._run(lambda: self._deactivate(patience))
 
     def enable(self) -> Future[str]:
         """Take control and run at set-point 0, then follow set-points that come in."""
-        return self._run(self._enable())
+        return self._run(lambda: self._enable())
 
     def stop(self) -> Future[str]:
         """Stop as the drive's StMode says; control is kept."""
-        return self._run(self._command(lambda motion: motion.stop()))
+        return self._run(lambda: self._command(lambda motion: motion.stop()))
 
     def quick_stop(self) -> Future[str]:
         """Release the motor at once: it coasts."""
-        return self._run(self._command(lambda motion: motion.quick_stop()))
+        return self._run(lambda: self._command(lambda motion: motion.quick_stop()))
 
     def acknowledge(self) -> Future[str]:
         """Acknowledge a fault."""
-        return self._run(self._command(lambda motion: motion.acknowledge(), connected=True))
+        return self._run(lambda: self._command(lambda motion: motion.acknowledge(), connected=True))
 
     def set_drive_timeout(self, seconds: float) -> Future[str]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return self._run(self._set_drive_timeout(seconds))
+        return self._run(lambda: self._set_drive_timeout(seconds))
 
     def set_setpoint(self, value: float) -> None:
         """
@@ -192,34 +208,25 @@ class Drive:
 
     # --- on the bus ---------------------------------------------------------------------------
 
-    def _run(self, coroutine: Coroutine[Any, Any, str]) -> Future[str]:
-        return self._bus.run(self._explained(coroutine))
+    def _run(self, command: Callable[[], Coroutine[Any, Any, str]]) -> Future[str]:
+        return self._bus.run(self._explained(command))
 
-    async def _explained(self, coroutine: Coroutine[Any, Any, str]) -> str:
+    async def _explained(self, command: Callable[[], Coroutine[Any, Any, str]]) -> str:
         try:
-            return await coroutine
+            return await command()
         except LinkError as error:
             raise DriveError(self._explain(error)) from error
         except Cancelled:
             raise DriveError('the driver is ending') from None
 
     def _explain(self, error: LinkError) -> str:
-        if isinstance(error, (PortError, Refused)):
-            return str(error)
-        if isinstance(error, NoAnswer) and self._inverter.identity is None:
-            return f'nobody answers at address {self._unit}: {_SILENCE_ADVICE}'
-        if self._inverter.identity is None:
-            return (
-                f'what comes from address {self._unit} is no answer ({error}): check baud rate '
-                'and parity, that no other master is on the line, and the wiring'
-            )
-        return f'{error}: check the cable and that the drive has power'
+        return explain(error, self._unit, known=self._inverter.identity is not None)
 
     async def _command(self, command: Any, *, connected: bool = False) -> str:
         if self._motion is None:
             raise DriveError(_MONITOR)
         if connected and not self._inverter.connected:
-            raise DriveError(f'the drive at address {self._unit} does not answer')
+            raise DriveError(f'the drive at address {self._unit} is not connected')
         answer: str = await command(self._motion)
         return answer
 
@@ -227,37 +234,51 @@ class Drive:
         # looked at on the bus, where a deactivation cannot come between
         if self._barred or not self._active:
             raise DriveError('the drive is not active')
-        return await self._command(lambda motion: motion.enable(), connected=True)
+        answer = await self._command(lambda motion: motion.enable(), connected=True)
+        if self._poll_task is not None:
+            self._bus.wake(self._poll_task)
+        return answer
 
-    async def _connect_first(self) -> str:
+    async def _connect_first(self, patient: bool) -> str:
         if self._poll_task is None:
-            await self._connect()
+            await self._connect(patient)
             self._poll_task = self._bus.spawn(self._poll_for_ever())
         return str(self._inverter.identity)
 
-    async def _connect(self) -> None:
+    async def _connect(self, patient: bool) -> None:
         inverter = self._inverter
-        identity = await inverter.identify()
+        if not patient:
+            # a silent drive costs its neighbours one time-out
+            await inverter.look(Priority.POLL, once=True)
+        await inverter.identify()
         await inverter.read_control_mode()
-        inverter.sio_tot = await inverter.read_number('serial.sio_tot')
+        await inverter.read_timeout()
         await inverter.look(Priority.SERVICE)
         if self._motion is not None:
             await self._motion.connected()
             if inverter.settings.drive_timeout:
                 await self._set_drive_timeout(inverter.settings.drive_timeout)
-        self._misses = 0
+        identity = await inverter.introduce()
+        self._misses = self._silences = 0
         self._complaint = ''
         inverter.connected = inverter.answering = True
-        inverter.tell(Severity.INFO, f'connected: {inverter.model.name}, {identity}')
+        name = '' if identity.model else f'{inverter.model.name}, '
+        inverter.tell(Severity.INFO, f'connected: {name}{identity}')
         self._warn_of_missing_timeout()
 
     def _warn_of_missing_timeout(self) -> None:
-        if self._motion is not None and not self._inverter.sio_tot:
-            self._inverter.tell(
-                Severity.WARNING,
-                'the drive has no time-out of its own (SioTot is 0): if this driver is killed or '
-                'the cable is cut, the motor runs on; set drive_timeout',
-            )
+        inverter = self._inverter
+        if self._motion is None or (inverter.sio_tot and inverter.auto_stop):
+            return
+        why = 'AutoStop is OFF' if inverter.sio_tot else 'SioTot is 0'
+        if why == self._told_timeout:
+            return
+        self._told_timeout = why
+        inverter.tell(
+            Severity.WARNING,
+            f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
+            'is cut, the motor runs on; set drive_timeout',
+        )
 
     async def _disconnect(self, timeout: float) -> str:
         try:
@@ -273,19 +294,20 @@ class Drive:
             self._bus.forget_cycle(self._unit)
             self._publish(None)
 
-    async def _deactivate(self) -> str:
+    async def _deactivate(self, patience: float | None = None) -> str:
         self._set_active(False)
-        if self._motion is None:
-            return 'only watched'
-        if not self._motion.concerned:
-            return 'the bus has no control of this drive'
-        return await self._motion.stop()
+        if self._motion is None or not self._motion.concerned:
+            return ''
+        return await self._motion.stop(patience)
 
     async def _set_drive_timeout(self, seconds: float) -> str:
         if self._motion is None:
             raise DriveError(_MONITOR)
         answer = await set_drive_timeout(self._registers, seconds)
-        self._inverter.sio_tot = seconds or self._inverter.sio_tot
+        await self._inverter.read_timeout()
+        if self._poll_task is not None:
+            # the drive may have to be kept alive more often from now on
+            self._bus.wake(self._poll_task)
         if answer:
             self._inverter.tell(Severity.INFO, answer)
         return answer
@@ -303,56 +325,86 @@ class Drive:
                 self._bus.wake(self._poll_task)
 
     async def _poll_for_ever(self) -> None:
+        polled_at = -math.inf
         while True:
             started = time.monotonic()
+            due = started >= polled_at + self._period
             try:
-                if self._inverter.connected:
+                if not self._inverter.connected:
+                    await self._connect(patient=False)
+                elif due:
                     await self._poll()
-                    self._misses = 0
                 else:
-                    await self._connect()
+                    await self._look()
+                self._misses = 0
             except (LinkError, DriveError) as error:
                 self._miss(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
                 self._miss(DriveError(f'error in the driver: {error!r}'))
-            took = time.monotonic() - started
-            if self._inverter.connected and self._active:
-                self._bus.note_cycle(self._unit, took)
-            await self._bus.sleep(self._period - took)
+            if due:
+                if self._inverter.connected and self._active and polled_at > 0:
+                    self._bus.note_cycle(self._unit, started - polled_at)
+                polled_at = started
+            await self._bus.sleep(self._pause(polled_at))
+
+    def _pause(self, polled_at: float) -> float:
+        """Return how long to wait until the drive is asked again, s."""
+        inverter = self._inverter
+        if not inverter.connected:
+            # a drive that stays silent costs its neighbours less and less
+            return min(_RECONNECT_PERIOD * max(1, self._silences), _SLOWEST_RECONNECT)
+        pause = polled_at + self._period - time.monotonic()
+        # however seldom somebody wants to read the status, a motor that runs is watched
+        return min(pause, _WATCH_PERIOD) if self.armed else pause
 
     @property
     def _period(self) -> float:
         """The time from one poll to the next, s."""
-        inverter = self._inverter
-        if not inverter.connected:
-            return _RECONNECT_PERIOD
         if not self._active:
             period = _IDLE_PERIOD
         else:
-            rate = inverter.settings.poll_rate
+            rate = self._inverter.settings.poll_rate
             period = 1 / rate if rate else 0.0
-        if inverter.sio_tot:
-            period = min(period, inverter.sio_tot * _KEEP_ALIVE_SHARE)
+        if self._inverter.sio_tot:
+            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
         return period
+
+    async def _look(self) -> InverterStatus:
+        """Read the status and judge it."""
+        # a request that fails is not repeated at once, so that a silent drive costs its
+        # neighbours no more than one time-out in each of their cycles
+        seen = await self._inverter.look(Priority.POLL, once=True)
+        self._inverter.answering = True
+        self._tell_fault(seen)
+        if self._motion is not None:
+            self._motion.watch(seen)
+        return seen
 
     async def _poll(self) -> None:
         inverter = self._inverter
-        # a request that fails is not repeated at once, so that a silent drive costs its
-        # neighbours no more than one time-out in each of their cycles
-        seen = await inverter.look(Priority.POLL, once=True)
-        inverter.answering = True
+        seen = await self._look()
         if time.monotonic() - self._mode_read_at > _MODE_PERIOD:
             self._mode_read_at = time.monotonic()
             await inverter.read_control_mode(Priority.POLL)
-        if self._motion is not None:
-            self._motion.watch(seen)
-        frequency = await self._measure('status.frq_act')
-        speed = await self._measure('status.spd_act')
+        inverter.frequency = frequency = await self._measure('status.frq_act')
+        inverter.speed = speed = await self._measure('status.spd_act')
         actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
         if inverter.control_mode in _ACTUAL_KEYS:
             actual = await self._measure(_ACTUAL_KEYS[inverter.control_mode])
         self._publish(seen, frequency=frequency, speed=speed, actual=actual)
+
+    def _tell_fault(self, seen: InverterStatus) -> None:
+        """Say on change that a fault stands; one that ends a ride is told by who ends it."""
+        code = seen.code if seen.faulted else 0
+        if code and code != self._told_fault and not self.armed:
+            fault = self._inverter.model.inv_st(code)
+            self._inverter.tell(
+                Severity.ERROR,
+                f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}; '
+                'then call ~/fault_ack',
+            )
+        self._told_fault = code
 
     async def _measure(self, key: str) -> float:
         """Read a measured value; NaN if the drive refuses it, for it answers all the same."""
@@ -371,14 +423,19 @@ class Drive:
         ):
             inverter.connected = False
             explained = self._explain(error) if isinstance(error, LinkError) else str(error)
-            inverter.tell(Severity.ERROR, f'lost: {explained}; trying again for ever')
             self._bus.forget_cycle(self._unit)
             if self._motion is not None:
                 self._motion.lost()
-        elif not inverter.connected and isinstance(error, DriveError):
-            self._complain(str(error))
-        if not inverter.connected:
-            self._publish(None)
+            inverter.tell(Severity.ERROR, f'lost: {explained}; trying again for ever')
+            try:
+                self._publish(None)
+            except Exception:
+                # a mistake of who listens must not end the watch
+                _log.exception('the loss of the drive could not be told')
+        elif not inverter.connected:
+            self._silences += 1
+            if isinstance(error, DriveError):
+                self._complain(str(error))
 
     def _complain(self, text: str) -> None:
         """Say what keeps the drive from being used, once."""
@@ -387,41 +444,5 @@ class Drive:
             self._inverter.tell(Severity.ERROR, text)
 
     def _publish(self, seen: InverterStatus | None, **values: float) -> None:
-        self._snapshot = self._take_snapshot(seen, **values)
+        self._snapshot = take_picture(self._inverter, self._setpoint, seen, **values)
         self._listener.on_snapshot(self._snapshot)
-
-    def _take_snapshot(
-        self,
-        seen: InverterStatus | None,
-        frequency: float = NAN,
-        speed: float = NAN,
-        actual: float = NAN,
-    ) -> Snapshot:
-        inverter = self._inverter
-        snapshot = Snapshot(
-            at=time.monotonic(),
-            connected=inverter.connected,
-            enabled=self.armed,
-            control_method=inverter.settings.control_method,
-        )
-        if seen is None:
-            return snapshot
-        code = inverter.model.inv_st(seen.code)
-        return dataclasses.replace(
-            snapshot,
-            at=seen.at,
-            status=seen,
-            control_mode=inverter.control_mode,
-            unit=inverter.unit,
-            setpoint=self._setpoint.commanded,
-            setpoint_age=self._setpoint.age,
-            setpoint_clamped=self._setpoint.clamped,
-            text=inverter.text,
-            description=code.description,
-            remedy=code.remedy,
-            kind=inverter.kind,
-            requires_ack=code.requires_ack,
-            frequency=frequency,
-            speed=speed,
-            actual=actual,
-        )

@@ -39,7 +39,7 @@ async def set_drive_timeout(registers: Registers, seconds: float) -> str:
     changed = {
         key: value
         for key, value in wanted.items()
-        if registers.words(key, value) != registers.words(key, before[key])
+        if before[key] != registers.number(key, registers.words(key, value))
     }
     written: list[str] = []
     try:
@@ -47,7 +47,7 @@ async def set_drive_timeout(registers: Registers, seconds: float) -> str:
             written.append(key)
             await registers.write(key, value, Priority.SERVICE)
             kept = await registers.read(key, Priority.SERVICE)
-            if registers.words(key, kept) != registers.words(key, value):
+            if kept != registers.number(key, registers.words(key, value)):
                 raise DriveError(f'the drive keeps {key} = {kept} where {value} was written')
     except (DriveError, LinkError):
         for key in written:

@@ -16,18 +16,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from fractions import Fraction
+import logging
 import math
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
+
+_log = logging.getLogger(__name__)
 
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
@@ -35,17 +40,30 @@ _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 @dataclass(frozen=True)
 class Identity:
     """
-    Who answers.
+    Who answers; ``''`` is what it does not tell.
 
     :ivar firmware: SWVer, such as 4.38 [M0 §8.1].
     :ivar motor_firmware: NFOVer, such as 4018.
+    :ivar vendor: who made it.
+    :ivar model: its product name and size, such as ``NFO Sinus 1.50/400`` [M0 §6.2.4].
+    :ivar serial: its serial number.
     """
 
     firmware: float
     motor_firmware: int
+    vendor: str = ''
+    model: str = ''
+    serial: str = ''
+
+    @property
+    def versions(self) -> str:
+        """Both firmwares, such as ``4.38 / 4018``."""
+        return f'{self.firmware:.2f} / {self.motor_firmware}'
 
     def __str__(self) -> str:
-        return f'firmware {self.firmware:.2f} / {self.motor_firmware}'
+        serial = (f'serial {self.serial}',) if self.serial else ()
+        model = (self.model,) if self.model else ()
+        return ', '.join((*model, f'firmware {self.versions}', *serial))
 
 
 class Inverter:
@@ -63,10 +81,15 @@ class Inverter:
         self.answering = False
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
+        #: Hz and rpm, as last polled.
+        self.frequency = math.nan
+        self.speed = math.nan
         self.control_mode = ''
         self.unit = ''
-        #: The drive's own time-out, s; 0 if it has none.
+        #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
+        #: AutoStop: without it the motor runs on when SioTot has passed [C91].
+        self.auto_stop = False
 
     async def look(self, priority: Priority, *, once: bool = False) -> InverterStatus:
         """
@@ -79,21 +102,49 @@ class Inverter:
         code = await self._registers.read_number('fieldbus.inv_st', priority, once=once)
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
+        kind = self.model.inv_st(int(code)).kind
+        if kind is Kind.FAULT and not word & Status.FAULTED:
+            # either the fault came between the two, or the drive treats it as an alarm [C95]
+            word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
+            assert isinstance(word, int)
         seen = InverterStatus(at, word & 0xFFFF, int(code))
         # a look of low priority may be overtaken by one that began later
         if self.seen is None or seen.at >= self.seen.at:
             self.seen = seen
         return seen
 
+    async def read_timeout(self) -> None:
+        """Read whether the drive has a time-out of its own."""
+        self.sio_tot = await self._registers.read_number('serial.sio_tot', Priority.SERVICE)
+        self.auto_stop = bool(await self._registers.read('serial.auto_stop', Priority.SERVICE))
+
     async def identify(self) -> Identity:
         """
-        Find out who answers.
+        Find out whether somebody answers, and with which firmware.
 
         :raises LinkError: nobody does.
         """
         firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
         motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
         self.identity = Identity(firmware, int(motor))
+        return self.identity
+
+    async def introduce(self) -> Identity:
+        """
+        Ask the drive who it is, beyond what :meth:`identify` has found.
+
+        Nothing depends on it: many drives do not tell [C57].
+
+        :raises PortError: the port is not open.
+        """
+        assert self.identity is not None
+        told = await self._registers.identify(Priority.SERVICE)
+        self.identity = dataclasses.replace(
+            self.identity,
+            vendor=told.vendor,
+            model=f'{told.product} {told.model}'.strip(),
+            serial=told.serial,
+        )
         return self.identity
 
     async def read_control_mode(self, priority: Priority = Priority.SERVICE) -> str:
@@ -144,5 +195,8 @@ class Inverter:
         return since is None or firmware > float(since) - 0.001
 
     def tell(self, severity: Severity, text: str) -> None:
-        """Say something to a person."""
-        self._listener.on_event(severity, text)
+        """Say something to a person; what cannot be told keeps nothing from being done."""
+        try:
+            self._listener.on_event(severity, text)
+        except Exception:
+            _log.exception('this could not be told: %s', text)

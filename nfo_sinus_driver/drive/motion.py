@@ -39,6 +39,7 @@ from nfo_sinus_driver.drive.mode_scmd import ModeScmd
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -52,6 +53,8 @@ _RETRY_PERIOD = 0.2
 _LOST_RETRY_PERIOD = 1.0
 #: How often it is said that a stop is not confirmed, s.
 _COMPLAINT_PERIOD = 5.0
+#: Each time it is said after a longer while, up to this, s.
+_LONGEST_COMPLAINT_PERIOD = 60.0
 
 _NO_RUN = (
     'the drive stays in standby: its RUN input is not active '
@@ -114,21 +117,22 @@ class Motion:
             self._arming = None
         return 'enabled; it follows set-points that arrive from now on'
 
-    async def stop(self) -> str:
+    async def stop(self, patience: float | None = None) -> str:
         """
         Stop as the drive's StMode says; control is kept.
 
+        :param patience: how long the drive may take to confirm it, s.
         :returns: whether it ramps or coasts [C97].
         :raises DriveError: the drive does not confirm the stop; it is tried on and on.
         """
         self.disarm()
-        await self._finish_withdrawal(self._withdraw())
+        await self._finish_withdrawal(self._withdraw(), patience or _PATIENCE)
         seen = self._inverter.seen
         text = self._inverter.describe()
         if self._held_by_fault:
             return f'stopped by fault {text}; the drive takes no command until it is acknowledged'
         if seen is None or not seen.from_bus:
-            return self._no_control()
+            return self._no_control(seen)
         if not seen.driven:
             return f'stopped ({text})'
         coasts = await self._inverter.read_label('control.st_mode', Priority.STOP) == 'Release'
@@ -144,7 +148,7 @@ class Motion:
         self.disarm()
         try:
             if not ours and not await self._method.in_control(Priority.STOP):
-                return self._no_control()
+                return self._no_control(await self._inverter.look(Priority.STOP))
             await self._method.quick_stop(self._inverter.control_mode)
             await self._await_status(lambda seen: not seen.driven, Priority.STOP, _PATIENCE)
         except (DriveError, LinkError) as error:
@@ -193,9 +197,12 @@ class Motion:
 
         :raises DriveError: the drive does not confirm that it stops.
         """
+        # a run command may be on its way, whoever has control at this moment
+        ours = self.armed or self.stopping or self._arming is not None
+        stopped = await self.stop() if ours else ''
         if not await self._method.in_control(Priority.SERVICE):
-            return 'control is not ours'
-        stopped = await self.stop()
+            return stopped or 'control is not ours'
+        stopped = stopped or await self.stop()
         if self._held_by_fault:
             raise DriveError(
                 f'fault {self._inverter.describe()} stands and the drive takes no command: '
@@ -222,6 +229,13 @@ class Motion:
     async def connected(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
         if await self._method.in_control(Priority.SERVICE):
+            seen = self._inverter.seen
+            if seen is not None and seen.runs_by_bus and not self.stopping:
+                self._tell(
+                    Severity.WARNING,
+                    f'the motor runs under bus control from before '
+                    f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
+                )
             self._withdraw()
 
     def lost(self) -> None:
@@ -234,6 +248,8 @@ class Motion:
     def watch(self, seen: InverterStatus) -> None:
         """Judge what the drive says about itself."""
         self._setpoint.answered()
+        if self._withdrawal is not None and self._held_by_fault and not seen.faulted:
+            self._bus.wake(self._withdrawal)
         if seen.at < self._changed_at:
             return
         if self.armed:
@@ -247,7 +263,12 @@ class Motion:
         """Disarm and stop for a reason that a person should know."""
         self.disarm()
         self._withdraw()
-        self._tell(Severity.WARNING, f'stopped: {reason}; call ~/enable to go on')
+        seen = self._inverter.seen
+        if seen is not None and seen.faulted:
+            remedy = 'call ~/fault_ack, then ~/enable to go on'
+            self._tell(Severity.ERROR, f'stopped: {reason}; {remedy}')
+        else:
+            self._tell(Severity.WARNING, f'stopped: {reason}; call ~/enable to go on')
 
     def disarm(self) -> None:
         """Follow set-points no more; end an enable that is on its way."""
@@ -274,7 +295,7 @@ class Motion:
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
         if self._withdrawal is not None:
-            await self._finish_withdrawal(self._withdrawal)
+            await self._finish_withdrawal(self._withdrawal, _PATIENCE)
         await self._method.take_control()
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, _PATIENCE)
         await self._method.zero_setpoint(control_mode, Priority.SERVICE)
@@ -315,9 +336,9 @@ class Motion:
             self._bus.wake(self._withdrawal)
         return self._withdrawal
 
-    async def _finish_withdrawal(self, withdrawal: Task) -> None:
+    async def _finish_withdrawal(self, withdrawal: Task, patience: float) -> None:
         """Wait until the drive has confirmed that it stops, or stands because of a fault."""
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + patience
         while not await self._bus.join(withdrawal, _LOOK_PERIOD):
             if self._held_by_fault:
                 return
@@ -328,11 +349,15 @@ class Motion:
 
     async def _keep_withdrawing(self) -> None:
         complain_at = time.monotonic() + _PATIENCE
+        pause = 0.0
         while not await self._tried_withdrawing():
             if self._held_by_fault:
                 complain_at = time.monotonic() + _PATIENCE
-            elif time.monotonic() >= complain_at:
-                complain_at = time.monotonic() + _COMPLAINT_PERIOD
+                await self._fault_gone()
+                continue
+            if time.monotonic() >= complain_at:
+                pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
+                complain_at = time.monotonic() + pause
                 self._tell(
                     Severity.ERROR,
                     f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
@@ -344,12 +369,23 @@ class Motion:
         self._withdrawal = None
         self._held_by_fault = False
         self._changed_at = time.monotonic()
+        if pause:
+            self._tell(Severity.INFO, f'the stop is confirmed now: {self._inverter.describe()}')
+
+    async def _fault_gone(self) -> None:
+        """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
+        while not self._again and self._inverter.connected:
+            await self._bus.sleep(_RETRY_PERIOD)
+            seen = self._inverter.seen
+            if seen is not None and not seen.faulted:
+                return
 
     async def _tried_withdrawing(self) -> bool:
         try:
             return await self._withdrawn()
         except Exception as error:
             # even a mistake of ours must not end the trying
+            self._held_by_fault = False
             self._unconfirmed = str(error) or repr(error)
             return False
 
@@ -359,7 +395,8 @@ class Motion:
         refusal = ''
         try:
             await self._method.stop(self._inverter.control_mode)
-        except Refused as error:
+        except (Refused, DamagedAnswer) as error:
+            # among late answers a refusal is not believed, until an answer to something else came
             refusal = str(error)
         seen = await self._inverter.look(Priority.STOP, once=True)
         # a drive with a fault may refuse everything; it stands, but would go on afterwards
@@ -390,9 +427,11 @@ class Motion:
             return f'the drive stopped by itself, RUN input lost? ({self._inverter.describe()})'
         return ''
 
-    def _no_control(self) -> str:
-        text = self._inverter.describe()
-        return f'the bus has no control of this drive, so there was nothing to stop ({text})'
+    def _no_control(self, seen: InverterStatus | None) -> str:
+        text = f'the bus has no control of this drive ({self._inverter.describe()})'
+        if seen is not None and seen.driven:
+            raise DriveError(f'{text}: stop it where it is controlled, by keypad or RUN input')
+        return f'{text}, and it does not run'
 
     def _tell(self, severity: Severity, text: str) -> None:
         self._inverter.tell(severity, text)

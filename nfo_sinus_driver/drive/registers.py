@@ -24,6 +24,7 @@ from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
@@ -96,6 +97,14 @@ class Registers:
         value = await self.read(key, priority, once=once)
         assert not isinstance(value, str), key
         return float(value)
+
+    async def identify(self, priority: Priority) -> Identification:
+        """
+        Ask the drive who it is; what it does not tell stays empty.
+
+        :raises PortError: the port is not open.
+        """
+        return await self._bus.identify(self._unit, priority)
 
     async def acknowledge(self, key: str, priority: Priority) -> None:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""

@@ -69,6 +69,7 @@ class Setpoint:
         self._written_at = 0.0
         self._watch: Task | None = None
         self._expired = False
+        self._warned = False
         self._waits_for_answer = False
         self._clamp_told = False
         #: What the drive was last given, in the unit of the control mode.
@@ -107,6 +108,7 @@ class Setpoint:
         self.commanded = 0.0
         self.clamped = False
         self._expired = False
+        self._warned = False
         self._waits_for_answer = False
         self._watch = self._bus.spawn(self._watch_age())
 
@@ -125,6 +127,11 @@ class Setpoint:
             self._waits_for_answer = False
             self._bus.request(self._slot)
 
+    def _is_old(self, at: float) -> bool:
+        """Tell whether a request waited so long for the line that it has expired meanwhile."""
+        timeout = self._inverter.settings.setpoint_timeout
+        return bool(timeout) and time.monotonic() - at > timeout
+
     def _limited(self, value: float) -> float:
         parameter = self._registers.model[SETPOINT_KEYS[self.control_mode]]
         assert parameter.maximum is not None, parameter.key
@@ -135,7 +142,7 @@ class Setpoint:
 
     def _make(self) -> Transfer | None:
         value, at = self._request
-        if at <= self._armed_at:
+        if at <= self._armed_at or self._is_old(at):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
@@ -143,10 +150,15 @@ class Setpoint:
         limited = self._limited(value)
         self.clamped = limited != value
         if self.clamped and not self._clamp_told:
-            self._tell(Severity.WARNING, f'set-point {value:g} is limited to {limited:g}')
+            self._tell(
+                Severity.WARNING,
+                f'set-point {value:g} is limited to {limited:g} '
+                '(setpoint_max, or the limit of the drive)',
+            )
         self._clamp_told = self.clamped
-        if self._expired:
-            self._expired = False
+        self._expired = False
+        if self._warned:
+            self._warned = False
             self._tell(Severity.INFO, 'set-points arrive again')
         key = SETPOINT_KEYS[self.control_mode]
         words = self._registers.nearest_words(key, limited)
@@ -196,11 +208,13 @@ class Setpoint:
 
     async def _expire(self, timeout: float) -> None:
         if any(self._written) or not self._written:
-            self._tell(
-                Severity.WARNING,
-                f'no set-point for {timeout:g} s: the motor ramps to a stop '
-                'until the next one arrives',
-            )
+            if not self._warned:
+                self._warned = True
+                self._tell(
+                    Severity.WARNING,
+                    f'no set-point for {timeout:g} s: the motor ramps to a stop '
+                    'until the next one arrives',
+                )
             key = SETPOINT_KEYS[self.control_mode]
             before = self._request
             try:

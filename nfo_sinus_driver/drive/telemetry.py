@@ -36,8 +36,6 @@ FAST = (
     'status.p_out',
     'status.pf',
     'status.dc_link',
-    'status.frq_act',
-    'status.spd_act',
     'status.trq_act',
 )
 #: Read one after the other, one each time, for they change slowly.
@@ -83,7 +81,9 @@ async def watch_telemetry(
                     await measure(key)
                 due.rotate(-1)
                 first = False
-                listener.on_telemetry(Telemetry(time.monotonic(), dict(values)))
+                # these two are polled anyway
+                polled = {'status.frq_act': inverter.frequency, 'status.spd_act': inverter.speed}
+                listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost
                 inverter.answering = False

@@ -21,6 +21,8 @@ from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import Inquiry
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
@@ -30,6 +32,8 @@ from nfo_sinus_driver.link.settings import LineSettings
 __all__ = [
     'Address',
     'DamagedAnswer',
+    'Identification',
+    'Inquiry',
     'LineSettings',
     'Link',
     'LinkError',

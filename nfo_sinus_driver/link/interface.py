@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 from typing import Protocol
 
@@ -48,6 +49,48 @@ class Reply(NamedTuple):
     arrived: float
 
 
+@dataclass(frozen=True)
+class Identification:
+    """
+    Who a unit says it is; ``''`` where it does not tell.
+
+    :ivar revision: its firmware, such as ``4.30 / 4018``.
+    :ivar model: its size, such as ``1.50/400``.
+    :ivar application: what a user named it.
+    :ivar serial: its serial number.
+    """
+
+    vendor: str = ''
+    product_code: str = ''
+    revision: str = ''
+    url: str = ''
+    product: str = ''
+    model: str = ''
+    application: str = ''
+    serial: str = ''
+
+
+class Inquiry(Protocol):
+    """Questions to a unit about itself, asked one by one, so that others may talk between."""
+
+    @property
+    def done(self) -> bool:
+        """There is nothing left to ask."""
+
+    @property
+    def found(self) -> Identification:
+        """What it has told so far."""
+
+    def ask(self) -> Reply:
+        """
+        Ask the next question: one transaction.
+
+        A question that failed is not asked again; only after :class:`NotReady` it still is to be.
+
+        :raises LinkError: as its subclasses say.
+        """
+
+
 class Link(Protocol):
     """One line to several units, used by one thread."""
 
@@ -74,6 +117,18 @@ class Link(Protocol):
 
         :raises LinkError: as its subclasses say.
         """
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        """
+        Write one parameter and read another, in one transaction.
+
+        :raises LinkError: as its subclasses say.
+        """
+
+    def identify(self, unit: int) -> Inquiry:
+        """Return the questions by which a unit tells who it is; nothing is sent yet."""
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """

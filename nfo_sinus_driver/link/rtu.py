@@ -23,6 +23,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import struct
+from typing import Generic
+from typing import Protocol
+from typing import TypeVar
 
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Words
@@ -30,10 +33,44 @@ from nfo_sinus_driver.link.interface import Words
 READ_HOLDING_REGISTERS = 3
 WRITE_SINGLE_REGISTER = 6
 WRITE_MULTIPLE_REGISTERS = 16
+WRITE_AND_READ_REGISTERS = 23
 
 _EXCEPTION = 0x80
 #: unit, function, code, CRC
 _EXCEPTION_LENGTH = 5
+
+T = TypeVar('T')
+_Answer = TypeVar('_Answer', covariant=True)
+
+
+class Request(Protocol[_Answer]):
+    """What a request knows of itself and of its answer."""
+
+    @property
+    def unit(self) -> int:
+        """Who is asked."""
+
+    @property
+    def function(self) -> int:
+        """The function code."""
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit, function and CRC."""
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand: unit, function and what follows them."""
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer, CRC included; the most there can be."""
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of an answer that begins like this, CRC included; the least there can be."""
+
+    def decode(self, frame: bytes) -> _Answer | None:
+        """Return what a whole frame says; ``None`` if it is no answer after all."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +97,14 @@ class Read:
     def answer_length(self) -> int:
         """Bytes of the answer, CRC included."""
         return 5 + 2 * self.count
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, frame: bytes) -> Words:
+        """Return the words read."""
+        return struct.unpack(f'>{self.count}H', frame[3:-2])
 
 
 @dataclass(frozen=True)
@@ -94,8 +139,56 @@ class Write:
         """Bytes of the answer, CRC included."""
         return 8
 
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
 
-Request = Read | Write
+    def decode(self, frame: bytes) -> Words:
+        """Return no words: the answer only says that it was done."""
+        return ()
+
+
+@dataclass(frozen=True)
+class WriteAndRead:
+    """
+    Write ``words`` from ``register`` on, then read ``count`` registers from ``source`` on.
+
+    One transaction (function 23) [M0 §6.2.3]; only the G2 has it [C57]. The answer is that of a
+    read: it names no register.
+    """
+
+    unit: int
+    register: int
+    words: Words
+    source: int
+    count: int
+
+    function = WRITE_AND_READ_REGISTERS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit, function and CRC."""
+        size = len(self.words)
+        where = (self.source, self.count, self.register, size)
+        return struct.pack(f'>4HB{size}H', *where, 2 * size, *self.words)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function, 2 * self.count))
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer, CRC included."""
+        return 5 + 2 * self.count
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, frame: bytes) -> Words:
+        """Return the words read."""
+        return struct.unpack(f'>{self.count}H', frame[3:-2])
 
 
 def crc(data: bytes | bytearray) -> bytes:
@@ -106,13 +199,13 @@ def crc(data: bytes | bytearray) -> bytes:
     return value.to_bytes(2, 'little')
 
 
-def encode(request: Request) -> bytes:
+def encode(request: Request[object]) -> bytes:
     """Return the frame of a request."""
     frame = bytes((request.unit, request.function)) + request.body
     return frame + crc(frame)
 
 
-class AnswerReader:
+class AnswerReader(Generic[T]):
     """
     Finds the answer to one request in the bytes that come in.
 
@@ -122,11 +215,11 @@ class AnswerReader:
     no answer to an earlier request of the same shape can still come.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: Request[T]) -> None:
+        self._request = request
         self._length = request.answer_length
         self._head = request.answer_head
         self._exception_head = bytes((request.unit, request.function | _EXCEPTION))
-        self._is_read = isinstance(request, Read)
         self._buffer = bytearray()
 
     @property
@@ -134,22 +227,30 @@ class AnswerReader:
         """How many bytes have come that are not part of a frame found."""
         return len(self._buffer)
 
-    def feed(self, data: bytes) -> Words | None:
+    @property
+    def missing(self) -> int:
+        """How many bytes have to come yet, at least, as far as those that came tell."""
+        begun = max(0, self._buffer.find(self._head))
+        return max(1, self._request.measure(bytes(self._buffer[begun:])) - len(self._buffer))
+
+    def feed(self, data: bytes) -> T | None:
         """
         Take bytes that came in.
 
-        :returns: the words read, ``()`` for a write done, ``None`` while there is no answer yet.
+        :returns: the words read, ``()`` for a write done, or what else the request's ``decode``
+            makes of its answer; ``None`` while there is no answer yet.
         :raises Refused: the unit answered with an exception; feeding may go on after it.
         """
         buffer = self._buffer
         buffer += data
         for start in range(len(buffer) - _EXCEPTION_LENGTH + 1):
-            if self._frame_at(start, self._head, self._length):
-                frame = bytes(buffer[start : start + self._length])
-                del buffer[: start + self._length]
-                if not self._is_read:
-                    return ()
-                return struct.unpack(f'>{(self._length - 5) // 2}H', frame[3:-2])
+            if buffer.startswith(self._head, start):
+                length = self._request.measure(bytes(buffer[start:]))
+                if length <= self._length and self._frame_at(start, self._head, length):
+                    answer = self._request.decode(bytes(buffer[start : start + length]))
+                    if answer is not None:
+                        del buffer[: start + length]
+                        return answer
             if self._frame_at(start, self._exception_head, _EXCEPTION_LENGTH):
                 code = buffer[start + 2]
                 del buffer[: start + _EXCEPTION_LENGTH]

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import contextlib
-from dataclasses import dataclass
-from dataclasses import field
 import time
+from typing import Any
 from typing import Protocol
+from typing import TypeVar
 
 from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.link.errors import DamagedAnswer
@@ -31,7 +31,10 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
+from nfo_sinus_driver.link.rtu_identify import RtuInquiry
 from nfo_sinus_driver.link.settings import LineSettings
+
+_T = TypeVar('_T')
 
 #: How late an answer may come, in time-outs, before it counts as lost for good.
 LATEST_ANSWER = 4
@@ -51,12 +54,8 @@ class Port(Protocol):
     def read(self, until: float) -> bytes: ...  # noqa: D102
 
 
-@dataclass
-class _Doubt:
-    """Answers of one unit that may still come, and until when."""
-
-    heads: set[bytes] = field(default_factory=set)
-    until: float = 0.0
+#: The heads of answers that may still come, and until when.
+_Doubt = dict[bytes, float]
 
 
 class RtuLink:
@@ -76,7 +75,7 @@ class RtuLink:
         self._settings = settings
         self._probes: dict[int, tuple[Address, ...]] = {}
         self._doubts: dict[int, _Doubt] = {}
-        self._last: rtu.Request | None = None
+        self._last: rtu.Request[Any] | None = None
         #: When the last byte was on the line, as far as we know.
         self._line_end = 0.0
 
@@ -105,7 +104,7 @@ class RtuLink:
 
         :raises LinkError: as its subclasses say.
         """
-        return self._ask(rtu.Read(unit, address.numbers[0], address.words))
+        return Reply(*self._ask(rtu.Read(unit, address.numbers[0], address.words)))
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
         """
@@ -113,37 +112,58 @@ class RtuLink:
 
         :raises LinkError: as its subclasses say.
         """
-        return self._ask(rtu.Write(unit, address.numbers[0], words))
+        return Reply(*self._ask(rtu.Write(unit, address.numbers[0], words)))
 
-    def _ask(self, request: rtu.Request) -> Reply:
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        """
+        Write one parameter and read another, in one transaction (function 23).
+
+        :raises LinkError: as its subclasses say.
+        """
+        register, read_from = address.numbers[0], source.numbers[0]
+        request = rtu.WriteAndRead(unit, register, words, read_from, source.words)
+        return Reply(*self._ask(request))
+
+    def identify(self, unit: int) -> RtuInquiry:
+        """Return the questions by which a unit tells who it is (functions 43/14 and 17)."""
+        return RtuInquiry(unit, self._ask)
+
+    def _ask(self, request: rtu.Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request, and when its last byte came."""
         self._await_silence()
         doubt = self._doubt(request.unit)
         # a write answer names what was written, and nobody believes it without reading back
-        if isinstance(request, rtu.Read) and doubt is not None:
+        if not isinstance(request, rtu.Write) and doubt:
             # a refusal that is believed tells as well as an answer that all is said
             with contextlib.suppress(Refused):
                 self._transact(self._probe(request.unit, doubt))
             self._await_silence()
         return self._transact(request)
 
-    def _doubt(self, unit: int) -> _Doubt | None:
-        doubt = self._doubts.get(unit)
-        if doubt is not None and time.monotonic() >= doubt.until:
-            del self._doubts[unit]
-            return None
+    def _doubt(self, unit: int) -> _Doubt:
+        """Return what may still come, without what is too late by now."""
+        now = time.monotonic()
+        doubt = {head: until for head, until in self._doubts.get(unit, {}).items() if until > now}
+        self._doubts[unit] = doubt
         return doubt
 
     def _probe(self, unit: int, doubt: _Doubt) -> rtu.Read:
-        for address in self._probes.get(unit, ()):
-            probe = rtu.Read(unit, address.numbers[0], address.words)
-            if probe.answer_head not in doubt.heads:
+        probes = [
+            rtu.Read(unit, address.numbers[0], address.words)
+            for address in self._probes.get(unit, ())
+        ]
+        for probe in probes:
+            if probe.answer_head not in doubt:
                 return probe
-        raise NotReady(doubt.until)
+        # not until nothing is in doubt: a write that fails again and again must not keep reads out
+        ends = [doubt[probe.answer_head] for probe in probes] or doubt.values()
+        raise NotReady(max(ends))
 
-    def _distrust(self, request: rtu.Request) -> None:
-        doubt = self._doubts.setdefault(request.unit, _Doubt())
-        doubt.heads.add(request.answer_head)
-        doubt.until = time.monotonic() + (LATEST_ANSWER - 1) * self._settings.response_timeout
+    def _distrust(self, request: rtu.Request[Any]) -> None:
+        until = time.monotonic() + (LATEST_ANSWER - 1) * self._settings.response_timeout
+        self._doubts.setdefault(request.unit, {})[request.answer_head] = until
 
     def _await_silence(self) -> None:
         """Wait for t3.5 of silence; bytes that come meanwhile were not asked for."""
@@ -162,36 +182,37 @@ class RtuLink:
             if now > give_up:
                 raise DamagedAnswer('the line is never silent: noise, or another master on it')
 
-    def _transact(self, request: rtu.Request) -> Reply:
+    def _transact(self, request: rtu.Request[_T]) -> tuple[_T, float]:
         frame = rtu.encode(request)
         self._last = request
         self._port.write(frame)
         self._line_end = time.monotonic() + len(frame) * self._settings.char_time
         answer = rtu.AnswerReader(request)
         try:
-            reply = self._receive(request, answer)
+            reply, arrived = self._receive(request, answer)
         except (NoAnswer, DamagedAnswer):
             self._distrust(request)
             raise
         except Refused:
             self._doubts.pop(request.unit, None)
             raise
-        late = request.answer_head in self._doubts.get(request.unit, _Doubt()).heads
+        late = request.answer_head in self._doubt(request.unit)
         if not late:
             # units answer in order: whatever was still to come has come before this
             self._doubts.pop(request.unit, None)
             # and the request has left, even where the port is faster than its settings say
-            self._line_end = reply.arrived
+            self._line_end = arrived
         if late or answer.received:
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._distrust(request)
-        return reply
+        return reply, arrived
 
-    def _receive(self, request: rtu.Request, answer: rtu.AnswerReader) -> Reply:
+    def _receive(
+        self, request: rtu.Request[_T], answer: rtu.AnswerReader[_T]
+    ) -> tuple[_T, float]:
         char_time = self._settings.char_time
-        doubt = self._doubts.get(request.unit, _Doubt())
         # an exception names neither register nor length: it may belong to the earlier request
-        believe_refusal = all(head[1] != request.function for head in doubt.heads)
+        believe_refusal = all(head[1] != request.function for head in self._doubt(request.unit))
         deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         last_chance = deadline + 2 * request.answer_length * char_time + _LUMP
@@ -206,17 +227,17 @@ class RtuLink:
             came += len(data)
             # what comes while the request still leaves is no answer to it
             self._line_end = max(self._line_end, now)
-            words = self._feed(answer, data, believe_refusal)
-            if words is not None:
-                return Reply(words, now)
-            missing = max(1, request.answer_length - answer.received)
-            deadline = min(max(deadline, now + missing * char_time + _LUMP), last_chance)
+            reply = self._feed(answer, data, believe_refusal)
+            if reply is not None:
+                return reply, now
+            rest = answer.missing * char_time + _LUMP
+            deadline = min(max(deadline, now + rest), last_chance)
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
 
     @staticmethod
-    def _feed(answer: rtu.AnswerReader, data: bytes, believe_refusal: bool) -> Words | None:
+    def _feed(answer: rtu.AnswerReader[_T], data: bytes, believe_refusal: bool) -> _T | None:
         while True:
             try:
                 return answer.feed(data)

@@ -18,10 +18,38 @@ from __future__ import annotations
 
 import re
 
+from rclpy.utilities import remove_ros_args
+
 _ROS_ARGS = '--ros-args'
 _END = '--'
 _REMAP_FLAGS = ('-r', '--remap')
 _NODE = re.compile(r'(?:__node|__name):=(.+)')
+
+
+_HELP = """usage: driver [--ros-args ...]
+
+Drives NFO Sinus inverters on one serial line. For example:
+
+  driver --ros-args -p port:=/dev/ttyUSB0 -p address:=1
+  driver --ros-args --params-file conveyor.yaml
+"""
+
+
+def refuse_other_arguments(arguments: list[str]) -> None:
+    """
+    Look for what is meant for nobody; ``--help`` prints how to call the driver.
+
+    :raises ValueError: an argument outside ``--ros-args``; the message says how to give it.
+    :raises SystemExit: after ``--help``.
+    """
+    others = remove_ros_args(arguments)[1:]
+    if '-h' in others or '--help' in others:
+        print(_HELP)
+        raise SystemExit(0)
+    if others:
+        raise ValueError(
+            f'unknown argument {others[0]}: parameters are given as --ros-args -p name:=value'
+        )
 
 
 def take_out_node_name(arguments: list[str]) -> tuple[list[str], str | None]:

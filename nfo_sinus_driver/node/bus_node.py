@@ -89,7 +89,7 @@ class BusNode(Node):
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.line.bus.port_error
         status = diagnostics.bus_status(
-            self.get_name(), self._port, statistics, error, silent
+            self.get_fully_qualified_name().lstrip('/'), self._port, statistics, error, silent
         )
         self._diagnostics.publish(diagnostics.array(status, stamp))
         self._log_port(None if error is None else str(error))

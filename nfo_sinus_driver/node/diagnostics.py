@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -23,6 +25,7 @@ from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.statistics import Statistics
@@ -45,35 +48,43 @@ def drive_status(
     *,
     lifecycle_state: str,
     address: int,
-    firmware: str,
+    identity: Identity | None,
     stop_unconfirmed: bool,
 ) -> DiagnosticStatus:
     """Return how one drive is doing."""
     if stop_unconfirmed:
-        level, message = DiagnosticStatus.ERROR, 'the stop is NOT confirmed'
+        level = DiagnosticStatus.ERROR
+        message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
     elif not snapshot.connected:
         # a node that nobody configured has nothing to complain about
         waiting = lifecycle_state == 'unconfigured'
         level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
-        message = 'not connected'
+        message = 'not connected: the log of the node says what to check'
     else:
         level = _LEVELS[snapshot.kind]
         message = snapshot.text
         if snapshot.kind is not Kind.STATUS:
             message = f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
     code = '' if snapshot.status is None else str(snapshot.status.code)
+    serial = identity.serial if identity else ''
     values = {
         'lifecycle state': lifecycle_state,
         'address': str(address),
-        'firmware': firmware,
+        'model': identity.model if identity else '',
+        'serial number': serial,
+        'firmware': identity.versions if identity else '',
         'inverter status': f'{code} {snapshot.text}'.strip(),
         'control method': snapshot.control_method,
         'control mode': snapshot.control_mode,
         'enabled': str(snapshot.enabled),
-        'setpoint': f'{snapshot.setpoint:g} {snapshot.unit}'.strip(),
-        'actual': f'{snapshot.actual:g} {snapshot.unit}'.strip(),
+        'setpoint': _quantity(snapshot.setpoint, snapshot.unit),
+        'actual': _quantity(snapshot.actual, snapshot.unit),
     }
-    return _status(level, f'{name}: drive', message, '', values)
+    return _status(level, f'{name}: drive', message, serial, values)
+
+
+def _quantity(value: float, unit: str) -> str:
+    return '' if math.isnan(value) else f'{value:g} {unit}'.strip()
 
 
 def bus_status(

@@ -22,9 +22,11 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
 import math
+import time
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.lifecycle import LifecycleNodeMixin
@@ -46,8 +48,12 @@ from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.settings import integers_to_doubles
 
-#: How often autostart tries, s.
-_AUTOSTART_PERIOD = 1.0
+#: How often autostart looks whether it should try, s.
+_AUTOSTART_PERIOD = 0.25
+#: How long it rests after a try that failed, at first and at last, s: meanwhile a person may have
+#: the lifecycle, and the drives that do answer have the bus.
+_AUTOSTART_REST = 1.0
+_AUTOSTART_LONGEST_REST = 4.0
 #: How long a service waits for the bus before it says that it does not know, s. A start delay of
 #: the drive may last an hour.
 _LONGEST_COMMAND = 3700.0
@@ -103,6 +109,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._autostart_tries = bool(values['autostart'])
         self._autostarting = False
         self._autostart_complaint = ''
+        self._autostart_rest = 0.0
+        self._autostart_at = 0.0
+        self._barred = False
         self._autostart_timer = self.create_timer(
             _AUTOSTART_PERIOD,
             self._autostart,
@@ -116,6 +125,17 @@ class DriveNode(LifecycleNodeMixin, Node):
         label: str = self._state_machine.current_state[1]
         return label
 
+    def stop_for_good(self, patience: float) -> Future[str]:
+        """
+        Stop the motor, and see to it that nobody can start it again.
+
+        :param patience: how long the drive may take to confirm it, s.
+        """
+        self._barred = True
+        self._autostart_tries = False
+        self._told_idle_setpoint = True
+        return self._drive.stop_for_good(patience)
+
     @property
     def drive(self) -> Drive:
         """The drive behind this node."""
@@ -126,11 +146,16 @@ class DriveNode(LifecycleNodeMixin, Node):
     @_guarded
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Identify the drive and watch it from then on."""
-        self._note_person()
+        if self._barred:
+            return TransitionCallbackReturn.FAILURE
+        if not self._is_for(self._drive.settings) and self._drive.stop_unconfirmed:
+            address = self._drive.settings.address
+            self._complain_of_start(f'the stop of the drive at {address} is not confirmed yet')
+            return TransitionCallbackReturn.FAILURE
         if self._drive.settings != self.settings:
             self._drive = Drive(self._line.bus, self.settings, self._reporter)
         try:
-            self._drive.connect().result()
+            self._drive.connect(patient=not self._autostarting).result()
         except DriveError as error:
             self._complain_of_start(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -140,11 +165,14 @@ class DriveNode(LifecycleNodeMixin, Node):
             return TransitionCallbackReturn.FAILURE
         self._drive.settings = self.settings
         self._autostart_complaint = ''
+        self._note_person()
         return TransitionCallbackReturn.SUCCESS
 
     @_guarded
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Poll at full rate and take set-points."""
+        if self._barred:
+            return TransitionCallbackReturn.FAILURE
         self._note_person()
         self._drive.activate()
         self._told_idle_setpoint = False
@@ -190,11 +218,13 @@ class DriveNode(LifecycleNodeMixin, Node):
         except (DriveError, FutureTimeoutError) as error:
             self.get_logger().error(f'{what}, but: {error}')
         else:
-            self.get_logger().info(f'{what}: {answer}')
+            self.get_logger().info(f'{what}: {answer}' if answer else what)
 
     def _autostart(self) -> None:
         if not self._autostart_tries:
             self._autostart_timer.cancel()
+            return
+        if time.monotonic() < self._autostart_at:
             return
         self._autostarting = True
         try:
@@ -205,6 +235,9 @@ class DriveNode(LifecycleNodeMixin, Node):
                 self._autostart_tries = False
         finally:
             self._autostarting = False
+            rest = self._autostart_rest + _AUTOSTART_REST
+            self._autostart_rest = min(rest, _AUTOSTART_LONGEST_REST)
+            self._autostart_at = time.monotonic() + self._autostart_rest
 
     def _note_person(self) -> None:
         """Leave the lifecycle to a person once a person took a hand in it."""
@@ -292,21 +325,16 @@ class DriveNode(LifecycleNodeMixin, Node):
             NEWEST,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        stops = MutuallyExclusiveCallbackGroup()
-        self.create_service(Trigger, '~/stop', self._on_stop, callback_group=stops)
-        self.create_service(Trigger, '~/quick_stop', self._on_quick_stop, callback_group=stops)
-        self.create_service(
-            SetBool,
-            '~/enable',
-            self._on_enable,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
-        self.create_service(
-            Trigger,
-            '~/fault_ack',
-            self._on_fault_ack,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
+        # reentrant, for to disable must not wait for an enable that waits for a start delay
+        group = ReentrantCallbackGroup()
+        self.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
+        for name, callback in (
+            ('~/stop', self._on_stop),
+            ('~/quick_stop', self._on_quick_stop),
+            ('~/fault_ack', self._on_fault_ack),
+        ):
+            group = MutuallyExclusiveCallbackGroup()
+            self.create_service(Trigger, name, callback, callback_group=group)
 
     def _on_setpoint(self, message: Float32) -> None:
         if self.state != 'active':
@@ -333,11 +361,16 @@ class DriveNode(LifecycleNodeMixin, Node):
             return self._answer(response, self._drive.stop, _LONGEST_STOP)
         if self.state != 'active':
             response.success = False
-            response.message = f'the node is {self.state}: activate it first'
-            if self._autostart_complaint:
-                response.message = f'the drive has not answered yet: {self._autostart_complaint}'
+            response.message = self._why_not_active()
             return response
         return self._answer(response, self._drive.enable, _LONGEST_COMMAND)
+
+    def _why_not_active(self) -> str:
+        if self.state == 'finalized':
+            return 'the node was shut down: start the driver again'
+        if self._autostart_complaint:
+            return f'the drive has not answered yet: {self._autostart_complaint}'
+        return f'the node is {self.state}: activate it first'
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         return self._answer(response, self._drive.stop, _LONGEST_STOP)

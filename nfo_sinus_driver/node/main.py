@@ -32,18 +32,21 @@ import rclpy
 from rclpy.exceptions import InvalidNodeNameException
 from rclpy.exceptions import ParameterException
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.arguments import refuse_other_arguments
 from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.output import Output
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
-_GROUPS_OF_A_DRIVE = 7
+_GROUPS_OF_A_DRIVE = 10
 _GROUPS_OF_THE_BUS = 3
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
@@ -53,25 +56,30 @@ _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
 
-#: Signals that end a process, as far as they can be caught. Those of the keyboard and of job
-#: control that would only suspend it are caught too: a suspended driver would leave the motor on.
+#: Signals that would suspend a process and leave the motors running.
 _SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))
-_ENDING = frozenset(
+#: Signals that end no process, or that cannot or must not be caught: those of a crash.
+_OTHERS = frozenset(
     (
-        signal.SIGINT,
-        signal.SIGTERM,
-        signal.SIGHUP,
-        signal.SIGQUIT,
-        signal.SIGUSR1,
-        signal.SIGUSR2,
-        signal.SIGALRM,
-        signal.SIGVTALRM,
-        signal.SIGPROF,
-        signal.SIGXCPU,
-        signal.SIGPOLL,
-        signal.SIGPWR,
+        signal.SIGCHLD,
+        signal.SIGCONT,
+        signal.SIGURG,
+        signal.SIGWINCH,
+        signal.SIGPIPE,
+        signal.SIGKILL,
+        signal.SIGSTOP,
+        signal.SIGBUS,
+        signal.SIGFPE,
+        signal.SIGILL,
+        signal.SIGSEGV,
+        signal.SIGSYS,
     )
 )
+#: Every other signal ends a process, and therefore stops the motors first.
+_ENDING = frozenset(signal.valid_signals()) - _SUSPENDING - _OTHERS
+
+#: What rclpy raises when its own arguments make no sense.
+_ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
 _log = logging.getLogger(__name__)
 
@@ -87,7 +95,10 @@ class DriverProcess:
         _check_names(names)
         line = self._bus_node.line
         for name in names:
-            line.drives.append(DriveNode(name, line))
+            try:
+                line.drives.append(DriveNode(name, line))
+            except (ParameterException, ValueError) as error:
+                raise ValueError(f'{name}: {error}') from error
         self._drives = line.drives
         self._warn_of_unknown_names(arguments)
         threads = _GROUPS_OF_A_DRIVE * len(names) + _GROUPS_OF_THE_BUS
@@ -113,20 +124,21 @@ class DriverProcess:
         """The nodes and the bus still work."""
         return self._thread.is_alive() and self._bus_node.line.bus.alive
 
-    def stop(self) -> bool:
+    def stop(self, why: str) -> bool:
         """
         Stop the motors, give control back and end.
 
+        :param why: what to say of it.
         :returns: whether every drive confirmed that it stops.
         """
-        confirmed = self._stop_motors()
+        confirmed = self._stop_motors(why)
         # whoever still waits for the bus is told, so that no callback keeps the executor
         self._bus_node.line.bus.close()
         self._bus_node.line.outbox.close()
         self._spinning = False
         self._executor.wake()
         self._thread.join(_LAST_CALLBACK)
-        self._executor.shutdown(_LAST_CALLBACK)
+        _await_callbacks(self._executor)
         return confirmed
 
     def _spin(self) -> None:
@@ -137,19 +149,38 @@ class DriverProcess:
                 # a mistake in one callback must not take the others with it
                 _log.exception('error in a callback; the driver goes on')
 
-    def _stop_motors(self) -> bool:
+    def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
-        connected = [node for node in self._drives if node.drive.identity is not None]
         # all are told before the first is waited for, and nobody can enable any of them again
-        stops = [(node, node.drive.stop_for_good()) for node in connected]
-        unconfirmed = [node for node, future in stops if not _confirmed(node, future, begun)]
+        stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
+        self._bus_node.get_logger().info(f'{why}: stopping the motors')
+        # a drive that never answered was never started, and may well not be there
+        connected = [node for node in self._drives if node.drive.identity is not None]
+        unconfirmed = [
+            node
+            for node, future in stops
+            if node in connected and not _confirmed(node, future, begun)
+        ]
         releases = [
             (node, node.drive.disconnect(_time_left(node, begun)))
             for node in connected
             if node not in unconfirmed
         ]
         unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
+        for node in unconfirmed:
+            node.get_logger().error(
+                'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
+                'the emergency stop'
+            )
         return not unconfirmed
+
+
+def _await_callbacks(executor: MultiThreadedExecutor) -> None:
+    """Let callbacks end before what they use is destroyed, but not for ever."""
+    # rclpy has no other way to wait for them
+    waiter = threading.Thread(target=executor._executor.shutdown, daemon=True)
+    waiter.start()
+    waiter.join(_LAST_CALLBACK)
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
@@ -161,13 +192,15 @@ def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
     """Wait for the answer to a stop or a release, and log it."""
     log = node.get_logger()
     try:
-        log.info(future.result(_time_left(node, begun) + _LAST_ANSWER))
+        answer = future.result(_time_left(node, begun) + _LAST_ANSWER)
     except FutureTimeoutError:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except DriveError as error:
         log.error(str(error))
         return False
+    if answer:
+        log.info(answer)
     return True
 
 
@@ -199,33 +232,50 @@ def main(args: list[str] | None = None) -> int:
     sys.setswitchinterval(_SWITCH_INTERVAL)
     # blocked before any thread exists, so that only the main thread ever sees them
     signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING | _SUSPENDING)
-    arguments, single_name = take_out_node_name(sys.argv if args is None else args)
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    output = Output()
     try:
+        return _run(*take_out_node_name(sys.argv if args is None else args))
+    finally:
+        output.close()
+
+
+def _run(arguments: list[str], single_name: str | None) -> int:
+    try:
+        refuse_other_arguments(arguments)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         process = DriverProcess(arguments, single_name)
-    except (ParameterException, ValueError) as error:
+    except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:
         text = ' '.join(str(error).split())
         rclpy.logging.get_logger('nfo_sinus_driver').fatal(f'cannot start: {text}')
-        rclpy.shutdown()
+        rclpy.try_shutdown()
         return 2
     process.start()
+    why = 'error in the driver'
     try:
-        _await_end(process)
+        why = _await_end(process)
     finally:
-        confirmed = process.stop()
+        confirmed = process.stop(why)
         rclpy.shutdown()
     return 0 if confirmed else 1
 
 
-def _await_end(process: DriverProcess) -> None:
+def _name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        # the real-time signals have no names but the first and the last
+        return f'signal {number}'
+
+
+def _await_end(process: DriverProcess) -> str:
+    """Wait until something ends the driver; return what."""
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
         caught = signal.sigtimedwait(_ENDING | _SUSPENDING, _POLL_SIGNALS)
         if caught is None:
             continue
-        name = signal.Signals(caught.si_signo).name
+        name = _name(caught.si_signo)
         if caught.si_signo in _ENDING:
-            log.info(f'{name}: stopping the motors')
-            return
+            return name
         log.warning(f'{name} ignored: a suspended driver would leave the motors running')
-    log.error('a part of the driver has ended by itself: stopping the motors')
+    return 'a part of the driver has ended by itself'

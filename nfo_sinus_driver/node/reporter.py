@@ -108,7 +108,10 @@ class Reporter:
     def _stamp(self, at: float) -> Time:
         """Return the node's time of a moment of ``time.monotonic``."""
         age = self._steady.now().nanoseconds - round(at * 1e9)
-        stamp: Time = (self._node.get_clock().now() - Duration(nanoseconds=age)).to_msg()
+        now = self._node.get_clock().now()
+        # simulated time begins at zero, and times before it cannot be
+        age = min(age, now.nanoseconds)
+        stamp: Time = (now - Duration(nanoseconds=age)).to_msg()
         return stamp
 
     def _frame_id(self) -> str:
@@ -146,11 +149,11 @@ class Reporter:
         assert self._drive is not None
         drive = self._drive()
         status = diagnostics.drive_status(
-            self._node.get_name(),
+            self._node.get_fully_qualified_name().lstrip('/'),
             snapshot,
             lifecycle_state=self._node.state,
             address=drive.settings.address,
-            firmware=str(drive.identity or ''),
+            identity=drive.identity,
             stop_unconfirmed=drive.stop_unconfirmed,
         )
         diagnosis = (status.level, status.message)

@@ -136,7 +136,12 @@ DRIVE_SETTINGS = (
         'How the drive is commanded; monitor: not one write to it',
         constraints=f'one of {", ".join(CONTROL_METHODS)}',
     ),
-    Setting('autostart', True, 'Configure and activate by itself, and try until it works'),
+    Setting(
+        'autostart',
+        True,
+        'Configure and activate by itself, and try until it works',
+        fixed=True,
+    ),
     Setting(
         'poll_rate', 0.0, 'Status and actual value, Hz; 0: as fast as the bus allows', 0, 1000
     ),

@@ -36,11 +36,13 @@ from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.simulator import identification
 from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
 from nfo_sinus_driver.simulator.control_source import TUNING_COMMANDS
 from nfo_sinus_driver.simulator.control_source import Source
 from nfo_sinus_driver.simulator.faults import SERIAL
 from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.identification import KNOWN
 from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
@@ -68,11 +70,15 @@ class SimulatedDrive:
     :param settings: parameters other than factory, in engineering units, by key.
     :param run_input: whether the digital input RUN is active.
     :param boot_time: how long it is silent after the mains come back (s).
+    :param serial_number: at most 16 characters; by default one for each address.
+    :param newer_functions: how it treats functions 17, 23 and 43: ``known``, ``refused`` as by
+        older firmware, or ``silent``.
     :raises ValueError: an unknown model or parameter, or a value that the drive would refuse.
 
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
     :ivar time: model time since the start (s).
     :ivar refuses_writes_when_faulted: while a fault stands every write is refused [M0 §6.1.5].
+    :ivar identification: the objects of Read Device Identification, by number [M0 §6.2.4].
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
     :ivar command_writes: how often it wrote each set-point or command, by key.
     :ivar ack_reads: how often 02A4h was read, which acknowledges.
@@ -87,6 +93,8 @@ class SimulatedDrive:
         settings: Mapping[str, Value] | None = None,
         run_input: bool = True,
         boot_time: float = 2.0,
+        serial_number: str | None = None,
+        newer_functions: str = KNOWN,
     ) -> None:
         self.model = load_model(model)
         self.settings = frozenset(
@@ -102,6 +110,9 @@ class SimulatedDrive:
         self.runner = Runner(self.memory, self.motor)
         self.runner.run_input = run_input
         self.counters = Counters()
+        self.serial_number = identification.serial_number(serial_number, address)
+        self.identification = identification.device_objects(self.memory)
+        self.newer_functions = newer_functions
         self.boot_time = boot_time
         self.refuses_writes_when_faulted = True
         self.writes: Counter[str] = Counter()
@@ -159,6 +170,18 @@ class SimulatedDrive:
         """
         parameter = self._registers.find(register, len(words))
         self.write_raw(parameter.key, parameter.place(Protocol.MODBUS).type.to_raw(words))
+
+    def write_and_read(
+        self, register: int, words: Sequence[int], source: int, count: int
+    ) -> tuple[int, ...]:
+        """
+        Write the parameter at ``register``, then read the one at ``source``.
+
+        :raises Refused: as the reason says; nothing was written if there is none at ``source``.
+        """
+        self._registers.find(source, count)
+        self.write(register, words)
+        return self.read(source, count)
 
     def read_raw(self, key: str) -> int:
         """

@@ -156,7 +156,7 @@ class Line:
                 continue
             drive.heard()
             answer = self.protocol.answer(drive, pdu)
-            if not everybody:
+            if answer and not everybody:
                 self._send(address, answer, arrived.last)
 
     def _hears(self, drive: SimulatedDrive) -> bool:

@@ -27,6 +27,8 @@ from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.simulator.control import ControlError
+from nfo_sinus_driver.simulator.identification import KNOWN
+from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.inject import inject
 from nfo_sinus_driver.simulator.injections import parse_setting
 from nfo_sinus_driver.simulator.ports import PortError
@@ -44,6 +46,9 @@ RUN input, the keypad, a power cycle, noise on the line; see "simulator inject -
 """
 
 
+_ROS_ARGS = '--ros-args'
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """
     Run the command and return its exit status.
@@ -51,6 +56,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     :param argv: the arguments, without the program's name; by default the process's own.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if _ROS_ARGS in arguments:
+        # a launch file's Node action adds them; there is no ROS in here
+        del arguments[arguments.index(_ROS_ARGS) :]
     if arguments[:1] == ['inject']:
         return inject(arguments[1:])
     parser = _parser()
@@ -127,6 +135,8 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         settings=_settings(options.model, options.set),
         run_input=options.run_input,
         boot_time=options.boot_time,
+        serial_numbers=options.serial,
+        newer_functions=options.newer_functions,
     )
 
 
@@ -218,5 +228,20 @@ def _parser() -> argparse.ArgumentParser:
         default=2.0,
         metavar='SECONDS',
         help='how long a drive is silent after power-on (default: 2)',
+    )
+    add(
+        '--serial',
+        action='append',
+        default=[],
+        metavar='TEXT',
+        help='serial number of a drive, at most 16 characters; once for each drive, in the order '
+        'of their addresses (default: made of the address)',
+    )
+    add(
+        '--newer-functions',
+        default=KNOWN,
+        choices=NEWER_FUNCTIONS,
+        help='how drives treat functions 17, 23 and 43, which older ones do not have '
+        '(default: known)',
     )
     return parser

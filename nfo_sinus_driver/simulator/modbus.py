@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Modbus as a simulated drive speaks it: functions 03, 06 and 16 over RTU frames [M0 §6.2]."""
+"""Modbus as a simulated drive speaks it, over RTU frames [M0 §6.2.3, §6.2.4]."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ from collections.abc import Mapping
 
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.identification import KNOWN
+from nfo_sinus_driver.simulator.identification import REFUSED
+from nfo_sinus_driver.simulator.identification import SILENT
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -32,9 +35,19 @@ BUS_TYPE_RTU = 3
 _READ = 3
 _WRITE_SINGLE = 6
 _WRITE_MULTIPLE = 16
+_REPORT_SLAVE_ID = 17
+_WRITE_AND_READ = 23
+_ENCAPSULATED = 43
+_DEVICE_IDENTIFICATION = 14
+#: Read device ID codes: basic, regular, specific; and which objects belong to each.
+_BASIC, _REGULAR, _SPECIFIC = 1, 2, 4
+_STREAMS = {_BASIC: range(3), _REGULAR: range(7)}
+#: Regular identification, as a stream and object by object.
+_CONFORMITY = 0x82
 #: The standard's limits of registers in one message.
 _MOST_READ = 125
 _MOST_WRITTEN = 123
+_MOST_WRITTEN_WITH_READ = 121
 
 #: Length of a request's whole RTU frame by function: fixed, or what the byte count at an index
 #: adds to the rest.
@@ -43,9 +56,14 @@ _COUNTED = {15: 6, 16: 6, 20: 2, 21: 2, 23: 10}
 
 
 def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
-    """Let the drive carry out a request PDU and return the answer PDU; it always has one."""
+    """Let the drive carry out a request PDU and return the answer PDU; empty if it stays silent."""
     function = pdu[0] if pdu else 0
+    treated = drive.newer_functions if function in _NEWER else KNOWN
+    if treated == SILENT:
+        return b''
     try:
+        if treated == REFUSED:
+            raise Refused(Reason.FUNCTION, f'function {function} came with a newer firmware')
         try:
             handler = _HANDLERS[function]
         except KeyError:
@@ -82,11 +100,55 @@ def _write_multiple(drive: SimulatedDrive, data: bytes) -> bytes:
     return pymodbus_compat.encode_write_multiple(register, count)
 
 
+def _write_and_read(drive: SimulatedDrive, data: bytes) -> bytes:
+    source, wanted, register, count, words = pymodbus_compat.decode_write_and_read(data)
+    right = 1 <= count <= _MOST_WRITTEN_WITH_READ and len(words) == count and data[8] == 2 * count
+    if not right or not 1 <= wanted <= _MOST_READ or len(data) != 9 + 2 * count:
+        raise Refused(Reason.VALUE, f'a write of {count} and read of {wanted} is malformed')
+    return pymodbus_compat.encode_write_and_read(
+        drive.write_and_read(register, words, source, wanted)
+    )
+
+
+def _report_slave_id(drive: SimulatedDrive, data: bytes) -> bytes:
+    if data:
+        raise Refused(Reason.VALUE, 'a request of a wrong length')
+    # not pymodbus's, which puts the standard's run indicator behind it [C94]
+    report = drive.serial_number.encode('ascii')
+    return bytes((_REPORT_SLAVE_ID, len(report))) + report
+
+
+def _identify(drive: SimulatedDrive, data: bytes) -> bytes:
+    if data[:1] != bytes((_DEVICE_IDENTIFICATION,)):
+        raise Refused(Reason.FUNCTION, 'only MEI type 14 is supported')
+    code, first = pymodbus_compat.decode_device(data)
+    if len(data) != 3:
+        raise Refused(Reason.VALUE, 'a request of a wrong length')
+    objects = drive.identification
+    if code == _SPECIFIC:
+        if first not in objects:
+            raise Refused(Reason.ADDRESS, f'there is no object {first}')
+        return pymodbus_compat.encode_device(code, _CONFORMITY, {first: objects[first]})
+    if code not in _STREAMS:
+        raise Refused(Reason.VALUE, f'read device ID code {code} is not supported')
+    stream = _STREAMS[code]
+    # from an object that is not there the standard begins anew
+    wanted = stream[first if first in stream else 0 :]
+    return pymodbus_compat.encode_device(
+        code, _CONFORMITY, {number: objects[number] for number in wanted}
+    )
+
+
 _HANDLERS: Mapping[int, Callable[[SimulatedDrive, bytes], bytes]] = {
     _READ: _read,
     _WRITE_SINGLE: _write_single,
     _WRITE_MULTIPLE: _write_multiple,
+    _REPORT_SLAVE_ID: _report_slave_id,
+    _WRITE_AND_READ: _write_and_read,
+    _ENCAPSULATED: _identify,
 }
+#: What only the newest family has [C57], so that an older firmware may lack it.
+_NEWER = frozenset((_REPORT_SLAVE_ID, _WRITE_AND_READ, _ENCAPSULATED))
 
 
 class ModbusRtu:
@@ -132,7 +194,7 @@ class ModbusRtu:
 
     @staticmethod
     def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
-        """Let the drive carry out a request; return the answer's PDU."""
+        """Let the drive carry out a request; return the answer's PDU, empty if there is none."""
         return answer(drive, pdu)
 
     @staticmethod

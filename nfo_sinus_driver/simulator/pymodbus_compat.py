@@ -29,6 +29,7 @@ What changed on the way:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 import importlib
 import logging
@@ -65,6 +66,11 @@ _WriteSingleRequest = _first_of(_WRITE, 'WriteSingleRegisterRequest')
 _WriteSingleResponse = _first_of(_WRITE, 'WriteSingleRegisterResponse')
 _WriteMultipleRequest = _first_of(_WRITE, 'WriteMultipleRegistersRequest')
 _WriteMultipleResponse = _first_of(_WRITE, 'WriteMultipleRegistersResponse')
+_WriteAndReadRequest = _first_of(_READ, 'ReadWriteMultipleRegistersRequest')
+_WriteAndReadResponse = _first_of(_READ, 'ReadWriteMultipleRegistersResponse')
+_MEI = ('pymodbus.pdu.mei_message', 'pymodbus.mei_message')
+_DeviceRequest = _first_of(_MEI, 'ReadDeviceInformationRequest')
+_DeviceResponse = _first_of(_MEI, 'ReadDeviceInformationResponse')
 _ExceptionResponse = _first_of(
     ('pymodbus.pdu.exceptionresponse', 'pymodbus.pdu'), 'ExceptionResponse'
 )
@@ -112,6 +118,27 @@ def decode_write_multiple(data: bytes) -> tuple[int, int, tuple[int, ...]]:
     return request.address, request.count, tuple(words)
 
 
+def decode_write_and_read(data: bytes) -> tuple[int, int, int, int, tuple[int, ...]]:
+    """
+    Decode what follows function 23: what to read, register and count, then what to write.
+
+    :raises ValueError: malformed.
+    """
+    request = _decoded(_WriteAndReadRequest(), data)
+    source = (request.read_address, request.read_count)
+    return *source, request.write_address, request.write_count, tuple(request.write_registers)
+
+
+def decode_device(data: bytes) -> tuple[int, int]:
+    """
+    Decode what follows function 43 with MEI type 14: read device ID code and object.
+
+    :raises ValueError: malformed.
+    """
+    request = _decoded(_DeviceRequest(), data)
+    return request.read_code, request.object_id
+
+
 def encode_read(words: Sequence[int]) -> bytes:
     """Return the answer PDU of function 03."""
     return _encoded(_ReadResponse(), registers=list(words))
@@ -125,6 +152,17 @@ def encode_write_single(register: int, word: int) -> bytes:
 def encode_write_multiple(register: int, count: int) -> bytes:
     """Return the answer PDU of function 16."""
     return _encoded(_WriteMultipleResponse(), address=register, count=count)
+
+
+def encode_write_and_read(words: Sequence[int]) -> bytes:
+    """Return the answer PDU of function 23."""
+    return _encoded(_WriteAndReadResponse(), registers=list(words))
+
+
+def encode_device(code: int, conformity: int, objects: Mapping[int, bytes]) -> bytes:
+    """Return the answer PDU of function 43 with MEI type 14."""
+    response = _DeviceResponse()
+    return _encoded(response, read_code=code, conformity=conformity, information=dict(objects))
 
 
 def encode_exception(function: int, code: int) -> bytes:

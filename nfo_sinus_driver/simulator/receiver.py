@@ -48,7 +48,7 @@ class Protocol(Interface):
         """The frame of an answer."""
 
     def answer(self, drive: SimulatedDrive, pdu: bytes) -> bytes:
-        """Let the drive carry out a request; return the answer."""
+        """Let the drive carry out a request; return the answer, empty if there is none."""
 
     def broadcast(self, address: int, pdu: bytes) -> bool:
         """Whether everybody obeys the request and nobody answers."""

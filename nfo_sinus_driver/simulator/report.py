@@ -29,6 +29,7 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
     return {
         'address': drive.address,
         'model': drive.model.name,
+        'serial_number': drive.serial_number,
         'time': drive.time,
         'silent': not drive.listening,
         'mode': int(runner.source.mode),

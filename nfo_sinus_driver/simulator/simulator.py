@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Sequence
 import contextlib
+import itertools
 import os
 import select
 import threading
@@ -31,6 +32,8 @@ from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.identification import KNOWN
+from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.injections import VERBS
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
@@ -68,6 +71,10 @@ class Simulator:
     :param control: path of the control channel; ``''`` for the default one, ``None`` for none.
     :param settings: parameters other than factory, in engineering units, by key.
     :param boot_time: how long a drive is silent after power-on (s).
+    :param serial_numbers: of the first drives, in the order of their addresses; the rest have
+        their own.
+    :param newer_functions: how the drives treat functions 17, 23 and 43: ``known``, ``refused``
+        or ``silent``.
     :raises ValueError: a wrong address, model, protocol, baud rate or parameter.
     :raises PortError: the port or link cannot be had.
     :raises ControlError: another simulator is there.
@@ -96,6 +103,8 @@ class Simulator:
         settings: Mapping[str, Value] | None = None,
         run_input: bool = True,
         boot_time: float = 2.0,
+        serial_numbers: Sequence[str] = (),
+        newer_functions: str = KNOWN,
     ) -> None:
         if protocol not in PROTOCOLS:
             raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
@@ -111,11 +120,21 @@ class Simulator:
             'serial.si_prot': labels['serial.si_prot'].labels[FORMAT_CODES[char_format]],
             **(settings or {}),
         }
+        if newer_functions not in NEWER_FUNCTIONS:
+            raise ValueError(f'newer_functions: choose one of {", ".join(NEWER_FUNCTIONS)}')
+        if len(serial_numbers) > len(addresses):
+            raise ValueError(f'{len(serial_numbers)} serial numbers for {len(addresses)} drives')
         self.drives = {
             address: SimulatedDrive(
-                model, address, settings=serial, run_input=run_input, boot_time=boot_time
+                model,
+                address,
+                settings=serial,
+                run_input=run_input,
+                boot_time=boot_time,
+                serial_number=number,
+                newer_functions=newer_functions,
             )
-            for address in _checked(addresses)
+            for address, number in itertools.zip_longest(_checked(addresses), serial_numbers)
         }
         self.lock = threading.RLock()
         self.control: str | None = None

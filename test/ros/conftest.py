@@ -17,37 +17,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import contextlib
-import fcntl
 import os
 from pathlib import Path
-import tempfile
 
 from bench import Bench
 import pytest
+
+from nfo_sinus_driver.node.domain import own_domain
 
 # before any context exists, in this process and in those it starts
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # a field of a wrong type is an exception then, and not the end of the process
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
-_DOMAINS = range(1, 102)
-
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """Return a ROS domain that no other test on this machine uses at the time."""
-    with contextlib.ExitStack() as stack:
-        for number in _DOMAINS:
-            path = Path(tempfile.gettempdir()) / f'nfo_sinus_test_domain_{number}.lock'
-            lock = stack.enter_context(path.open('w'))
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            yield number
-            return
-    pytest.fail('no ROS domain is free')
+    """Return a ROS domain that no other test and no demo on this machine uses at the time."""
+    with own_domain() as number:
+        yield number
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 import re
 import signal
 import subprocess
@@ -29,9 +30,15 @@ from bench import wait_until
 _DEMO_TIME = 100.0
 
 
-def test_the_demo_rides_to_its_end() -> None:
+def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
+    # what records and draws it is not installed: test_demo_record.py has the other case
+    libraries = ('rosbags', 'matplotlib')
+    for name in libraries:
+        (tmp_path / f'{name}.py').write_text(f'raise ImportError("No module named {name}")')
+    path = f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}'
     done = subprocess.run(
-        [sys.executable, '-m', 'nfo_sinus_driver.node.demo'],
+        [sys.executable, '-m', 'nfo_sinus_driver.node.demo', '--output', str(tmp_path / 'here')],
+        env={**os.environ, 'PYTHONPATH': path},
         capture_output=True,
         text=True,
         timeout=_DEMO_TIME,
@@ -40,6 +47,10 @@ def test_the_demo_rides_to_its_end() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     for step in ('enable: enabled', '30.0 Hz', '-20.0 Hz', 'Overload', 'acknowledged 5', 'stop:'):
         assert step in done.stdout, done.stdout
+    [line] = [line for line in done.stdout.splitlines() if 'neither a bag nor a plot' in line]
+    for name in libraries:
+        assert f'No module named {name} (pip install {name})' in line
+    assert not (tmp_path / 'here').exists()
 
 
 def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:

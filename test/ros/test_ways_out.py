@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import signal
 
+from bench import A_WHILE
 from bench import PATIENCE
 from bench import Bench
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
 import pytest
+from std_srvs.srv import SetBool
 
 
 def _stops(state: dict) -> bool:
@@ -41,7 +43,14 @@ def _stops(state: dict) -> bool:
 
 @pytest.mark.parametrize(
     'number',
-    [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1],
+    [
+        signal.SIGINT,
+        signal.SIGTERM,
+        signal.SIGHUP,
+        signal.SIGQUIT,
+        signal.SIGUSR1,
+        signal.SIGRTMIN,
+    ],
     ids=lambda number: number.name,
 )
 def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int) -> None:
@@ -148,6 +157,41 @@ def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
         assert not state['turning']
         assert client.state() == 'inactive', 'autostart undid what a person did'
         assert not client.enable().success
+
+
+def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
+    # slow answers keep the enable long enough on its way
+    drive = bench.simulator('--turnaround', '0.2', '--set', 'control.accel=1')
+    driver = bench.driver('-p', 'response_timeout:=1.0')
+    client = bench.client().connected()
+    with client.setpoints(20.0):
+        enable = client.call_async('enable', SetBool, data=True)
+        drive.wait_for(lambda state: state['mode'] == 3, timeout=PATIENCE)
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+        wait_until(enable.done, 'enable answers')
+        assert 'stopped while it was being enabled' in enable.result().message
+        assert client.change_state(Transition.TRANSITION_ACTIVATE)
+        began = drive.state()['time']
+        state = drive.wait_for(
+            lambda state: state['turning'] or state['time'] > began + A_WHILE, timeout=PATIENCE
+        )
+        assert not state['turning']
+    driver.signal(signal.SIGINT)
+    assert driver.wait() == 0, driver.text
+    assert drive.state()['mode'] == 1
+
+
+def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.run_dly=3000')
+    bench.driver()
+    client = bench.client().connected()
+    enable = client.call_async('enable', SetBool, data=True)
+    drive.wait_for(lambda state: state['inv_st'] == 25, timeout=PATIENCE)
+    other = bench.client()
+    assert other.enable(False).success
+    wait_until(enable.done, 'enable answers')
+    assert not enable.result().success
+    drive.wait_for(lambda state: state['scmd'] == 0, timeout=PATIENCE)
 
 
 def test_cleanup_gives_control_back_without_mode_ext(bench: Bench) -> None:

@@ -28,6 +28,11 @@ from nfo_sinus_driver.catalog import load_model
 _READ = 3
 _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
+#: Who are you: whole requests without unit and CRC. They touch no parameter [M0 §6.2.4].
+_REPORT_SLAVE_ID = bytes((17,))
+_READ_DEVICE = frozenset(
+    bytes((43, 14, code, first)) for code in (1, 2, 4) for first in range(7)
+)
 _ACKNOWLEDGING = 0x02A4
 _MODE = 0x0294
 _SCMD = 0x0298
@@ -59,6 +64,8 @@ def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:
 
 
 def _wrong_request(frames: list[Frame], number: int, data: bytes) -> Iterator[str]:
+    if data[1:-2] == _REPORT_SLAVE_ID or data[1:-2] in _READ_DEVICE:
+        return
     unit, function, register = struct.unpack('>BBH', data[:4])
     if function == _READ:
         count = struct.unpack('>H', data[4:6])[0]

@@ -34,7 +34,8 @@ MAY_IMPORT = {
     'catalog': set(),
     'link': set(),
     'statistics': set(),
-    'bus': {'link', 'statistics'},
+    'bus': {'jobs', 'link', 'statistics'},
+    'jobs': {'link'},
     'drive': {'bus', 'catalog', 'link'},
     'simulator': {'catalog'},
     'node': {'bus', 'catalog', 'drive', 'link', 'statistics'},
@@ -49,7 +50,7 @@ PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
 
 MOST_LINES = 450
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
-LONGER = {'bus.py': 560}
+LONGER = {'bus.py': 530}
 
 LICENCE = re.compile(
     r'(#!.*\n)?# Copyright 20\d\d The nfo_sinus_driver authors\n'

@@ -309,12 +309,23 @@ def test_late_answer_before_a_write_is_passed_over() -> None:
 def test_late_answer_to_a_write_does_not_end_the_doubt() -> None:
     # found by the property below: the first write's answer is taken for the second one's, and
     # the answer to the probe between them is still to come
-    bench = Bench([Fate(2.9), Fate(2.9), Fate()])
+    bench = Bench([Fate(2.9), Fate(2.5)])
     bench.expect(NoAnswer, lambda: bench.write(B, 5))
     bench.expect(NoAnswer, lambda: bench.read(C))
     assert bench.asked[1:] == [0x2A5]
     assert bench.write(B, 5).words == ()
     assert read_or_none(bench, A) in (None, bench.answer_of(len(bench.asked) - 1))
+
+
+def test_late_answer_while_the_next_request_still_leaves() -> None:
+    # the silence between frames counts from the end of the request, not from what came before it
+    bench = Bench([Fate(0.97, lump=True)])
+    bench.expect(NoAnswer, lambda: bench.write(A, 5))
+    assert bench.write(A, 5).words == ()
+    start, frame = bench.wire.sent[-1]
+    assert bench.wire.now < start + len(frame) * SETTINGS.char_time
+    bench.read(A)
+    bench.wire.check_gaps()
 
 
 def read_or_none(bench: Bench, address: Address) -> tuple[int, ...] | None:
@@ -351,6 +362,25 @@ def test_refusal_of_another_function_is_believed_in_doubt() -> None:
     error = bench.expect(Refused, lambda: bench.write(A, 5))
     assert isinstance(error, Refused)
     assert error.code == bench.slave.code(1)
+
+
+def test_refusals_that_nobody_can_tell_apart_keep_no_reads_out() -> None:
+    # a drive comes back from a power cycle and refuses what is written to it again and again
+    lost = [Fate(what='drop')] * 3
+    bench = Bench([*lost, *[Fate(what='refuse')] * 6])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.expect(NoAnswer, lambda: bench.write(B, 0))
+    error = bench.expect(NotReady, lambda: bench.read(A))
+    assert isinstance(error, NotReady)
+    while bench.wire.now < error.until:
+        bench.wire.now += TIMEOUT
+        bench.expect(DamagedAnswer, lambda: bench.write(B, 0))
+    bench.slave.heal()
+    assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
+    # and now that an answer has come, the next refusal is believed
+    bench.slave.heal(Fate(what='refuse'))
+    bench.expect(Refused, lambda: bench.write(B, 0))
 
 
 def test_refused_probe_is_an_answer() -> None:
@@ -459,7 +489,8 @@ def lumps_or_doubles(fates: list[Fate]) -> Iterator[Fate]:
 
 @hypothesis_settings(max_examples=400)
 @given(FATES, STEPS)
-@example([Fate(2.9), Fate(2.9)], [('write B', 0.0), ('C', 0.0), ('write B', 0.0), ('A', 0.0)])
+@example([Fate(2.9), Fate(2.5)], [('write B', 0.0), ('C', 0.0), ('write B', 0.0), ('A', 0.0)])
+@example([Fate(0.97, lump=True)], [('write A', 0.0), ('write A', 0.0), ('A', 0.0)])
 @example([Fate(1.5), Fate(1.5), Fate(1.5)], [('A', 0.0), ('B', 0.0), ('B', 0.0), ('B', 0.0)])
 @example([Fate(1.5, 'refuse'), Fate(what='drop')], [('A', 0.0), ('B', 0.0), ('B', 0.0)])
 def test_every_answer_belongs_to_its_request(

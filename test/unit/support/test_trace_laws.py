@@ -31,7 +31,8 @@ _POLL = _request('01 03 0258 0002')
 _ZERO = _request('01 06 03FC 0000')
 _RUN = _request('01 06 0298 0101')
 _STOP = _request('01 06 0298 0000')
-_GOOD = [_POLL, _ANSWER, _request('01 06 0294 0003'), _ZERO, _RUN, _POLL, _ANSWER, _STOP]
+_WHO = [_request('01 2B 0E02 00'), _ANSWER, _request('01 11'), _ANSWER]
+_GOOD = [_POLL, _ANSWER, *_WHO, _request('01 06 0294 0003'), _ZERO, _RUN, _POLL, _ANSWER, _STOP]
 
 
 def test_a_good_ride_has_nothing_to_complain_of() -> None:
@@ -53,6 +54,14 @@ def test_a_good_ride_has_nothing_to_complain_of() -> None:
         ([_ZERO, _request('01 06 03FC 0064'), _RUN], 'without set-point 0'),
         ([_ZERO, _RUN, _STOP, _RUN], 'without set-point 0'),
         ([_request('01 2B 0E01 0000')], 'not for parameters'),
+        ([_request('01 2B 0E03 00')], 'not for parameters'),
+        ([_request('01 2B 0E02 07')], 'not for parameters'),
+        ([_request('01 2B 0D02 00')], 'not for parameters'),
+        ([_request('01 11 00')], 'not for parameters'),
+        ([_request('01 08 0001 0000')], 'not for parameters'),
+        ([_request('01 17 0400 0001 0294 0001 02 0003')], 'not for parameters'),
+        ([_POLL, _request('01 11', gap=0.0017)], 't3.5 is not kept'),
+        ([_ZERO, *_WHO, _RUN, *_WHO, _RUN], 'without set-point 0'),
     ],
 )
 def test_a_bad_ride_is_found_out(bad: list[dict], complaint: str) -> None:

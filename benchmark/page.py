@@ -1,0 +1,142 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The table, and the page that it stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence
+from datetime import datetime
+from datetime import timezone
+from importlib.metadata import version
+import os
+from pathlib import Path
+import platform
+import subprocess
+
+from measurements import Figures
+from measurements import Measurement
+
+_ROOT = Path(__file__).resolve().parents[1]
+PAGE = _ROOT / 'docs' / 'performance.md'
+_BEGIN = '<!-- benchmark: from here to the end mark written by benchmark/run.py --write -->'
+_END = '<!-- benchmark: end -->'
+
+#: Title and figure of each column, and how many decimals.
+_COLUMNS = (
+    ('time, ms', 'time', 2),
+    ('p99, ms', 'p99', 2),
+    ('limit, ms', 'limit', 2),
+    ('time / limit', 'ratio', 3),
+    ('gaps < t3.5', 'short_gaps', 0),
+    ('master adds, ms', 'master_adds', 2),
+    ('simulator adds, ms', 'simulator_adds', 2),
+    ('driver says, ms', 'driver_says', 2),
+    ('CPU, % of a core', 'cpu', 1),
+    ('CPU, ms a transaction', 'cpu_transaction', 2),
+    ('others, % of a core', 'others', 0),
+)
+_UNITS = {
+    'ratio': ('time / limit', '', 3),
+    'short_gaps': ('gaps < t3.5', '', 0),
+    'cpu': ('CPU', ' %', 1),
+    'time': ('median', ' ms', 2),
+    'p99': ('p99', ' ms', 2),
+}
+
+
+def table(rows: Sequence[tuple[Measurement, Figures]]) -> str:
+    """Return the table in Markdown."""
+    titles = ['what', 'bit/s', 'drives', *(title for title, _, _ in _COLUMNS), 'aims']
+    lines = [_line(titles), _line(['---', *['---:'] * (len(titles) - 2), '---'])]
+    for measurement, figures in rows:
+        cells = [measurement.title, str(measurement.baud_rate), str(measurement.drives)]
+        cells += [_number(figures.get(name), decimals) for _, name, decimals in _COLUMNS]
+        lines.append(_line([*cells, verdict(measurement.aims, figures)]))
+    return '\n'.join(lines)
+
+
+def verdict(aims: Figures, figures: Figures) -> str:
+    """Return whether the aims are met, or what was missed and by how much."""
+    missed = []
+    for name, most in aims.items():
+        title, unit, decimals = _UNITS[name]
+        excess = round(figures[name] - most, decimals)
+        if excess > 0:
+            missed.append(f'**{title} at most {most:g}{unit}: missed by {excess:g}{unit}**')
+    if figures.get('lost'):
+        missed.append(f'**{figures["lost"]:g} set-points never came there**')
+    return '; '.join(missed) or ('met' if aims else '')
+
+
+def circumstances(command: str, runs: int, loads: Sequence[float]) -> str:
+    """Return where and how it was measured, as a list in Markdown."""
+    packages = ('rclpy', 'pymodbus', 'minimalmodbus', 'pyserial')
+    versions = ', '.join(f'{name} {_attempt(lambda name=name: version(name))}' for name in packages)
+    now = datetime.now(timezone.utc)
+    return '\n'.join(
+        (
+            f'* {now:%Y-%m-%d %H:%M} UTC, `{command}`, ' + _of(runs),
+            f'* {_processor()}, {os.cpu_count()} cores, Linux {platform.release()}, '
+            f'Python {platform.python_version()}',
+            f'* driver at {_attempt(_revision)}; {versions}',
+            f'* load average of the machine before each measurement: {min(loads):.2f} to '
+            f'{max(loads):.2f}, in which the benchmark itself has its share',
+        )
+    )
+
+
+def write(text: str) -> None:
+    """
+    Put what was measured on the page.
+
+    :raises ValueError: the page has no place for it.
+    """
+    before, begin, rest = PAGE.read_text().partition(_BEGIN)
+    _, end, after = rest.partition(_END)
+    if not begin or not end:
+        raise ValueError(f'{PAGE.name} has lost its marks: {_BEGIN} and {_END}')
+    PAGE.write_text(f'{before}{_BEGIN}\n\n{text}\n\n{_END}{after}')
+
+
+def _of(runs: int) -> str:
+    return f'medians of {runs} runs' if runs > 1 else 'one run'
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f'| {" | ".join(cells)} |'
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return '' if value is None else f'{value:.{decimals}f}'
+
+
+def _attempt(what: Callable[[], str]) -> str:
+    """Return what something says of itself, or that it is not known."""
+    try:
+        return what()
+    except (ImportError, OSError, subprocess.CalledProcessError):
+        return 'of unknown version'
+
+
+def _processor() -> str:
+    for line in Path('/proc/cpuinfo').read_text().splitlines():
+        if line.startswith('model name'):
+            return line.partition(':')[2].strip()
+    return platform.machine()
+
+
+def _revision() -> str:
+    command = ('git', '-C', str(_ROOT), 'describe', '--always', '--dirty')
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()

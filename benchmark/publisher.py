@@ -1,0 +1,73 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Publishes set-points at random moments and says when; a process of its own.
+
+Each drive gets one in its turn. Prints one JSON list: moment (s of the steady clock), number of
+the drive, value. Then it waits to be ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import signal
+import time
+
+import rclpy
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float32
+
+#: How long drives may take to listen, s.
+_PATIENCE = 30.0
+#: Between two set-points, s: 10 to 20 a second.
+_PERIODS = (0.05, 0.1)
+#: Hz. No value comes again before all others were published.
+VALUES = [5.0 + 0.5 * step for step in range(61)]
+
+
+def main() -> None:
+    """Wait until all drives listen, publish, and say when."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('count', type=int)
+    parser.add_argument('names', nargs='+')
+    options = parser.parse_args()
+    rclpy.init()
+    node = rclpy.create_node('bench_publisher')
+    publishers = [
+        node.create_publisher(Float32, f'/{name}/setpoint', QoSProfile(depth=1))
+        for name in options.names
+    ]
+    deadline = time.monotonic() + _PATIENCE
+    while not all(publisher.get_subscription_count() for publisher in publishers):
+        if time.monotonic() > deadline:
+            raise SystemExit('not every drive listens to its set-points')
+        time.sleep(0.05)
+    chance = random.Random()
+    published = []
+    for number in range(options.count):
+        time.sleep(chance.uniform(*_PERIODS))
+        drive = number % len(publishers)
+        message = Float32(data=VALUES[number % len(VALUES)])
+        published.append((time.monotonic(), drive, message.data))
+        publishers[drive].publish(message)
+    time.sleep(1.0)
+    print(json.dumps(published), flush=True)
+    # whoever reads it wants to know what this process has cost
+    signal.pause()
+
+
+if __name__ == '__main__':
+    main()

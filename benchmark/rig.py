@@ -1,0 +1,169 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The processes of a measurement: the simulated line, and whoever drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import processor
+import trace_file
+from trace_file import Frame
+from trace_file import Line
+
+#: A process that has not done by then what it should never will, s.
+PATIENCE = 60.0
+_FOLDER = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Window:
+    """
+    What happened in a while.
+
+    :ivar core: how much of one core the watched process took.
+    :ivar others: how much everybody took who has nothing to do with the measurement.
+    """
+
+    frames: list[Frame]
+    seconds: float
+    core: float
+    others: float
+
+    def figures(self) -> dict[str, float]:
+        """Return what was taken of the processor: % of a core, and ms for each transaction."""
+        count = trace_file.transactions(self.frames)
+        cost = {'cpu': 100 * self.core, 'others': 100 * self.others}
+        if count:
+            cost['cpu_transaction'] = 1e3 * self.core * self.seconds / count
+        return cost
+
+
+class Rig(contextlib.ExitStack):
+    """A simulated line, paced and traced; ends all that it started."""
+
+    def __init__(self, baud_rate: int, drives: int, char_format: str) -> None:
+        super().__init__()
+        folder = self.enter_context(tempfile.TemporaryDirectory(prefix='nfo_sinus_bench_'))
+        self.line = Line(baud_rate)
+        self.drives = drives
+        self.port = str(Path(folder, 'line'))
+        self._trace = Path(folder, 'trace')
+        self._log = Path(folder, 'log')
+        self._processes: list[subprocess.Popen[str]] = []
+        addresses = [f'--address={number}' for number in range(1, drives + 1)]
+        with contextlib.ExitStack() as failing:
+            failing.push(self)
+            simulator = self.start(
+                *(executable('simulator'), '--link', self.port, '--baud', str(baud_rate)),
+                *('--char-format', char_format, '--paced', '--trace', str(self._trace)),
+                *('--boot-time', '0', *addresses),
+            )
+            self.wait_for(lambda: 'serving' in self.log, simulator)
+            failing.pop_all()
+
+    @property
+    def log(self) -> str:
+        """What all processes said."""
+        return self._log.read_text(errors='replace')
+
+    def start(self, *command: str, stdout: int | None = None) -> subprocess.Popen[str]:
+        """Start a process that ends with the rig."""
+        with self._log.open('ab') as log:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log if stdout is None else stdout,
+                stderr=log,
+                text=True,
+                start_new_session=True,
+            )
+        self._processes.append(process)
+        self.callback(_end, process)
+        return process
+
+    def start_script(self, name: str, *arguments: str, **how: int) -> subprocess.Popen[str]:
+        """Start one of the programs beside this one."""
+        return self.start(sys.executable, str(_FOLDER / name), *arguments, **how)
+
+    def watch(self, process: subprocess.Popen[str], seconds: float) -> Window:
+        """Let time pass; return what the line carried and what the process cost meanwhile."""
+        watched_since = self.begin_watch(process)
+        time.sleep(seconds)
+        return watched_since()
+
+    def begin_watch(self, process: subprocess.Popen[str]) -> Callable[[], Window]:
+        """Return what tells later what happened from now on."""
+        start, cost, others = time.monotonic(), processor.of_process(process.pid), self._others()
+
+        def watched() -> Window:
+            now = time.monotonic()
+            if process.poll() is not None:
+                raise RuntimeError(f'a process has ended:\n{self.log}')
+            return Window(
+                trace_file.frames_of(self._trace, start, now),
+                now - start,
+                (processor.of_process(process.pid) - cost) / (now - start),
+                (self._others() - others) / (now - start),
+            )
+
+        return watched
+
+    def _others(self) -> float:
+        return processor.of_all_but([os.getpid(), *(process.pid for process in self._processes)])
+
+    def frames(self) -> list[Frame]:
+        """Return all that the line has carried."""
+        return trace_file.frames_of(self._trace)
+
+    def wait_for(self, condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+        """
+        Wait for what a process should bring about.
+
+        :raises RuntimeError: it ended, or that never came; says what was logged.
+        """
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            if process.poll() is not None or time.monotonic() > deadline:
+                raise RuntimeError(f'it does not start as it should:\n{self.log}')
+            time.sleep(0.05)
+
+
+def executable(name: str) -> str:
+    """Return the path of one of the package's programs."""
+    path = shutil.which(name)
+    if path is None:
+        raise SystemExit(f'there is no {name}: run this by make bench, or by tools/run')
+    return path
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process, gently first."""
+    if process.poll() is None:
+        # SIGINT is ignored by all that a background job starts
+        process.terminate()
+    try:
+        process.wait(20.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,156 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the far end of the line saw: frames, cycles, gaps, and the least time they can take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+import json
+import math
+from pathlib import Path
+import statistics
+import struct
+
+#: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU.
+_BITS = 11
+_READ = 3
+#: Less than this is what floating point makes of a time since the machine started, s.
+_ROUNDING = 1e-7
+
+
+@dataclass(frozen=True)
+class Frame:
+    """
+    One frame as the simulator traced it.
+
+    :ivar first: when its first byte arrived, s of the steady clock.
+    :ivar gap: the silence before it, s; 0 for the first frame.
+    """
+
+    first: float
+    last: float
+    is_request: bool
+    data: bytes
+    gap: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """How fast a line is: what nobody can beat."""
+
+    baud_rate: int
+
+    @property
+    def character(self) -> float:
+        """The time of one character, s."""
+        return _BITS / self.baud_rate
+
+    @property
+    def gap(self) -> float:
+        """The silence that must be before each frame, t3.5, s; fixed above 19200 bit/s."""
+        return 0.00175 if self.baud_rate > 19200 else 3.5 * self.character
+
+    def limit(self, frames: Sequence[Frame]) -> float:
+        """Return the time that frames and the gaps before them take at least, s."""
+        characters = sum(len(frame.data) for frame in frames)
+        return characters * self.character + len(frames) * self.gap
+
+
+def frames_of(path: Path, start: float = 0.0, end: float = float('inf')) -> list[Frame]:
+    """Return the frames whose first byte came between two moments."""
+    # the last line may not be whole yet
+    lines = path.read_text().split('\n')[:-1]
+    frames = [_frame(json.loads(line)) for line in lines]
+    return [frame for frame in frames if start <= frame.first < end]
+
+
+def _frame(entry: dict) -> Frame:
+    if entry['note']:
+        raise RuntimeError(f'a frame on a perfect line was {entry["note"]}: {entry["hex"]}')
+    return Frame(
+        entry['first'],
+        entry['last'],
+        entry['direction'] == 'request',
+        bytes.fromhex(entry['hex']),
+        entry['gap'] or 0.0,
+    )
+
+
+def short_gaps(frames: Sequence[Frame], line: Line) -> int:
+    """Return before how many requests the line was silent for less than t3.5."""
+    # nothing came before the first
+    requests = (frame for frame in frames[1:] if frame.is_request)
+    return sum(frame.gap < line.gap - _ROUNDING for frame in requests)
+
+
+def cycles(frames: Sequence[Frame], line: Line, register: int) -> dict[str, float]:
+    """
+    Return the cycles of all units: from one read of a register to the next, of the same unit.
+
+    :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio.
+    """
+    begins: dict[int, list[int]] = {}
+    for number, frame in enumerate(frames):
+        if frame.is_request and read_register(frame) == register:
+            begins.setdefault(frame.data[0], []).append(number)
+    times, limits = [], []
+    for numbers in begins.values():
+        for begin, end in pairwise(numbers):
+            times.append(frames[end].first - frames[begin].first)
+            limits.append(line.limit(frames[begin:end]))
+    return {
+        'time': 1e3 * statistics.median(times),
+        'p99': 1e3 * percentile(times, 99),
+        'limit': 1e3 * statistics.median(limits),
+        'ratio': statistics.median(a / b for a, b in zip(times, limits, strict=True)),
+        'units': len(begins),
+    }
+
+
+def read_register(frame: Frame) -> int | None:
+    """Return which register a request reads, or ``None`` if it reads none."""
+    _, function, register = struct.unpack('>BBH', frame.data[:4])
+    return register if function == _READ else None
+
+
+def additions(frames: Sequence[Frame], line: Line) -> dict[str, float]:
+    """
+    Return what master and simulator add to the wire time of a transaction (ms, medians).
+
+    The master's share has in it how long the simulator takes to see that something came.
+    """
+    master, simulator = [], []
+    for before, frame in pairwise(frames):
+        if frame.is_request:
+            master.append(frame.gap - line.gap)
+        elif before.is_request:
+            due = before.last + line.gap + len(frame.data) * line.character
+            simulator.append(frame.last - due)
+    return {
+        'master_adds': 1e3 * statistics.median(master),
+        'simulator_adds': 1e3 * statistics.median(simulator),
+    }
+
+
+def transactions(frames: Sequence[Frame]) -> int:
+    """Return how many requests there are."""
+    return sum(frame.is_request for frame in frames)
+
+
+def percentile(values: Sequence[float], percent: float) -> float:
+    """Return the value that so many percent of all do not exceed."""
+    ordered = sorted(values)
+    return ordered[math.ceil(len(ordered) * percent / 100) - 1]

@@ -1,0 +1,146 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the worker of a bus is given to do: coroutines that await transactions, and slots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Coroutine
+from collections.abc import Generator
+from concurrent.futures import Future
+import enum
+from typing import Any
+
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+
+
+class Priority(enum.IntEnum):
+    """How urgent a transaction is; the least goes first."""
+
+    STOP = 0
+    SETPOINT = 1
+    SERVICE = 2
+    POLL = 3
+    TELEMETRY = 4
+    REFRESH = 5
+
+
+class Cancelled(BaseException):
+    """
+    Raised inside a coroutine whose task was cancelled.
+
+    Not an ``Exception``, so that a coroutine that survives every mistake still ends.
+    """
+
+
+class Transfer:
+    """
+    One transaction that a coroutine awaits.
+
+    A read, or a write if ``words`` is given, or whatever ``send`` does.
+    """
+
+    __slots__ = ('address', 'priority', 'send', 'unit', 'words')
+
+    def __init__(
+        self,
+        unit: int,
+        address: Address,
+        priority: Priority,
+        words: Words | None = None,
+        send: Callable[[], Reply] | None = None,
+    ) -> None:
+        self.unit = unit
+        self.address = address
+        self.priority = priority
+        self.words = words
+        self.send = send
+
+    def __await__(self) -> Generator[Transfer, Reply, Reply]:
+        return (yield self)
+
+
+class Pause:
+    """A wait until a moment, or until the task is woken."""
+
+    __slots__ = ('until',)
+
+    def __init__(self, until: float) -> None:
+        self.until = until
+
+    def __await__(self) -> Generator[Pause, None, None]:
+        yield self
+
+
+class Task:
+    """A coroutine on the bus; :attr:`future` has its result."""
+
+    def __init__(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+        self._coroutine = coroutine
+        self.future: Future[Any] = Future()
+        self.cancelled = False
+        #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.
+        self.running = False
+        self.cancel_due = False
+        #: What it waits for.
+        self.awaited: Transfer | Pause | None = None
+        #: Tells timers of earlier pauses from that of the present one.
+        self.pause = 0
+        self.asleep = False
+        #: Tasks that wait for the end of this one.
+        self.joiners: list[Task] = []
+        # nobody may cancel the future behind the worker's back
+        self.future.set_running_or_notify_cancel()
+
+    def step(self, value: Any, error: BaseException | None) -> Transfer | Pause | None:
+        """Run it up to what it awaits next; ``None`` when it has ended."""
+        self.running = True
+        try:
+            if error is not None:
+                awaited = self._coroutine.throw(error)
+            else:
+                awaited = self._coroutine.send(value)
+        except StopIteration as end:
+            self.future.set_result(end.value)
+        except BaseException as failure:
+            self.future.set_exception(failure)
+        else:
+            assert isinstance(awaited, (Transfer, Pause))
+            return awaited
+        finally:
+            self.running = False
+        return None
+
+
+class Slot:
+    """
+    A place for one pending write of which only the latest counts, such as a set-point.
+
+    :param make: called by the worker at the moment of sending; returns what to write now, or
+        ``None`` if there is nothing to write any more.
+    :param done: called by the worker with the error, or ``None`` when the unit took it.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Transfer | None],
+        done: Callable[[Transfer, LinkError | None], None],
+    ) -> None:
+        self.make = make
+        self.done = done
+        self.pending = False

@@ -1,0 +1,275 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Draws a recorded ride: what was asked, what the motor did, and what the drive said to it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MultipleLocator
+from matplotlib.transforms import Transform
+from matplotlib.transforms import blended_transform_factory
+
+from nfo_sinus_driver.node.bag import Curve
+from nfo_sinus_driver.node.bag import Ride
+from nfo_sinus_driver.node.bag import Span
+from nfo_sinus_driver.node.bag import read
+
+#: The picture, inches and dots per inch: 1600 x 1000.
+_SIZE = (16.0, 10.0)
+_DPI = 100
+_LEFT, _RIGHT = 0.075, 0.98
+#: A text is made smaller rather than left out.
+_SPAN_SIZES = (13, 12, 11, 10)
+
+# the colours of Okabe and Ito, which people who do not see red or green tell apart
+_ORANGE = '#E69F00'
+_DARK_ORANGE = '#8F6300'
+_SKY_BLUE = '#56B4E9'
+_GREEN = '#009E73'
+_BLUE = '#0072B2'
+_VERMILION = '#D55E00'
+_PURPLE = '#AA4499'
+_INK = '#222222'
+_SOFT = '#555555'
+_GREY = '#8A8A8A'
+_PALE = '#D9D9D9'
+
+_PHASES = {
+    'standby': (_PALE, _INK),
+    'running': (_GREEN, 'white'),
+    'stopping': (_SKY_BLUE, _INK),
+    'fault': (_VERMILION, 'white'),
+}
+_STYLE = {
+    'font.family': 'DejaVu Sans',
+    'font.size': 13,
+    'text.color': _INK,
+    'axes.labelcolor': _INK,
+    'axes.edgecolor': _GREY,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'xtick.color': _INK,
+    'ytick.color': _INK,
+    'grid.color': '#E6E6E6',
+    'legend.frameon': False,
+}
+#: Between publications that are further apart nothing was asked, s.
+_SILENCE = 0.5
+
+
+def draw(bag: Path, picture: Path) -> None:
+    """Draw what a bag tells of a ride into a PNG file."""
+    ride = read(bag)
+    with matplotlib.rc_context(_STYLE):
+        # no window, and no state that is shared: the figure is drawn for the file alone
+        figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor='white')
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(
+            4, 1, height_ratios=(1.0, 4.2, 2.3, 2.3), hspace=0.16,
+            left=_LEFT, right=_RIGHT, top=0.842, bottom=0.085,
+        )
+        states, frequency, speed, current = (figure.add_subplot(cell) for cell in grid)
+        for axes in (states, frequency, speed, current):
+            axes.set_xlim(-0.2, ride.length + 0.2)
+            axes.xaxis.set_major_locator(MultipleLocator(_step(ride.length)))
+            axes.tick_params(axis='x', labelbottom=axes is current, length=0)
+            _mark(axes, ride)
+        _draw_states(states, ride)
+        _name_calls(states, ride)
+        _draw_frequency(frequency, ride)
+        _draw_quantity(speed, ride.speed, 'motor speed (rpm)', _GREEN)
+        _draw_quantity(current, ride.current, 'output current (A)', _PURPLE, marker='o')
+        current.set_ylim(bottom=0.0)
+        current.set_xlabel('time since the drive was connected (s)', labelpad=8)
+        _name_faults(frequency, ride)
+        figure.align_ylabels([frequency, speed, current])
+        _draw_title(figure, ride, frequency.get_legend_handles_labels()[0])
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(picture, dpi=_DPI)
+
+
+def _draw_title(figure: Figure, ride: Ride, lines: list[Artist]) -> None:
+    facts = [ride.remarks.get('drive', ''), *ride.identity, f'{ride.began:%d %B %Y, %H:%M}']
+    figure.text(_LEFT, 0.944, ride.remarks.get('title', 'A ride'), size=25, weight='bold')
+    figure.text(_LEFT, 0.904, '   ·   '.join(filter(None, facts)), size=14, color=_SOFT)
+    figure.text(
+        _RIGHT, 0.018, f'drawn from the bag {ride.source}', size=11, color=_SOFT, ha='right'
+    )
+    phases = [Patch(color=colour, label=phase) for phase, (colour, _) in _PHASES.items()]
+    for y, handles in ((0.976, phases), (0.948, lines)):
+        figure.legend(
+            handles=handles, loc='upper right', bbox_to_anchor=(_RIGHT, y), ncols=len(handles),
+            fontsize=12, borderaxespad=0.0, borderpad=0.0, handlelength=1.8, columnspacing=1.4,
+        )
+
+
+# --- panels -----------------------------------------------------------------------------------
+
+
+def _draw_states(axes: Axes, ride: Ride) -> None:
+    axes.set_ylim(0.0, 2.0)
+    axes.set_yticks([0.48, 1.52], ['display', 'motor'])
+    axes.tick_params(axis='y', length=0)
+    axes.spines[:].set_visible(False)
+    for span in ride.phases:
+        colour, ink = _PHASES[span.what]
+        _draw_span(axes, span, 1.04, colour, ink, bold=True)
+    faulty = {span.what for span in ride.faults}
+    for span in ride.texts:
+        fault = span.what in faulty
+        _draw_span(axes, span, 0.0, '#F9DCCB' if fault else '#F0F0F0', _INK, bold=fault)
+
+
+def _draw_span(
+    axes: Axes, span: Span, bottom: float, colour: str, ink: str, *, bold: bool
+) -> None:
+    length = span.end - span.begin
+    axes.broken_barh(
+        [(span.begin, length)], (bottom, 0.96),
+        facecolors=colour, edgecolors='white', linewidth=1.5, zorder=6,
+    )
+    text = axes.text(
+        span.begin + length / 2, bottom + 0.47, span.what, ha='center', va='center_baseline',
+        color=ink, weight='bold' if bold else 'normal', zorder=7,
+    )
+    for size in _SPAN_SIZES:
+        text.set_size(size)
+        if _width(text) < 0.96 * length:
+            return
+    # the colour has to do
+    text.remove()
+
+
+def _draw_frequency(axes: Axes, ride: Ride) -> None:
+    followed, ignored = Curve(), Curve()
+    last = -math.inf
+    for time, value in zip(ride.setpoint.times, ride.setpoint.values, strict=True):
+        if time - last > _SILENCE:
+            followed.add(last, math.nan)
+            ignored.add(last, math.nan)
+        heard = any(span.begin <= time <= span.end for span in ride.enabled)
+        followed.add(time, value if heard else math.nan)
+        ignored.add(time, math.nan if heard else value)
+        last = time
+    axes.step(
+        followed.times, followed.values, where='post', color=_ORANGE, linewidth=3.2,
+        label='set-point', zorder=3,
+    )
+    axes.step(
+        ignored.times, ignored.values, where='post', color=_ORANGE, linewidth=2.2,
+        linestyle=(0, (1, 1.5)), label='ignored: not enabled', zorder=3,
+    )
+    axes.plot(
+        ride.frequency.times, ride.frequency.values, color=_BLUE, linewidth=2.4,
+        label='actual frequency', zorder=4,
+    )
+    axes.set_ylabel('frequency (Hz)')
+    _finish(axes)
+    # room for names above all that is drawn
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.1 * (high - low))
+    _name_setpoints(axes, followed)
+
+
+def _draw_quantity(axes: Axes, curve: Curve, name: str, colour: str, marker: str = '') -> None:
+    axes.plot(
+        curve.times, curve.values, color=colour, linewidth=2.2, marker=marker, markersize=4.5,
+        zorder=4,
+    )
+    axes.fill_between(curve.times, curve.values, color=colour, alpha=0.12, linewidth=0, zorder=2)
+    axes.set_ylabel(name)
+    _finish(axes)
+
+
+def _finish(axes: Axes) -> None:
+    axes.margins(y=0.14)
+    axes.axhline(0.0, color=_GREY, linewidth=1.0, zorder=2)
+    axes.grid()
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
+
+
+# --- marks ------------------------------------------------------------------------------------
+
+
+def _mark(axes: Axes, ride: Ride) -> None:
+    """Draw calls and faults through a panel."""
+    for time, _ in ride.calls:
+        axes.axvline(time, color=_INK, linewidth=1.0, linestyle=(0, (4, 4)), zorder=2)
+    for span in ride.faults:
+        axes.axvspan(span.begin, span.end, color=_VERMILION, alpha=0.10, linewidth=0, zorder=0)
+        axes.axvline(span.begin, color=_VERMILION, linewidth=2.2, zorder=5)
+
+
+def _name_calls(axes: Axes, ride: Ride) -> None:
+    """Name the calls above the panel, one above the other where they would overlap."""
+    ends: list[float] = []
+    for time, name in ride.calls:
+        text = axes.text(
+            time, 0.0, f'▼ {name}', transform=_at_height(axes), ha='left', va='bottom', size=13
+        )
+        row = next((row for row, end in enumerate(ends) if end < time), len(ends))
+        ends[row : row + 1] = [time + _width(text)]
+        text.set_y(1.06 + 0.3 * row)
+
+
+def _name_setpoints(axes: Axes, followed: Curve) -> None:
+    named = math.nan
+    for time, value in zip(followed.times, followed.values, strict=True):
+        # NaN, where nothing is followed, is neither near nor far
+        if value == value and value != named:
+            axes.annotate(
+                f'{value:+g} Hz'.replace('-', '\N{MINUS SIGN}'), (time, value),
+                (4, 5 if value >= 0 else -5), textcoords='offset points', ha='left',
+                va='bottom' if value >= 0 else 'top', color=_DARK_ORANGE, weight='bold', zorder=6,
+            )
+            named = value
+
+
+def _name_faults(axes: Axes, ride: Ride) -> None:
+    for span in ride.faults:
+        offset = {'textcoords': 'offset points', 'xycoords': _at_height(axes), 'zorder': 6}
+        where = (span.begin, 0.985)
+        axes.annotate(
+            span.what, where, (8, 0), va='top', size=18, weight='bold', color=_VERMILION, **offset
+        )
+        told = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
+        axes.annotate(told, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
+
+
+def _at_height(axes: Axes) -> Transform:
+    """Return coordinates of time and of the part of a panel's height."""
+    return blended_transform_factory(axes.transData, axes.transAxes)
+
+
+def _width(text: Text) -> float:
+    """Return how wide a text is, in units of the axis of time."""
+    box = text.get_window_extent().transformed(text.axes.transData.inverted())
+    return float(box.width)
+
+
+def _step(length: float) -> float:
+    """Return a round distance between ticks that gives about ten of them."""
+    power = 10.0 ** math.floor(math.log10(length / 10))
+    return next(power * step for step in (1, 2, 5, 10) if length / (power * step) <= 13)

@@ -1,0 +1,183 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Records a ride: what its topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import time
+from typing import TYPE_CHECKING
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from nfo_sinus_msgs.msg import BusStatistics
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import Telemetry
+from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+from std_msgs.msg import Float32
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.node.definitions import definition_of
+from nfo_sinus_driver.node.definitions import hash_of
+from nfo_sinus_driver.node.definitions import name_of
+from nfo_sinus_driver.node.line import LATCHED
+from nfo_sinus_driver.node.line import NEWEST
+from nfo_sinus_driver.node.line import RELIABLE
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+    from rosbags.interfaces import Qos
+
+_DRIVE = '/nfo_sinus'
+_EVENT = '_service_event'
+_ROSOUT = QoSProfile(
+    depth=1000,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+#: What is recorded: topic, type, and the quality of service that its publishers offer.
+TOPICS = (
+    (f'{_DRIVE}/setpoint', Float32, NEWEST),
+    (f'{_DRIVE}/status', DriveStatus, RELIABLE),
+    (f'{_DRIVE}/inv_st', InvSt, LATCHED),
+    (f'{_DRIVE}/actual_speed', Float32, RELIABLE),
+    (f'{_DRIVE}/actual_frequency', Float32, RELIABLE),
+    (f'{_DRIVE}/telemetry', Telemetry, RELIABLE),
+    (f'{_DRIVE}/enable/{_EVENT}', SetBool.Event, RELIABLE),
+    (f'{_DRIVE}/stop/{_EVENT}', Trigger.Event, RELIABLE),
+    (f'{_DRIVE}/fault_ack/{_EVENT}', Trigger.Event, RELIABLE),
+    ('/nfo_sinus_bus/statistics', BusStatistics, RELIABLE),
+    ('/diagnostics', DiagnosticArray, RELIABLE),
+    ('/rosout', Log, _ROSOUT),
+)
+#: How many messages may wait while the machine is busy with something else.
+_DEPTH = 1000
+#: How rosbag2 writes "for ever", s and ns.
+_FOR_EVER = (9223372036, 854775807)
+
+
+class RecordingError(Exception):
+    """What was to be recorded was not."""
+
+
+class Recorder(Node):
+    """
+    Writes what it hears into a bag, which is whole once the context is left.
+
+    By then nothing may be heard any more.
+
+    :param folder: the bag, a folder that does not exist.
+    :param remarks: what the bag is to say of itself.
+    :raises RecordingError: the bag cannot be made or, at the end, is not whole.
+    """
+
+    def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
+        # here and not above: a ride is possible where there is only ROS
+        from rosbags.rosbag2 import StoragePlugin
+        from rosbags.rosbag2 import Writer
+
+        super().__init__('demo_recorder', enable_rosout=False)
+        self._error: Exception | None = None
+        self._count = 0
+        self._writer = Writer(
+            folder, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP
+        )
+        for key, value in remarks.items():
+            self._writer.set_custom_data(key, value)
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise RecordingError(f'no bag can be written to {folder}: {error}') from error
+        for topic, type_, qos in TOPICS:
+            self._record(topic, type_, qos)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *cause: object) -> None:
+        try:
+            self._writer.close()
+        except OSError as error:
+            self._error = self._error or error
+        self.destroy_node()
+        # a ride that failed has more to tell than its bag
+        if cause[0] is None:
+            self._judge()
+
+    def _judge(self) -> None:
+        if self._error is not None:
+            raise RecordingError(f'the bag is not whole: {self._error}')
+        if not self._count:
+            raise RecordingError('the bag is empty: nothing was heard')
+
+    def _record(self, topic: str, type_: type, qos: QoSProfile) -> None:
+        name = name_of(type_)
+        connection = self._writer.add_connection(
+            topic,
+            name,
+            msgdef=definition_of(name),
+            rihs01=hash_of(name),
+            offered_qos_profiles=[_as_recorded(qos)],
+        )
+        latest = 0
+
+        def write(data: bytes, info: dict[str, Any]) -> None:
+            nonlocal latest
+            # some middlewares do not tell when a message came; and the system's clock may be set
+            # back, but a bag's must not
+            latest = max(latest, info.get('received_timestamp') or time.time_ns())
+            self._write(connection, latest, data)
+
+        deep = QoSProfile(depth=_DEPTH, reliability=qos.reliability, durability=qos.durability)
+        self.create_subscription(type_, topic, write, deep, raw=True)
+
+    def _write(self, connection: Connection, stamp: int, data: bytes) -> None:
+        if self._error is not None:
+            return
+        try:
+            self._writer.write(connection, stamp, data)
+            self._count += 1
+        except OSError as error:
+            # the ride goes on, for it must come to its stop; the end tells
+            self._error = error
+
+
+def _as_recorded(qos: QoSProfile) -> Qos:
+    """Return a profile as rosbag2 finds it when it asks for what a publisher offers."""
+    from rosbags.interfaces import Qos
+    from rosbags.interfaces import QosDurability
+    from rosbags.interfaces import QosHistory
+    from rosbags.interfaces import QosLiveliness
+    from rosbags.interfaces import QosReliability
+    from rosbags.interfaces import QosTime
+
+    for_ever = QosTime(*_FOR_EVER)
+    return Qos(
+        history=QosHistory[qos.history.name],
+        depth=qos.depth,
+        reliability=QosReliability[qos.reliability.name],
+        durability=QosDurability[qos.durability.name],
+        deadline=for_ever,
+        lifespan=for_ever,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=for_ever,
+        avoid_ros_namespace_conventions=False,
+    )

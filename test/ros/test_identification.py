@@ -1,0 +1,150 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who a drive says it is, in log and diagnostics; and what it costs where it does not tell."""
+
+from __future__ import annotations
+
+import re
+import signal
+
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from diagnostic_msgs.msg import DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+import pytest
+
+_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
+_SERIAL = '0123456789ABCDEF'
+_DEVICE, _SLAVE_ID = '012b0e0200', '0111'
+_STOP = '010602980000'
+
+
+def _requests(bench: Bench) -> list[str]:
+    return [frame['hex'] for frame in bench.frames() if frame['direction'] == 'request']
+
+
+def _asked(bench: Bench) -> list[str]:
+    """The requests that ask who the drive is, in order."""
+    identifying = (_DEVICE, _SLAVE_ID)
+    return [
+        start for hex_ in _requests(bench) for start in identifying if hex_.startswith(start)
+    ]
+
+
+def _diagnosis(client: Client, name: str = 'nfo_sinus') -> DiagnosticStatus:
+    """Return the newest diagnosis of a connected drive."""
+
+    def seen() -> DiagnosticStatus | None:
+        for message in reversed(client.messages['diagnostics']):
+            for status in message.status:
+                if status.name == f'{name}: drive' and status.level == DiagnosticStatus.OK:
+                    return status
+        return None
+
+    diagnosis: DiagnosticStatus = wait_until(seen, 'diagnostics of a connected drive')
+    return diagnosis
+
+
+def _values(diagnosis: DiagnosticStatus) -> dict[str, str]:
+    return {pair.key: pair.value for pair in diagnosis.values}
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'monitor'])
+def test_log_and_diagnostics_name_the_drive(bench: Bench, method: str) -> None:
+    drive = bench.simulator('--serial', _SERIAL)
+    driver = bench.driver('-p', f'control_method:={method}')
+    client = bench.client().connected()
+    assert (
+        f'connected: NFO Sinus 1.50/400, firmware 4.38 / 4018, serial {_SERIAL}\n' in driver.text
+    )
+    diagnosis = _diagnosis(client)
+    assert diagnosis.hardware_id == _SERIAL
+    values = _values(diagnosis)
+    assert values['model'] == 'NFO Sinus 1.50/400'
+    assert values['serial number'] == _SERIAL
+    assert values['firmware'] == '4.38 / 4018'
+    assert _asked(bench) == [_DEVICE, _SLAVE_ID]
+    assert not drive.state()['command_writes']
+
+
+def test_it_is_asked_once_for_each_connection(bench: Bench) -> None:
+    drive = bench.simulator('--serial', _SERIAL)
+    driver = bench.driver()
+    client = bench.client().connected()
+    drive.inject('silence', 3.0)
+    client.wait_for('status', lambda status: not status.connected, 'it is lost')
+    client.wait_for('status', lambda status: status.connected, 'it is back')
+    wait_until(lambda: driver.text.count(f'serial {_SERIAL}') == 2, 'it is named again')
+    assert _asked(bench) == 2 * [_DEVICE, _SLAVE_ID]
+    assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+    assert client.change_state(Transition.TRANSITION_CLEANUP)
+    assert client.change_state(Transition.TRANSITION_CONFIGURE)
+    assert _asked(bench) == 3 * [_DEVICE, _SLAVE_ID]
+
+
+@pytest.mark.parametrize('treated', ['refused', 'silent'])
+def test_a_drive_that_does_not_tell_connects_and_runs(bench: Bench, treated: str) -> None:
+    drive = bench.simulator('--newer-functions', treated, *_QUICK)
+    driver = bench.driver()
+    client = bench.client().connected()
+    (line,) = re.findall(r'connected: .*', driver.text)
+    assert line == 'connected: sinus_g2, firmware 4.38 / 4018'
+    diagnosis = _diagnosis(client)
+    assert diagnosis.hardware_id == ''
+    values = _values(diagnosis)
+    assert (values['model'], values['serial number']) == ('', '')
+    assert values['firmware'] == '4.38 / 4018'
+    with client.run_at(20.0):
+        assert drive.state()['driven']
+    # no retries, and a refusal is not complained of
+    assert _asked(bench) == [_DEVICE, _SLAVE_ID]
+    assert client.latest('statistics').retries == 0
+    assert 'ERROR' not in driver.text
+
+
+def test_a_motor_found_running_is_stopped_before_anybody_asks_who_it_is(bench: Bench) -> None:
+    # with a drive that keeps silence to such questions, so that a stop behind them would be late
+    drive = bench.simulator('--newer-functions', 'silent', *_QUICK)
+    driver = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGKILL)
+        driver.wait()
+        assert drive.state()['driven'], 'the drive runs on, and that makes this a test'
+        before = len(_requests(bench))
+        bench.driver()
+        wait_until(lambda: 'connected: sinus_g2' in bench.log, 'a new driver is connected')
+    requests = _requests(bench)[before:]
+    stops = [number for number, hex_ in enumerate(requests) if hex_.startswith(_STOP)]
+    questions = [number for number, hex_ in enumerate(requests) if hex_.startswith(_DEVICE)]
+    assert len(questions) == 1
+    assert stops[0] < questions[0]
+    assert drive.state()['scmd'] == 0
+
+
+def test_two_drives_are_told_apart(bench: Bench) -> None:
+    bench.simulator('--address', '1', '--address', '2', '--serial', 'LEFT', '--serial', 'RIGHT')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}\n'
+        'left: {ros__parameters: {address: 1}}\n'
+        'right: {ros__parameters: {address: 2}}\n'
+    )
+    bench.driver('--params-file', str(parameters))
+    left = bench.client('/left').connected()
+    right = bench.client('/right').connected()
+    assert _diagnosis(left, 'left').hardware_id == 'LEFT'
+    assert _diagnosis(right, 'right').hardware_id == 'RIGHT'

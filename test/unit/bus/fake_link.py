@@ -1,0 +1,124 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A link made of plain Python, and waiting without luck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import threading
+import time
+from typing import NamedTuple
+
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+
+#: No honest wait takes this long, on any machine, s.
+PATIENCE = 30.0
+
+
+def wait_until(condition: Callable[[], object], timeout: float = PATIENCE) -> None:
+    """Wait until a condition holds; fail when it does not in time."""
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline, 'it never came true'
+        time.sleep(0.001)
+
+
+def register(number: int, words: int = 1) -> Address:
+    """An address that tests can tell by its number."""
+    return Address((number,), words)
+
+
+class Done(NamedTuple):
+    """One transaction that the link saw; ``words`` is ``None`` for a read."""
+
+    unit: int
+    number: int
+    words: Words | None
+
+
+class FakeLink:
+    """
+    A link that notes what it is asked and does as it is told.
+
+    :ivar done: every transaction, in order.
+    :ivar answer: called with each; returns the words, or raises.
+    :ivar opening: called when the port is opened; may raise.
+    """
+
+    def __init__(self) -> None:
+        self.done: list[Done] = []
+        self.answer: Callable[[Done], Words] = lambda done: (done.number,)
+        self.opening: Callable[[], None] = lambda: None
+        self.closing: Callable[[], None] = lambda: None
+        self.opened = 0
+        self.closed = 0
+        self.probes: dict[int, tuple[Address, ...]] = {}
+        self._condition = threading.Condition()
+        self._hold = self._holds = False
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep the next transaction on the line; inside, it has begun as soon as asked for."""
+        with self._condition:
+            self._hold = True
+        try:
+            yield
+        finally:
+            with self._condition:
+                self._hold = False
+                self._condition.notify_all()
+
+    def wait_until_held(self) -> None:
+        """Wait until a transaction is being kept."""
+        with self._condition:
+            assert self._condition.wait_for(lambda: self._holds, PATIENCE)
+
+    @property
+    def numbers(self) -> list[int]:
+        """The registers asked for, in order."""
+        return [done.number for done in self.done]
+
+    def open(self) -> None:
+        self.opening()
+        self.opened += 1
+
+    def close(self) -> None:
+        self.closed += 1
+        self.closing()
+
+    def read(self, unit: int, address: Address) -> Reply:
+        return self._transact(Done(unit, address.numbers[0], None))
+
+    def write(self, unit: int, address: Address, words: Words) -> Reply:
+        return self._transact(Done(unit, address.numbers[0], words))
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        self.probes[unit] = tuple(probes)
+
+    def _transact(self, done: Done) -> Reply:
+        with self._condition:
+            self.done.append(done)
+            while self._hold:
+                self._holds = True
+                self._condition.notify_all()
+                assert self._condition.wait(PATIENCE)
+            self._holds = False
+        return Reply(self.answer(done), time.monotonic())

@@ -1,0 +1,148 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Asking a unit who it is: one transaction at a time, and whatever fails stays unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+
+from fake_link import PATIENCE
+from fake_link import Done
+from fake_link import FakeLink
+from fake_link import register
+import pytest
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+
+_UNIT = 1
+_FIRST, _SECOND, _STOP = 43, 17, 99
+
+
+class _Inquiry:
+    """Two questions, each of which is a read as far as the fake link knows."""
+
+    def __init__(self, link: FakeLink, unit: int) -> None:
+        self._link = link
+        self._unit = unit
+        self._left = [_FIRST, _SECOND]
+        self.found = Identification()
+
+    @property
+    def done(self) -> bool:
+        return not self._left
+
+    def ask(self) -> Reply:
+        number = self._left.pop(0)
+        try:
+            reply = self._link.read(self._unit, register(number))
+        except NotReady:
+            self._left.insert(0, number)
+            raise
+        self.found = Identification(vendor=f'{self.found.vendor}{number}')
+        return reply
+
+
+class _Link(FakeLink):
+    def identify(self, unit: int) -> _Inquiry:
+        return _Inquiry(self, unit)
+
+
+@pytest.fixture
+def link() -> _Link:
+    return _Link()
+
+
+@pytest.fixture
+def bus(link: _Link) -> Iterator[Bus]:
+    bus = Bus(link)
+    bus.start()
+    yield bus
+    bus.close()
+
+
+def _failing(error: Exception, *numbers: int) -> Callable[[Done], Words]:
+    def answer(done: Done) -> Words:
+        if done.number in numbers:
+            raise error
+        return (done.number,)
+
+    return answer
+
+
+def test_each_question_is_asked_once(link: _Link, bus: Bus) -> None:
+    found = bus.run(bus.identify(_UNIT, Priority.SERVICE)).result(PATIENCE)
+    assert found == Identification(vendor='4317')
+    assert link.numbers == [_FIRST, _SECOND]
+    assert bus.statistics().transactions == 2
+
+
+def test_a_stop_goes_between_two_questions(link: _Link, bus: Bus) -> None:
+    async def stop() -> None:
+        await bus.write(_UNIT, register(_STOP), (0,), Priority.STOP)
+
+    with link.held():
+        inquiry = bus.run(bus.identify(_UNIT, Priority.SERVICE))
+        link.wait_until_held()
+        stopping = bus.run(stop())
+    stopping.result(PATIENCE)
+    inquiry.result(PATIENCE)
+    assert link.numbers == [_FIRST, _STOP, _SECOND]
+
+
+@pytest.mark.parametrize(
+    'error', [Refused(1), NoAnswer('nobody'), DamagedAnswer('noise'), LinkError('a mistake')]
+)
+def test_what_fails_stays_unknown(link: _Link, bus: Bus, error: LinkError) -> None:
+    link.answer = _failing(error, _FIRST)
+    found = bus.run(bus.identify(_UNIT, Priority.SERVICE)).result(PATIENCE)
+    assert found == Identification(vendor='17')
+    link.answer = _failing(error, _FIRST, _SECOND)
+    found = bus.run(bus.identify(_UNIT, Priority.SERVICE)).result(PATIENCE)
+    assert found == Identification()
+    assert link.numbers == 2 * [_FIRST, _SECOND], 'nothing is asked twice'
+    assert bus.statistics().retries == 0
+
+
+def test_what_cannot_be_asked_yet_is_asked_later(link: _Link, bus: Bus) -> None:
+    refusals = iter([NotReady(0.0), NotReady(0.0)])
+
+    def answer(done: Done) -> Words:
+        error = next(refusals, None)
+        if error is not None:
+            raise error
+        return (done.number,)
+
+    link.answer = answer
+    found = bus.run(bus.identify(_UNIT, Priority.SERVICE)).result(PATIENCE)
+    assert found == Identification(vendor='4317')
+    assert link.numbers == [_FIRST, _FIRST, _FIRST, _SECOND]
+
+
+def test_a_lost_port_ends_it(link: _Link, bus: Bus) -> None:
+    link.answer = _failing(PortError('gone'), _FIRST)
+    future = bus.run(bus.identify(_UNIT, Priority.SERVICE))
+    assert isinstance(future.exception(PATIENCE), PortError)
+    assert link.numbers == [_FIRST]

@@ -1,0 +1,59 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nobody who asks for much keeps those from the line who ask for little."""
+
+from __future__ import annotations
+
+from fake_link import Done
+from fake_link import FakeLink
+from fake_link import register
+from fake_link import wait_until
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Slot
+from nfo_sinus_driver.bus import Transfer
+
+_SETPOINT = 50
+_POLL = 7
+_ENOUGH = 400
+
+
+def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None:
+    link = FakeLink()
+    bus = Bus(link)
+
+    def write() -> Transfer:
+        # wanted again before it is written: somebody publishes faster than the line can carry
+        for slot in slots:
+            bus.request(slot)
+        return Transfer(1, register(_SETPOINT), Priority.SETPOINT, (1,))
+
+    slots = [Slot(write, lambda transfer, error: None) for _ in range(8)]
+
+    async def poll() -> None:
+        while True:
+            await bus.read(1, register(_POLL), Priority.POLL)
+
+    bus.start()
+    polling = bus.run(poll())
+    bus.request(slots[0])
+    wait_until(lambda: len(link.done) > 2 * _ENOUGH, timeout=60.0)
+    bus.close()
+    assert polling.done()
+    seen: list[Done] = link.done[_ENOUGH:]
+    polls = sum(done.number == _POLL for done in seen)
+    writes = sum(done.number == _SETPOINT for done in seen)
+    assert abs(polls - writes) <= 2

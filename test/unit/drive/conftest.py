@@ -1,0 +1,76 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The rig of the drive's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from drive_rig import MakeRig
+from drive_rig import Rig
+import pytest
+
+from nfo_sinus_driver import bus as bus_module
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import drive as drive_module
+from nfo_sinus_driver.drive import motion
+
+
+@pytest.fixture
+def make_rig(tmp_path: Path) -> Iterator[MakeRig]:
+    """Makes a rig, started; at the end the laws are judged by what was on the line."""
+    with contextlib.ExitStack() as stack:
+
+        def make(
+            *,
+            parameters: dict[str, Any] | None = None,
+            response_timeout: float = 2.0,
+            run_input: bool = True,
+            boot_time: float = 0.2,
+            link: str | None = None,
+            **settings: Any,
+        ) -> Rig:
+            rig = Rig(
+                tmp_path / 'trace',
+                DriveSettings(**settings),
+                parameters or {},
+                response_timeout,
+                run_input=run_input,
+                boot_time=boot_time,
+                link=link,
+            )
+            rig.start()
+            stack.callback(rig.stop)
+            return rig
+
+        yield make
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the driver try again soon, where it is not tested how long it waits."""
+    monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.05)
+    monkeypatch.setattr(drive_module, '_RECONNECT_PERIOD', 0.1)
+    monkeypatch.setattr(motion, '_LOST_RETRY_PERIOD', 0.1)
+
+
+@pytest.fixture
+def rig(make_rig: MakeRig) -> Rig:
+    """A rig as most tests need it."""
+    return make_rig()

@@ -1,0 +1,289 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A drive on a bus, with the simulated one at the far end, and the laws of the house on top."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import dataclasses
+import json
+import math
+from pathlib import Path
+import threading
+import time
+from typing import Any
+
+import pytest
+from support import trace_laws
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import LineSettings
+from nfo_sinus_driver.link import Link
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.simulator import Simulator
+
+#: No honest wait takes this long, on any machine, s.
+PATIENCE = 30.0
+BAUD = 57600
+ACKNOWLEDGES = 'reads the status that acknowledges'
+SCMD = 0x298
+MODE = 0x294
+RUN = 0x101
+#: Fast ramps: nobody wants to wait for a motor.
+QUICK = {'control.accel': 0.2, 'control.retard': 0.2}
+
+
+def wait_until(condition: Callable[[], object], timeout: float = PATIENCE) -> None:
+    """Wait until a condition holds; fail when it does not in time."""
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline, 'it never came true'
+        time.sleep(0.002)
+
+
+class Notes:
+    """A listener that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.snapshots: list[Snapshot] = []
+        self.telemetry: list[Telemetry] = []
+        self.events: list[tuple[Severity, str]] = []
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        self.snapshots.append(snapshot)
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        self.telemetry.append(telemetry)
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        self.events.append((severity, text))
+
+    def told(self, part: str, severity: Severity | None = None) -> bool:
+        """Whether an event says this."""
+        return any(part in text for grave, text in self.events if severity in (None, grave))
+
+
+class Tap:
+    """A link with somebody who sees every transaction just before it is sent."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self.before: Callable[[int, Words | None], None] = lambda register, words: None
+        self.open = link.open
+        self.close = link.close
+        self.use_probes = link.use_probes
+        self.identify = link.identify
+
+    def read(self, unit: int, address: Address) -> Reply:
+        self.before(address.numbers[0], None)
+        return self._link.read(unit, address)
+
+    def write(self, unit: int, address: Address, words: Words) -> Reply:
+        self.before(address.numbers[0], words)
+        return self._link.write(unit, address, words)
+
+
+class Rig:
+    """
+    A simulated drive, a bus and a drive on it.
+
+    :ivar far: the simulated drive; hold ``simulator.lock`` to touch it.
+    :ivar acknowledged: how often the test itself has a fault acknowledged.
+    """
+
+    def __init__(
+        self,
+        trace: Path,
+        settings: DriveSettings,
+        parameters: dict[str, Any],
+        response_timeout: float,
+        **options: Any,
+    ) -> None:
+        self._trace = trace
+        options.setdefault('boot_time', 0.2)
+        self.simulator = Simulator(
+            baud=BAUD, trace=str(trace), settings={**QUICK, **parameters}, **options
+        )
+        self.line = LineSettings(baud_rate=BAUD, response_timeout=response_timeout)
+        self._link = open_link('modbus_rtu', self.simulator.port, self.line)
+        self.tap = Tap(self._link)
+        self.notes = Notes()
+        self.bus = Bus(self.tap)
+        self.drive = Drive(self.bus, settings, self.notes)
+        self.acknowledged = 0
+        self._publishing = threading.Event()
+        self._publisher: threading.Thread | None = None
+        self.published = 0
+
+    def start(self) -> None:
+        self.simulator.start()
+        self.bus.start()
+
+    def stop(self) -> None:
+        self.stop_publishing()
+        self.bus.close()
+        assert not self.bus.alive
+        assert self.simulator.failure is None
+        self.simulator.stop()
+        self.check_laws()
+
+    def check_laws(self) -> None:
+        """Judge everything that was on the line, but for its times: the machine may be slow."""
+        found = trace_laws.violations(self.trace(), -math.inf)
+        acknowledged = [complaint for complaint in found if ACKNOWLEDGES in complaint]
+        others = [complaint for complaint in found if ACKNOWLEDGES not in complaint]
+        assert not others, others
+        assert len(acknowledged) <= self.acknowledged, acknowledged
+
+    def trace(self) -> list[dict[str, Any]]:
+        """Every frame on the line so far, as the simulator saw it."""
+        lines = self._trace.read_text(encoding='utf-8').splitlines(keepends=True)
+        return [json.loads(line) for line in lines if line.endswith('\n')]
+
+    def writes(self, register: int) -> list[int]:
+        """What was written to a register of one word, in order."""
+        requests = [frame for frame in self.trace() if frame['direction'] == 'request']
+        data = [bytes.fromhex(frame['hex']) for frame in requests]
+        return [
+            int.from_bytes(frame[4:6], 'big')
+            for frame in data
+            if frame[1] == 6 and int.from_bytes(frame[2:4], 'big') == register
+        ]
+
+    def set_response_timeout(self, seconds: float) -> None:
+        """
+        Let the driver wait so long for an answer from now on.
+
+        Short times are only for what will not be answered: the machine may be slow.
+        """
+        done = threading.Event()
+
+        def change() -> None:
+            self._link._settings = dataclasses.replace(self.line, response_timeout=seconds)
+            done.set()
+
+        self.bus.call(change)
+        assert done.wait(PATIENCE)
+
+    # --- the driver's side ---
+
+    def connect(self) -> str:
+        """Connect and activate."""
+        identity = self.drive.connect().result(PATIENCE)
+        self.drive.activate()
+        return identity
+
+    def enable(self) -> str:
+        return self.drive.enable().result(PATIENCE)
+
+    def refused(self, future: Any) -> str:
+        """The message with which a command fails."""
+        with pytest.raises(DriveError) as error:
+            future.result(PATIENCE)
+        return str(error.value)
+
+    def answer(self, future: Any) -> str:
+        """What a command answers, done or not."""
+        try:
+            return str(future.result(PATIENCE))
+        except DriveError as error:
+            return str(error)
+
+    def publish(self, value: float, period: float = 0.005) -> None:
+        """Send a set-point again and again, as a program of a user does."""
+        self.stop_publishing()
+        self._publishing.set()
+
+        def work() -> None:
+            while self._publishing.is_set():
+                self.drive.set_setpoint(value)
+                self.published += 1
+                time.sleep(period)
+
+        self._publisher = threading.Thread(target=work, daemon=True)
+        self._publisher.start()
+
+    def stop_publishing(self) -> None:
+        self._publishing.clear()
+        if self._publisher is not None:
+            self._publisher.join()
+            self._publisher = None
+
+    def next_snapshots(self, count: int = 3) -> None:
+        """Wait for some more polls."""
+        before = len(self.notes.snapshots)
+        wait_until(lambda: len(self.notes.snapshots) >= before + count)
+
+    # --- the drive's side ---
+
+    @property
+    def far(self) -> SimulatedDrive:
+        return self.simulator.drives[1]
+
+    def skip(self, seconds: float) -> None:
+        """Let time pass in the drive, at once, in which nobody speaks to it."""
+        with self.simulator.lock:
+            self.far.advance(seconds)
+            assert self.far._origin is not None
+            self.far._origin -= seconds
+
+    def boot(self) -> None:
+        """End the silence of a drive that was switched off and on."""
+        with self.simulator.lock:
+            assert not self.far.listening
+            self.far._boot_left = 0.01
+        wait_until(lambda: self.far.listening)
+
+    def turn(self, frequency: float = 20.0) -> None:
+        """Connect, enable and turn, with a program that keeps on sending the set-point."""
+        self.connect()
+        self.enable()
+        self.publish(frequency)
+        self.wait_for_frequency(frequency)
+
+    def wait_for_frequency(self, frequency: float) -> None:
+        wait_until(lambda: abs(self.far.motor.frequency - frequency) < 0.2)
+
+    def wait_until_still(self) -> None:
+        """Wait until the output stage is off."""
+        wait_until(lambda: not self.far.motor.driven)
+
+    def assert_stays_still(self) -> None:
+        """Nothing turns although set-points keep arriving, and nobody tells it to."""
+        self.wait_until_still()
+        assert self._publisher is not None
+        runs = self.writes(SCMD).count(RUN)
+        published, polls = self.published, len(self.notes.snapshots)
+        wait_until(
+            lambda: self.far.motor.driven
+            or (self.published >= published + 20 and len(self.notes.snapshots) >= polls + 5)
+        )
+        assert not self.far.motor.driven
+        assert not self.drive.armed
+        assert self.writes(SCMD).count(RUN) == runs
+
+
+MakeRig = Callable[..., Rig]

@@ -1,0 +1,369 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The documentation: everything public stands in it, and what it names exists."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / 'nfo_sinus_driver'
+INTERFACE = ROOT / 'docs' / 'interface.md'
+SIMULATOR = ROOT / 'docs' / 'simulator.md'
+MESSAGES = ROOT / 'docs' / 'messages.md'
+DEVELOPMENT = ROOT / 'docs' / 'development.md'
+PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md')))
+CONFIGS = sorted((ROOT / 'config').glob('*.yaml'))
+LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
+#: Arguments of remapping that look like parameters.
+NO_PARAMETERS = {'__node', '__ns'}
+
+
+# --- what is public -------------------------------------------------------------------------------
+
+
+def calls(source: str, *names: str) -> Iterator[ast.Call]:
+    """Every call of a function or method of one of these names."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            function = node.func
+            name = function.attr if isinstance(function, ast.Attribute) else ''
+            if (function.id if isinstance(function, ast.Name) else name) in names:
+                yield node
+
+
+def texts(node: ast.AST) -> Iterator[str]:
+    """Every text below a node of the syntax tree."""
+    for child in ast.walk(node):
+        if isinstance(child, ast.Constant) and isinstance(child.value, str):
+            yield child.value
+
+
+def keys_of(source: str, variable: str) -> set[str]:
+    """The keys of the dictionary that a variable of a module is."""
+    for node in ast.parse(source).body:
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        target = node.target if isinstance(node, ast.AnnAssign) else None
+        names = [name.id for name in (*targets, target) if isinstance(name, ast.Name)]
+        if variable in names and isinstance(node.value, ast.Dict):
+            return {key.value for key in node.value.keys}
+    return set()
+
+
+def topics_and_services(source: str) -> set[str]:
+    """The names that a node gives its topics and services."""
+    pattern = re.compile(r'~/[a-z_]+|/diagnostics')
+    return {text for text in texts(ast.parse(source)) if pattern.fullmatch(text)}
+
+
+def settings(source: str) -> dict[str, object]:
+    """The parameters that a module declares as a ``Setting``, and their defaults."""
+    found = {}
+    for call in calls(source, 'Setting'):
+        name, default = (ast.literal_eval(argument) for argument in call.args[:2])
+        found[name] = default
+    return found
+
+
+def launch_arguments(source: str) -> set[str]:
+    """The arguments of a launch file."""
+    declared = calls(source, 'DeclareLaunchArgument', 'declare')
+    first = (call.args[0] for call in declared)
+    names = {argument.value for argument in first if isinstance(argument, ast.Constant)}
+    return names | keys_of(source, 'OVERRIDES')
+
+
+def options(source: str) -> set[str]:
+    """The options of a command."""
+    found = calls(source, 'add', 'add_argument')
+    return {text for call in found for text in texts(call) if re.fullmatch('--[a-z-]+', text)}
+
+
+def switches(source: str) -> set[str]:
+    """The options that ``simulator inject`` makes of arguments that are on or off."""
+    found = [call.args[:2] for call in calls(source, 'Argument')]
+    return {
+        f'--{name.value}'
+        for name, type_ in found
+        if isinstance(type_, ast.Name) and type_.id == 'bool'
+    }
+
+
+def verbs(injections: str, inject: str) -> set[str]:
+    """The verbs of ``simulator inject``."""
+    parsers = calls(inject, 'add_parser')
+    more = {
+        call.args[0].value for call in parsers if isinstance(call.args[0], ast.Constant)
+    }
+    return keys_of(injections, 'VERBS') | more
+
+
+def executables(setup: str) -> set[str]:
+    """What ``ros2 run`` can run."""
+    return set(re.findall(r"f'([\w-]+) = \{NAME\}", setup))
+
+
+def make_targets(makefile: str) -> set[str]:
+    """The targets that ``make help`` lists."""
+    return set(re.findall(r'^([a-z-]+):.*##', makefile, re.MULTILINE))
+
+
+def fields(message: str) -> set[str]:
+    """The fields of a message; constants are none."""
+    return set(re.findall(r'^[\w/\[\]]+ +([a-z_0-9]+) *(?:#.*)?$', message, re.MULTILINE))
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def words_of(span: str) -> list[str]:
+    """The words of a piece of code, without the brackets of what may be left out."""
+    return [word.strip('[],') for word in span.split()]
+
+
+def code_spans(text: str) -> list[str]:
+    """Every piece of code between backticks."""
+    return re.findall(r'`([^`]+)`', text)
+
+
+def code_lines(text: str) -> list[str]:
+    """Every line of code that stands by itself."""
+    return [line.strip() for line in text.splitlines() if line.startswith('    ')]
+
+
+def documented(text: str) -> set[str]:
+    """Every word that stands as code in the first column of some table."""
+    rows = [line.split('|')[1] for line in text.splitlines() if line.startswith('|')]
+    return {word for cell in rows for span in code_spans(cell) for word in words_of(span)}
+
+
+def headings(text: str) -> set[str]:
+    """The anchors of a page."""
+    titles = re.findall(r'^#+ (.+)$', text, re.MULTILINE)
+    return {re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-') for title in titles}
+
+
+def links(text: str) -> list[tuple[str, str]]:
+    """The relative links of a page: file, if any, and anchor, if any."""
+    found = re.findall(r'\]\(([^)#\s]*)(?:#([^)\s]*))?\)', text)
+    return [(file, anchor) for file, anchor in found if '://' not in file]
+
+
+def broken_links(page: Path, text: str) -> list[str]:
+    """Links that lead nowhere."""
+    broken = []
+    for file, anchor in links(text):
+        target = page.parent / file if file else page
+        if not target.exists():
+            broken.append(file)
+        elif anchor and anchor not in headings(target.read_text(encoding='utf-8')):
+            broken.append(f'{file}#{anchor}')
+    return broken
+
+
+def named_targets(text: str) -> set[str]:
+    """The make targets that a page speaks of."""
+    code = (*code_spans(text), *code_lines(text))
+    return {match[1] for piece in code if (match := re.match(r'make ([a-z-]+)', piece))}
+
+
+def named_parameters(text: str) -> set[str]:
+    """The parameters and launch arguments that the commands of a page set."""
+    code = (*code_spans(text), *code_lines(text))
+    names = {name for piece in code for name in re.findall(r'(\w+):=', piece)}
+    return names - NO_PARAMETERS
+
+
+def named_files(text: str) -> set[str]:
+    """The files of the project that a page names with their folder."""
+    pattern = re.compile(r'[\w.-]+/[\w./-]*\.(?:py|md|yaml|rules|csv|rst)')
+    return {span for span in code_spans(text) if pattern.fullmatch(span)}
+
+
+def as_written(default: object) -> str:
+    """A default as the tables show it."""
+    if isinstance(default, bool):
+        return str(default).lower()
+    if isinstance(default, list):
+        return f'`[{", ".join(default)}]`'
+    if isinstance(default, str):
+        return f'`{default}`' if default else "`''`"
+    return str(default)
+
+
+def wrong_default(text: str, name: str, default: object) -> bool:
+    """Tell whether no table row says that this is the parameter's default."""
+    row = f'| `{name}` | {as_written(default)} |'
+    return not any(line.startswith(row) for line in text.splitlines())
+
+
+# --- the tests ------------------------------------------------------------------------------------
+
+
+def read(path: Path) -> str:
+    return path.read_text(encoding='utf-8')
+
+
+def all_settings() -> dict[str, object]:
+    return settings(read(PACKAGE / 'node' / 'settings.py'))
+
+
+def all_launch_arguments() -> set[str]:
+    return {name for path in LAUNCH_FILES for name in launch_arguments(read(path))}
+
+
+def test_topics_and_services_are_documented() -> None:
+    names = {
+        name for path in (PACKAGE / 'node').glob('*.py') for name in topics_and_services(read(path))
+    }
+    assert {'~/status', '~/setpoint', '~/enable', '/diagnostics'} <= names
+    assert names - documented(read(INTERFACE)) == set()
+
+
+def test_parameters_are_documented() -> None:
+    assert {'port', 'drives', 'address', 'drive_timeout'} <= set(all_settings())
+    assert set(all_settings()) - documented(read(INTERFACE)) == set()
+
+
+@pytest.mark.parametrize(('name', 'default'), all_settings().items())
+def test_default_is_documented(name: str, default: object) -> None:
+    assert not wrong_default(read(INTERFACE), name, default), f'{name}: {as_written(default)}'
+
+
+def test_executables_are_documented() -> None:
+    names = executables(read(ROOT / 'setup.py'))
+    assert {'driver', 'simulator'} <= names
+    assert names - documented(read(INTERFACE)) == set()
+
+
+@pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
+def test_launch_file_is_documented(path: Path) -> None:
+    names = launch_arguments(read(path))
+    assert 'namespace' in names
+    assert names - documented(read(INTERFACE)) == set()
+    assert f'ros2 launch nfo_sinus_driver {path.name}' in read(INTERFACE)
+    compile(read(path), path, 'exec')
+
+
+def test_simulator_is_documented() -> None:
+    folder = PACKAGE / 'simulator'
+    injections, inject = read(folder / 'injections.py'), read(folder / 'inject.py')
+    names = options(read(folder / 'main.py')) | options(inject)
+    names |= verbs(injections, inject) | switches(injections)
+    assert {'--link', '--paced', '--standing', 'fault', 'power-cycle', 'state'} <= names
+    assert names - documented(read(SIMULATOR)) == set()
+
+
+def test_make_targets_are_documented() -> None:
+    names = make_targets(read(ROOT / 'Makefile'))
+    assert {'demo', 'test', 'run'} <= names
+    assert names - named_targets(read(DEVELOPMENT)) == set()
+
+
+def test_messages_are_documented() -> None:
+    kinds = [*(ROOT / 'msg_defs').rglob('*.msg'), *(ROOT / 'msg_defs').rglob('*.srv')]
+    names = {path.stem for path in (*kinds, *(ROOT / 'msg_defs').rglob('*.action'))}
+    page = read(MESSAGES)
+    missing = {name for name in names if not re.search(rf'\b{name}\b', page)}
+    for name in ('DriveStatus', 'InvSt', 'Telemetry', 'BusStatistics'):
+        found = fields(read(ROOT / 'msg_defs' / 'msg' / f'{name}.msg'))
+        assert len(found) > 5, name
+        missing |= {f'{name}.{field}' for field in found if f'`{field}`' not in page}
+    assert missing - {f'{name}.header' for name in names} == set()
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_what_a_page_names_exists(page: Path) -> None:
+    text = read(page)
+    assert broken_links(page, text) == []
+    assert named_targets(text) - make_targets(read(ROOT / 'Makefile')) == set()
+    assert named_parameters(text) - set(all_settings()) - all_launch_arguments() == set()
+    for name in named_files(text):
+        assert any((folder / name).exists() for folder in (ROOT, PACKAGE)), name
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = {file for file, _ in links(read(ROOT / 'docs' / 'README.md'))}
+    assert {page.name for page in (ROOT / 'docs').glob('*.md')} - index == {'README.md'}
+
+
+@pytest.mark.parametrize('path', CONFIGS, ids=lambda path: path.name)
+def test_parameter_file_names_parameters_that_exist(path: Path) -> None:
+    names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
+    assert 'port' in names
+    assert names - set(all_settings()) == set()
+
+
+# --- the checker itself ---------------------------------------------------------------------------
+
+
+def test_checker_finds_what_is_public() -> None:
+    node = "self.create_service(Trigger, '~/tune', f)\nlog('call ~/enable')\npub(A, '/diagnostics')"
+    assert topics_and_services(node) == {'~/tune', '/diagnostics'}
+    assert settings("A = (Setting('gear_ratio', 1.0, 'turns'),)") == {'gear_ratio': 1.0}
+    launch = "OVERRIDES = {'port': 1}\ndeclare('link')\nDeclareLaunchArgument('x')\ndeclare(name)"
+    assert launch_arguments(launch) == {'port', 'link', 'x'}
+    assert options("add('--link', '-l')\nparser.add_argument('--tcp', help='--x y')") == {
+        '--link',
+        '--tcp',
+    }
+    assert switches("Argument('standing', bool, '')\nArgument('code', int, '')") == {'--standing'}
+    assert verbs("VERBS: M = {'fault': 1}", "v.add_parser('state')\nv.add_parser(name)") == {
+        'fault',
+        'state',
+    }
+    assert executables("    f'nfo-sinus = {NAME}.cli:main',") == {'nfo-sinus'}
+    assert make_targets('demo: setup ## ride\n.PHONY: demo\nhidden: demo\n') == {'demo'}
+    assert fields('uint8 HZ=0  # Hz\nstd_msgs/Header header  # x\nfloat32 value\n') == {
+        'header',
+        'value',
+    }
+
+
+def test_checker_sees_what_is_missing() -> None:
+    page = 'Prose of `port`.\n\n| name | meaning |\n|---|---|\n| `address` | as `model` |\n'
+    assert {'port', 'address', 'model', '~/stop'} - documented(page) == {'port', 'model', '~/stop'}
+    assert documented('| `fault CODE [--standing]`, `run on` |') == {
+        'fault',
+        'CODE',
+        '--standing',
+        'run',
+        'on',
+    }
+    row = '| `autostart` | true | | by itself |\n| `drives` | `[a]` | |\n'
+    assert not wrong_default(row, 'autostart', True)
+    assert not wrong_default(row, 'drives', ['a'])
+    assert wrong_default(row, 'autostart', False)
+    assert wrong_default(row, 'frame_id', '')
+
+
+def test_checker_sees_what_does_not_exist(tmp_path: Path) -> None:
+    page = tmp_path / 'page.md'
+    page.write_text('# The first\n\n## What, then?\n')
+    for link in ('page.md', '#the-first', 'page.md#what-then', 'https://example.org/x'):
+        assert broken_links(page, f'[see\nthere]({link})') == []
+    for link in ('other.md', '#the-last', 'page.md#then', '../nowhere/'):
+        assert broken_links(page, f'[there]({link})') == [link]
+    assert named_targets('Type `make tea`.\n\n    make coffee\n\nWe make nothing.') == {
+        'tea',
+        'coffee',
+    }
+    assert named_parameters('`-p sugar:=2` and\n\n    run milk:=1 -r __ns:=/x') == {'sugar', 'milk'}
+    assert named_files('`config/no.yaml`, `no.yaml`, `/dev/x`') == {'config/no.yaml'}
