@@ -51,7 +51,8 @@ _SETTINGS = {
 
 
 def _stamps_increase(client: Client, topic: str) -> bool:
-    stamps = [seconds(message.header.stamp) for message in client.messages[topic]]
+    messages = [message for message in client.messages[topic] if message.connected]
+    stamps = [seconds(message.header.stamp) for message in messages]
     return len(stamps) > 3 and all(a < b for a, b in itertools.pairwise(stamps))
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-import itertools
 from pathlib import Path
 from typing import Any
 
@@ -374,17 +373,22 @@ WAYS_TO_STOP: dict[str, Command] = {
 
 def stopped_before(rig: Rig, way: str, moment: int) -> tuple[Future[str] | None, bool]:
     """Enable; stop before so many transactions. Return the stop, and whether it was enabled."""
-    seen = itertools.count()
+    seen: list[tuple[int, Words | None]] = []
     stops: list[Future[str]] = []
 
     def before(register: int, words: Words | None) -> None:
-        if next(seen) == moment:
+        if len(seen) == moment:
             stops.append(WAYS_TO_STOP[way](rig))
+        seen.append((register, words))
 
     rig.tap.before = before
     failure = rig.drive.enable().exception(PATIENCE)
+    if stops:
+        stops[0].result(PATIENCE)
     rig.tap.before = lambda register, words: None
     assert failure is None or isinstance(failure, DriveError)
+    # the one that was about to be sent goes out; after it there is no run command
+    assert (SCMD, (RUN,)) not in seen[moment + 1 :]
     return next(iter(stops), None), failure is None
 
 
@@ -397,7 +401,6 @@ def test_stop_at_any_moment_of_enabling(make_rig: MakeRig, way: str) -> None:
         stop, was_enabled = stopped_before(rig, way, moment)
         if stop is None:
             break
-        stop.result(PATIENCE)
         wait_until(lambda: not rig.drive.stop_unconfirmed)
         rig.wait_until_still()
         assert not rig.drive.armed
