@@ -111,7 +111,8 @@ def test_a_drive_that_does_not_tell_connects_and_runs(bench: Bench, treated: str
         assert drive.state()['driven']
     # no retries, and a refusal is not complained of
     assert _asked(bench) == [_DEVICE, _SLAVE_ID]
-    assert client.latest('statistics').retries == 0
+    statistics = client.wait_for('statistics', lambda message: True, 'statistics')
+    assert statistics.retries == 0
     assert 'ERROR' not in driver.text
 
 
