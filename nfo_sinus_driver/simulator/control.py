@@ -67,6 +67,8 @@ class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
     block_on_close = False
     handler: Handler
     connections: set[socket.socket]
+    #: Clients that come at once wait here; a full queue would turn them away.
+    request_queue_size = 128
 
 
 class _Connection(socketserver.StreamRequestHandler):

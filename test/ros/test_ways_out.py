@@ -116,11 +116,13 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
 
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
-    bench.driver('-p', 'drive_timeout:=1.0', '-p', 'poll_rate:=0.2')
+    # without telemetry, and with a poll every five seconds, only the keeping alive is left
+    settings = ('drive_timeout:=1.0', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
+    bench.driver(*(word for setting in settings for word in ('-p', setting)))
     client = bench.client().connected()
     with client.run_at(20.0):
+        assert client.call('stop').success
         running = drive.state()['time']
-        # with a poll every five seconds only, it is the keeping alive that prevents the fault
         state = drive.wait_for(
             lambda state: state['fault'] or state['time'] > running + 3.0, timeout=PATIENCE
         )
