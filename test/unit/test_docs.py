@@ -367,3 +367,11 @@ def test_checker_sees_what_does_not_exist(tmp_path: Path) -> None:
     }
     assert named_parameters('`-p sugar:=2` and\n\n    run milk:=1 -r __ns:=/x') == {'sugar', 'milk'}
     assert named_files('`config/no.yaml`, `no.yaml`, `/dev/x`') == {'config/no.yaml'}
+
+
+def test_the_readme_says_what_is_a_safety_function_and_what_is_not() -> None:
+    # law 10: it stands near the top, where it is read
+    top = ' '.join((ROOT / 'README.md').read_text(encoding='utf-8')[:2000].split())
+    assert 'safety function' in top
+    assert 'RUN input' in top
+    assert 'drive_timeout' in top
