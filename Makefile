@@ -23,11 +23,11 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants bench build clean
+.PHONY: help setup demo run test lint types unit ros mutants bench parameters build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
 setup: ## set up .venv, and build into install
 	@tools/setup
@@ -69,6 +69,10 @@ bench: setup ## measure its speed, and that of others (half an hour; BENCH=--qui
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)
+
+parameters: setup ## write docs/parameters.md from the tables of the drives
+	@.venv/bin/python -m nfo_sinus_driver.catalog.page > docs/parameters.md.new
+	@mv docs/parameters.md.new docs/parameters.md
 
 build: ## build both packages again
 	@rm -rf build install

@@ -14,8 +14,13 @@
 
 """What the manuals say: tables and pure functions on them. No I/O beyond that, no ROS."""
 
+from nfo_sinus_driver.catalog.dialect import Dialect
+from nfo_sinus_driver.catalog.dialect import Fact
+from nfo_sinus_driver.catalog.error_log import ERROR_LOG
+from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.inv_st import InvStCode
 from nfo_sinus_driver.catalog.inv_st import Kind
+from nfo_sinus_driver.catalog.model import DRIVABLE
 from nfo_sinus_driver.catalog.model import MODELS
 from nfo_sinus_driver.catalog.model import Model
 from nfo_sinus_driver.catalog.model import load_model
@@ -36,9 +41,14 @@ from nfo_sinus_driver.catalog.words import state_of
 
 __all__ = [
     'DEFAULT_SCALING',
+    'DRIVABLE',
+    'ERROR_LOG',
     'MODELS',
     'Access',
     'Control',
+    'Dialect',
+    'ErrorLogArea',
+    'Fact',
     'InvStCode',
     'Kind',
     'Mode',

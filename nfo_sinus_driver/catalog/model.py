@@ -27,6 +27,7 @@ import functools
 from pathlib import Path
 from typing import TypeVar
 
+from nfo_sinus_driver.catalog.dialect import DIALECTS
 from nfo_sinus_driver.catalog.inv_st import InvStCode
 from nfo_sinus_driver.catalog.inv_st import Kind
 from nfo_sinus_driver.catalog.parameter import Access
@@ -35,8 +36,10 @@ from nfo_sinus_driver.catalog.parameter import Place
 from nfo_sinus_driver.catalog.parameter import Protocol
 from nfo_sinus_driver.catalog.parameter import RawType
 
-#: The names that the driver's ``model`` parameter takes.
-MODELS = ('sinus_g2',)
+#: The models that there are tables of.
+MODELS = ('sinus_g2', 'sinus_optimal')
+#: Those that the driver drives and the simulator simulates: what their ``model`` takes.
+DRIVABLE = ('sinus_g2',)
 
 _TABLES = Path(__file__).parent
 #: Firmware 4.28 renamed Sio Stby and its like [C3].
@@ -51,11 +54,13 @@ class Model(Mapping[str, Parameter]):
     """
     A drive family: its parameters by key, and its inverter status codes.
 
-    :ivar name: the name that the driver's ``model`` parameter takes.
+    :ivar name: one of ``MODELS``.
+    :ivar dialect: what its control and status words and its status codes mean.
     """
 
     def __init__(self, name: str, parameters: list[Parameter], inv_st: list[InvStCode]) -> None:
         self.name = name
+        self.dialect = DIALECTS[name]
         self._parameters = {parameter.key: parameter for parameter in parameters}
         self._inv_st = {code.code: code for code in inv_st}
 
@@ -67,6 +72,11 @@ class Model(Mapping[str, Parameter]):
 
     def __len__(self) -> int:
         return len(self._parameters)
+
+    @property
+    def settings(self) -> tuple[Parameter, ...]:
+        """The parameters that become ROS parameters, in the order of the manual."""
+        return tuple(parameter for parameter in self.values() if parameter.is_setting)
 
     def inv_st(self, code: int) -> InvStCode:
         """Return what an inverter status code means; an unknown code is shown as its number."""
@@ -161,6 +171,8 @@ def _parameter(row: dict[str, str]) -> Parameter:
         since=_fraction(row['since']),
         description=row['description'],
         source=row['source'],
+        pnu=int(row['pnu']) if row['pnu'] else None,
+        canopen=int(row['canopen'], 16) if row['canopen'] else None,
     )
 
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import enum
 from fractions import Fraction
 import math
+import struct
 
 #: An engineering value: a number, the label of an enumeration, or on/off.
 Value = bool | int | float | str
@@ -113,6 +114,9 @@ class Scaling:
 
 DEFAULT_SCALING = Scaling()
 
+#: The groups of the tables that hold no settings: what a drive measures, and what controls it.
+NO_SETTINGS = frozenset({'Status', 'Fieldbus'})
+
 
 @dataclass(frozen=True)
 class Place:
@@ -159,6 +163,8 @@ class Parameter:
     :ivar stopped: the motor must stand for it to be written (type Init, not Init/Run).
     :ivar since: the first firmware that has it, or ``None``.
     :ivar source: where in the manuals it stands.
+    :ivar pnu: its PROFIBUS parameter number, 1000 + ADI [M0 §6.3.3]; ``None`` if it has none.
+    :ivar canopen: its CANopen index, 2000h + ADI [M0 §6.4.3], likewise.
     """
 
     key: str
@@ -176,14 +182,23 @@ class Parameter:
     since: Fraction | None
     description: str
     source: str
+    pnu: int | None = None
+    canopen: int | None = None
 
     @property
     def kind(self) -> type[bool] | type[int] | type[float] | type[str]:
         """The Python type of its values."""
         if self.labels:
-            return bool if set(self.labels.values()) == {'OFF', 'ON'} else str
+            labels = set(self.labels.values())
+            # RegAmp is one of two numbers, with nothing between them [C46]
+            return bool if labels == {'OFF', 'ON'} else int if labels == {'-1', '1'} else str
         whole = all(place.factor == 1 for place in self.places.values())
         return int if whole else float
+
+    @property
+    def is_setting(self) -> bool:
+        """Whether the drive keeps it for people to read and write: a ROS parameter."""
+        return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS
 
     def place(self, protocol: Protocol) -> Place:
         """
@@ -212,12 +227,12 @@ class Parameter:
 
         A code that the manual does not list is shown as its number: the drive is right [C19].
 
-        :raises ValueError: not as many words as the parameter has.
+        :raises ValueError: not as many words as the parameter has, or a code that has no value of
+            the parameter's type.
         """
         raw = self.place(protocol).type.to_raw(words)
         if self.labels:
-            label = self.labels.get(raw, str(raw))
-            return label == 'ON' if self.kind is bool else label
+            return self._meaning(raw)
         if self.kind is int:
             return raw
         factor = self.factor(protocol, scaling)
@@ -239,16 +254,30 @@ class Parameter:
             return self.place(protocol).type.to_words(self._code(value))
         number = self._number(value)
         factor = self.factor(protocol, scaling)
-        self._check_range(number)
         raw = round(number / factor)
-        # float32 and decimal fractions never hit a step exactly
-        if abs(raw * factor - number) > factor / 1000:
+        if not _means(float(number), raw * factor, factor):
+            self._check_range(number, protocol, scaling)
             below = math.floor(number / factor)
             raise ValueError(
                 f'{self.key}: {value} lies between two steps of the drive, '
-                f'{self._show(below * factor)} and {self._show((below + 1) * factor)}'
+                f'{_show(below * factor)} and {_show((below + 1) * factor)}'
             )
+        self._check_range(raw * factor, protocol, scaling)
         return self.place(protocol).type.to_words(raw)
+
+    def span(
+        self, protocol: Protocol = Protocol.MODBUS, scaling: Scaling = DEFAULT_SCALING
+    ) -> tuple[Fraction, Fraction]:
+        """
+        Return the least and the greatest value over ``protocol``, in :attr:`unit`.
+
+        Where the manual allows more than the type can carry, or says nothing, the type decides.
+        """
+        factor = self.factor(protocol, scaling)
+        carried = self.place(protocol).type
+        low, high = carried.minimum * factor, carried.maximum * factor
+        low = low if self.minimum is None else max(low, self.minimum)
+        return low, high if self.maximum is None else min(high, self.maximum)
 
     def quantise(
         self,
@@ -263,39 +292,71 @@ class Parameter:
         """
         number = self._number(value)
         factor = self.factor(protocol, scaling)
-        self._check_range(number)
+        self._check_range(number, protocol, scaling)
         return self.place(protocol).type.to_words(round(number / factor))
+
+    def _meaning(self, raw: int) -> Value:
+        """Return what a code of an enumeration means."""
+        if self.kind is str:
+            return self.labels.get(raw, str(raw))
+        if raw not in self.labels:
+            raise ValueError(
+                f'{self.key}: the drive has code {raw}, which is none of '
+                f'{", ".join(self.labels.values())}'
+            )
+        label = self.labels[raw]
+        return int(label) if self.kind is int else label == 'ON'
 
     def _code(self, value: Value) -> int:
         if self.kind is bool and isinstance(value, bool):
             value = 'ON' if value else 'OFF'
+        elif self.kind is int and not isinstance(value, (bool, str)) and value in (-1, 1):
+            value = f'{value:g}'
         for code, label in self.labels.items():
             if label == value:
                 return code
         raise ValueError(f'{self.key}: {value!r} is none of {", ".join(self.labels.values())}')
 
     def _number(self, value: Value) -> Fraction:
-        if isinstance(value, (bool, str)):
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(f'{self.key}: {value!r} is not a number')
-        if not math.isfinite(value):
-            raise ValueError(f'{self.key}: {value} is not finite')
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise ValueError(f'{self.key}: {number} is not finite')
         return Fraction(value)
 
-    def _check_range(self, number: Fraction) -> None:
+    def _check_range(self, number: Fraction, protocol: Protocol, scaling: Scaling) -> None:
+        low, high = self.span(protocol, scaling)
         # the bounds are decimal fractions and the values binary ones
-        slack = Fraction(1, 10**6)
-        low = self.minimum is not None and number < self.minimum - slack
-        high = self.maximum is not None and number > self.maximum + slack
-        if low or high:
-            unit = f' {self.unit}' if self.unit else ''
-            if self.maximum is None:
-                allowed = f'at least {self._show(self.minimum or Fraction(0))}{unit}'
-            elif self.minimum is None:
-                allowed = f'at most {self._show(self.maximum)}{unit}'
+        slack = self.factor(protocol, scaling) / 1000
+        if not low - slack <= number <= high + slack:
+            if self.maximum is None and number < low:
+                allowed = f'at least {_show(low)}'
             else:
-                allowed = f'{self._show(self.minimum)} to {self._show(self.maximum)}{unit}'
-            raise ValueError(f'{self.key}: {float(number):g} is out of range, {allowed}')
+                allowed = f'{_show(low)} to {_show(high)}'
+            raise ValueError(
+                f'{self.key}: {_show(number)} is out of range, {allowed} {self.unit}'.rstrip()
+            )
 
-    @staticmethod
-    def _show(number: Fraction) -> str:
-        return f'{float(number):.10g}'
+
+def _show(number: Fraction) -> str:
+    return f'{float(number):.10g}'
+
+
+def _means(value: float, step: Fraction, factor: Fraction) -> bool:
+    """
+    Tell whether a number is meant to be a step of the drive.
+
+    Decimal fractions never hit a binary number exactly, and what went through a Float32 message or
+    a tool that computes with one is off by more.
+    """
+    if abs(Fraction(value) - step) <= max(abs(step) / 2**50, factor / 10**6):
+        return True
+    try:
+        single = struct.unpack('<f', struct.pack('<f', float(step)))[0]
+    except OverflowError:
+        return False
+    return bool(value == single)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import DRIVABLE
 
 CONTROL_METHODS = ('mode_scmd', 'monitor')
 #: The control modes by the names that ``expected_control_mode`` takes.
@@ -40,6 +40,7 @@ class DriveSettings:
     :ivar setpoint_timeout: s; 0 turns it off.
     :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
     :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are.
+    :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
     :raises ValueError: a field that makes no sense; the message says what would.
     """
 
@@ -53,10 +54,11 @@ class DriveSettings:
     expected_control_mode: str = ''
     drive_timeout: float = 0.0
     shutdown_timeout: float = 4.0
+    allow_communication_changes: bool = False
     retries: int = 2
 
     def __post_init__(self) -> None:
-        _one_of('model', self.model, MODELS)
+        _one_of('model', self.model, DRIVABLE)
         _one_of('control_method', self.control_method, CONTROL_METHODS)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *CONTROL_MODES))
         if self.address not in _MODBUS_ADDRESSES:

@@ -71,7 +71,7 @@ def test_tables_are_loaded_in_no_time() -> None:
         start = time.perf_counter()
         loaded = load_afresh('sinus_g2')
         times.append(time.perf_counter() - start)
-    assert len(loaded) >= 70
+    assert len(loaded) == 155
     assert min(times) < 1.0
 
 

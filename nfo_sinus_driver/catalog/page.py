@@ -1,0 +1,225 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The page of all parameters for people, made from the tables.
+
+``python -m nfo_sinus_driver.catalog.page`` prints it; ``make parameters`` writes it to ``docs/``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+from fractions import Fraction
+
+from nfo_sinus_driver.catalog.error_log import ERROR_LOG
+from nfo_sinus_driver.catalog.model import MODELS
+from nfo_sinus_driver.catalog.model import Model
+from nfo_sinus_driver.catalog.model import load_model
+from nfo_sinus_driver.catalog.parameter import Access
+from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.parameter import Protocol
+
+_TITLES = {'sinus_g2': 'NFO Sinus G2', 'sinus_optimal': 'NFO Sinus Optimal'}
+_KINDS = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
+_ACCESS = {
+    Access.READ: 'read',
+    Access.WRITE: 'write',
+    Access.READ_WRITE: 'read, write',
+    Access.ACKNOWLEDGE: 'reading acknowledges',
+}
+#: Enumerations with more labels than this stand below the table.
+_MOST_LABELS = 7
+
+_INTRODUCTION = """\
+<!-- Made from the tables in nfo_sinus_driver/catalog by `make parameters`: change those. -->
+
+# Parameters
+
+What a drive has, as its maker's manuals print it: [settings](#settings), which are the ROS
+parameters of its node, and what it measures and is controlled by, which are
+[topics](interface.md#topics) and [services](interface.md#services).
+
+    ros2 param list /nfo_sinus
+    ros2 param describe /nfo_sinus control.accel
+    ros2 param set /nfo_sinus control.accel 5.0
+
+How to read the tables:
+
+- **Values** are in the unit beside them, on every bus. Where an end is open, or no range is
+  printed, it depends on the inverter, or the manual does not tell: the drive decides.
+- A number in parentheses is the code of a value in its register; `false` is 0 and `true` is 1.
+- **Step** is the difference between two values that the drive can hold. Two steps: the one over
+  Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of
+  the process regulator are the factory's; the drive's scale factors change them.
+- **Stopped**: it can only be written while the motor stands.
+- **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
+  low word first), **PROFIBUS** its parameter number, **CANopen** its index.
+- **From** is the first firmware that has it; empty: all have it.
+
+Numbers like 0220h are hexadecimal. A column that would be empty is left out.
+"""
+
+_SETTINGS = """\
+The name of the ROS parameter, and of the setting on the drive's own display; {count} in all:
+{groups}.
+"""
+
+_NO_SETTINGS = 'Its manual prints none.\n'
+
+_ERROR_LOG = """\
+Entries of two words, the newest first: the operating time in 0.1 h, 24 bits, and the code of the
+inverter status above it. Code 0 ends the log.
+
+| bus | first entry | next entry | entries |
+|---|---|---|---|
+| Modbus | {modbus.first:04X}h | {modbus.stride} registers on | {modbus.entries} |
+| Classic | E{classic.first:04X} | {classic.stride} ids on | {classic.entries} to {classic.limit} |
+| PROFIBUS | P13157 | the next number | {modbus.entries} |
+"""
+
+_Column = tuple[str, Callable[[Parameter], str]]
+
+
+def page() -> str:
+    """Return the whole page in Markdown."""
+    parts = [part for name in MODELS for part in _model(load_model(name))]
+    return '\n'.join([_INTRODUCTION, *parts])
+
+
+def _model(model: Model) -> Iterator[str]:
+    yield f'## {_TITLES[model.name]}\n'
+    groups = list(dict.fromkeys(parameter.group for parameter in model.settings))
+    yield '### Settings\n'
+    if groups:
+        names = ', '.join(f'[{group}](#{_anchor(group)})' for group in groups)
+        yield _SETTINGS.format(count=len(model.settings), groups=names)
+    else:
+        yield _NO_SETTINGS
+    for group in groups:
+        rows = [parameter for parameter in model.settings if parameter.group == group]
+        yield f'#### {group}\n'
+        yield _table(_SETTING_COLUMNS, rows)
+        yield from _long_lists(rows)
+    for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
+        rows = [parameter for parameter in model.values() if parameter.group == group]
+        yield f'### {title}\n'
+        yield _table(_OTHER_COLUMNS, rows)
+    if model.name == 'sinus_g2':
+        log = {protocol.value: area for protocol, area in ERROR_LOG.items()}
+        yield '### Error log\n'
+        yield _ERROR_LOG.format(**log)
+
+
+def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
+    """Return a table without the columns that would be empty."""
+    cells = {title: [show(row) for row in rows] for title, show in columns}
+    full = {title: column for title, column in cells.items() if any(column)}
+    lines = [list(full), ['---'] * len(full), *zip(*full.values(), strict=True)]
+    return ''.join(f'| {" | ".join(line)} |\n' for line in lines)
+
+
+def _long_lists(rows: Sequence[Parameter]) -> Iterator[str]:
+    for parameter in rows:
+        if parameter.kind is str and len(parameter.labels) > _MOST_LABELS:
+            yield f'`{parameter.key}` is one of {_labels(parameter)}.\n'
+
+
+def _labels(parameter: Parameter) -> str:
+    if parameter.kind is int:
+        return ', '.join(parameter.labels.values())
+    return ', '.join(f'`{label}` ({code})' for code, label in parameter.labels.items())
+
+
+def _values(parameter: Parameter) -> str:
+    if parameter.kind is bool:
+        return '`false`, `true`'
+    if parameter.labels:
+        count = len(parameter.labels)
+        return _labels(parameter) if count <= _MOST_LABELS else f'one of {count}, see below'
+    low, high = parameter.minimum, parameter.maximum
+    ends = [] if low is None else [_number(low) if high is not None else f'from {_number(low)}']
+    ends += [] if high is None else [_number(high) if low is not None else f'up to {_number(high)}']
+    return ' to '.join(ends)
+
+
+def _step(parameter: Parameter) -> str:
+    if parameter.labels:
+        return ''
+    steps = {protocol: parameter.factor(protocol) for protocol in parameter.places}
+    modbus = steps.get(Protocol.MODBUS)
+    classic = steps.get(Protocol.CLASSIC, modbus)
+    if modbus is None or classic is None or modbus == classic:
+        return _number(modbus or classic or Fraction(1))
+    return f'{_number(modbus)}, {_number(classic)}'
+
+
+def _modbus(parameter: Parameter) -> str:
+    place = parameter.places.get(Protocol.MODBUS)
+    return '' if place is None else f'{place.address:04X}h'
+
+
+def _classic(parameter: Parameter) -> str:
+    place = parameter.places.get(Protocol.CLASSIC)
+    return '' if place is None else ', '.join(f'E{address:04X}' for address in place.addresses)
+
+
+def _types(parameter: Parameter) -> str:
+    names = [place.type.name for place in parameter.places.values()]
+    return ', '.join(dict.fromkeys(reversed(names)))
+
+
+def _number(number: Fraction) -> str:
+    return f'{float(number):.6f}'.rstrip('0').rstrip('.')
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(' ', '-')
+
+
+_ADDRESSES: tuple[_Column, ...] = (
+    ('Modbus', _modbus),
+    ('Classic', _classic),
+    ('PROFIBUS', lambda row: '' if row.pnu is None else f'P{row.pnu}'),
+    ('CANopen', lambda row: '' if row.canopen is None else f'{row.canopen:04X}h'),
+    ('From', lambda row: '' if row.since is None else _number(row.since)),
+)
+_SETTING_COLUMNS: tuple[_Column, ...] = (
+    ('ROS parameter', lambda row: f'`{row.key}`'),
+    ('Display', lambda row: row.name),
+    ('Meaning', lambda row: row.description),
+    ('Type', lambda row: _KINDS[row.kind]),
+    ('Values', _values),
+    ('Unit', lambda row: row.unit),
+    ('Step', _step),
+    ('Stopped', lambda row: 'yes' if row.stopped else ''),
+    *_ADDRESSES,
+)
+_OTHER_COLUMNS: tuple[_Column, ...] = (
+    ('Name', lambda row: row.name),
+    ('Meaning', lambda row: row.description),
+    ('Access', lambda row: _ACCESS[row.access]),
+    ('Values', _values),
+    ('Unit', lambda row: row.unit),
+    ('Step', lambda row: _step(row) if row.unit or row.kind is float else ''),
+    ('Type', _types),
+    *_ADDRESSES,
+)
+
+
+if __name__ == '__main__':
+    print(page(), end='')

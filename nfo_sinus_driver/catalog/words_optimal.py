@@ -1,0 +1,115 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Control and status words of the Sinus Optimal, and the codes of its MODE and SMODE [M1].
+
+The registers are those of the G2, the meaning is not ([C51], [C52], [C54], [C55]): never mix these
+with those of ``words.py``.
+"""
+
+from __future__ import annotations
+
+import enum
+
+from nfo_sinus_driver.catalog.words import State
+
+
+class Mode(enum.IntEnum):
+    """Who controls the drive; only BUS means the same as on the G2 [C51]."""
+
+    MANUAL = 1
+    #: Never written: with RUN active it may start the motor [C51].
+    AUTO = 2
+    BUS = 3
+
+
+class Smode(enum.IntEnum):
+    """Start and stop commands under MODE = Bus: these and no other [C52]."""
+
+    STOP = 0x00
+    #: Run; the set-point comes from the terminals.
+    TERMINAL = 0x81
+    #: Run; the set-point comes from Input Freq Setpoint or Input Speed Setpoint.
+    FIELDBUS = 0x101
+
+
+class Control(enum.IntFlag):
+    """Drive Control: BUS_CONTROL before ENABLE, and that before SWITCH_ON ([M1], [C54])."""
+
+    SWITCH_ON = 1 << 0
+    #: Does nothing but come back in the status word.
+    ECHO_1 = 1 << 1
+    ECHO_2 = 1 << 2
+    ENABLE = 1 << 3
+    #: Acknowledges a fault when it changes from 0 to 1.
+    FAULT_ACK = 1 << 7
+    BUS_CONTROL = 1 << 14
+
+
+class Status(enum.IntFlag):
+    """Drive Status ([M1], [C55])."""
+
+    #: Ready to receive the enable command.
+    READY = 1 << 0
+    #: The output stage is active.
+    SWITCHED_ON = 1 << 1
+    #: Ready to receive the run command.
+    ENABLED = 1 << 2
+    FAULT_ACTIVE = 1 << 3
+    #: What control bits 1 and 2 are; voltage and quick stop are not reported [C55].
+    ECHO_1 = 1 << 4
+    ECHO_2 = 1 << 5
+    #: No run signal on terminal DIN1.
+    DISABLED = 1 << 6
+    ALARM_ACTIVE = 1 << 7
+    CONTROL_FROM_BUS = 1 << 9
+    SETPOINT_REACHED = 1 << 10
+    LIMIT_ACTIVE = 1 << 11
+    #: The output is suspended in sleep mode.
+    SLEEP_ACTIVE = 1 << 12
+    STOPMODE_BRAKE = 1 << 13
+    #: The motor turns in reverse.
+    REVERSE = 1 << 14
+    STOPPING = 1 << 15
+
+
+def state_of(word: int) -> State:
+    """
+    Return the state that a Drive Status word shows.
+
+    [M1] has no state machine: this is derived from what it says of each bit, and what speaks of a
+    turning motor goes first. UNKNOWN if no bit speaks of a state. QUICK_STOP and
+    NOT_READY_TO_SWITCH_ON never come, for nothing tells them.
+    """
+    if word & Status.FAULT_ACTIVE:
+        # while the output stage is still on, the motor is not released
+        return State.FAULT_REACTION_ACTIVE if word & Status.SWITCHED_ON else State.FAULTED
+    for bits, state in _STATES:
+        if word & bits:
+            return state
+    return State.UNKNOWN
+
+
+#: What any of these bits says where no earlier one is set.
+_STATES = (
+    (Status.STOPPING, State.STOPPING),
+    # who sleeps keeps the run command and starts again by itself
+    (Status.SWITCHED_ON | Status.SLEEP_ACTIVE, State.OPERATION_ENABLED),
+    (Status.DISABLED, State.SWITCH_ON_DISABLED),
+    # enabled comes before switched on here, the other way round than on the G2 [C54]
+    (Status.ENABLED, State.SWITCHED_ON),
+    (Status.READY, State.READY_TO_SWITCH_ON),
+)

@@ -1,0 +1,122 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The page of all parameters is the one that the tables make, and nothing is missing in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog.page import page
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / 'docs' / 'parameters.md'
+LINES = page().splitlines()
+
+
+def cells(line: str) -> list[str]:
+    """The cells of a row."""
+    return [cell.strip() for cell in line.strip('|').split('|')]
+
+
+def rows_of(parameter: str) -> list[dict[str, str]]:
+    """The rows whose first cell is a parameter, by the titles of their table."""
+    found = []
+    titles: list[str] = []
+    for line in LINES:
+        if not line.startswith('| '):
+            titles = []
+        elif not titles:
+            titles = cells(line)
+        elif cells(line)[0] == parameter:
+            found.append(dict(zip(titles, cells(line), strict=True)))
+    return found
+
+
+def test_page_is_current() -> None:
+    assert PAGE.read_text(encoding='utf-8') == page(), 'make parameters'
+
+
+def test_page_is_printed() -> None:
+    command = [sys.executable, '-m', 'nfo_sinus_driver.catalog.page']
+    said = subprocess.run(command, capture_output=True, check=True, cwd=ROOT, text=True)
+    assert said.stdout == page()
+
+
+def test_every_table_is_one() -> None:
+    before: list[str] = []
+    for line in LINES:
+        row = cells(line) if line.startswith('|') else []
+        if row and before:
+            assert len(row) == len(before), line
+        before = row
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_every_parameter_has_its_row(name: str) -> None:
+    for row in load_model(name).values():
+        first = f'`{row.key}`' if row.is_setting else row.name
+        registers = [
+            f'{place.address:04X}h'
+            for protocol, place in row.places.items()
+            if protocol is Protocol.MODBUS
+        ]
+        assert [
+            found
+            for found in rows_of(first)
+            if found['Meaning'] == row.description
+            and [text for text in (found.get('Modbus', ''),) if text] == registers
+        ], row.key
+
+
+def test_rows_written_by_hand() -> None:
+    assert rows_of('`motor.p_nom`') == [
+        {
+            'ROS parameter': '`motor.p_nom`',
+            'Display': 'P-Nom',
+            'Meaning': 'Nominal motor output (RMS)',
+            'Type': 'double',
+            'Values': '0.01 to 100',
+            'Unit': 'kW',
+            'Step': '0.001, 0.01',
+            'Stopped': 'yes',
+            'Modbus': '0220h',
+            'Classic': 'E0008',
+            'PROFIBUS': 'P1005',
+            'CANopen': '2005h',
+        }
+    ]
+    assert rows_of('`error.short_c_err_cnt`')[0]['From'] == '4.32'
+    assert rows_of('`motor.l_main`')[0]['Step'] == '0.000001, 0.0001'
+    assert rows_of('`motor.i_nom`')[0]['Values'] == 'from 0.1'
+    assert rows_of('`pi_reg.reg_amp`')[0]['Values'] == '-1, 1'
+    assert rows_of('`serial.auto_stop`')[0]['Values'] == '`false`, `true`'
+    assert rows_of('`output.v_out`')[0]['Values'] == (
+        '`Disable` (0), `Freque` (1), `Speed` (2), `Torque` (3)'
+    )
+    assert rows_of('OpTime')[0]['Classic'] == 'E0027, E0127'
+    assert rows_of('Inv St (With Ack)')[0]['Access'] == 'reading acknowledges'
+    assert any(
+        line.startswith('`pi_reg.op_mode` is one of `Terminal` (129), ')
+        and line.endswith(', `Temp F` (258), `Temp R` (259).')
+        for line in LINES
+    )
