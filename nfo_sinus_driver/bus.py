@@ -30,9 +30,8 @@ from collections.abc import Coroutine
 from concurrent.futures import Future
 import ctypes
 import functools
-import heapq
-import itertools
 import logging
+import math
 import threading
 import time
 from typing import Any
@@ -41,22 +40,23 @@ from typing import TypeVar
 from nfo_sinus_driver.jobs import Cancelled
 from nfo_sinus_driver.jobs import Pause
 from nfo_sinus_driver.jobs import Priority
+from nfo_sinus_driver.jobs import Sleepers
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
 from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import Keeper
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
+from nfo_sinus_driver.turns import Turns
+from nfo_sinus_driver.turns import Waiting
 
 __all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Task', 'Transfer']
 
@@ -65,16 +65,9 @@ _T = TypeVar('_T')
 
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
-#: The share of the time that TELEMETRY and REFRESH get when everything above asks for more.
-BACKGROUND_SHARE = 0.2
-#: How much unused share may be saved up, s: so little that a set-point never waits for two.
-_MOST_CREDIT = 0.005
 
 _PR_SET_TIMERSLACK = 29
 _NOWHERE = Address((), 0)
-
-
-_FOREGROUND = (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
 
 
 class Bus:
@@ -86,22 +79,11 @@ class Bus:
 
     def __init__(self, link: Link) -> None:
         self._link = link
+        self._port = Keeper(link)
         self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
         self._awake = threading.Event()
-        self._queues: dict[Priority, deque[tuple[Task, Transfer]]] = {
-            priority: deque() for priority in Priority
-        }
-        self._slots: deque[Slot] = deque()
-        #: A slot was written last.
-        self._slot_went = False
-        self._timers: list[tuple[float, int, Task, int]] = []
-        self._order = itertools.count()
-        self._credit = 0.0
-        #: What shares the guaranteed time, the one that is next in front.
-        self._background = deque((Priority.TELEMETRY, Priority.REFRESH))
-        self._is_open = False
-        self._reopen_at = 0.0
-        self._port_error = PortError('the port is not open yet')
+        self._turns = Turns()
+        self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
         self._tasks: set[Task] = set()
@@ -159,7 +141,7 @@ class Bus:
     @property
     def port_error(self) -> PortError | None:
         """Why the port is not open, or ``None`` when it is."""
-        return None if self._is_open else self._port_error
+        return None if self._port.is_open else self._port.error
 
     def use_probes(self, unit: int, probes: tuple[Address, ...]) -> None:
         """Tell the link which parameters of a unit it may read to find out if it hears it."""
@@ -242,9 +224,7 @@ class Bus:
         if task.running:
             task.cancel_due = True
             return
-        for queue in self._queues.values():
-            for entry in [entry for entry in queue if entry[0] is task]:
-                queue.remove(entry)
+        self._turns.withdraw(task)
         task.asleep = False
         task.pause += 1
         self._advance(task, None, Cancelled())
@@ -283,8 +263,7 @@ class Bus:
             except BaseException:
                 # a mistake in a callback must not take every drive on the line with it
                 _log.exception('error in the bus worker; it goes on')
-        self._is_open = False
-        self._close_link()
+        self._port.close()
         self._closed = True
         self._take_in()
         for task in tuple(self._tasks):
@@ -294,10 +273,10 @@ class Bus:
         self._awake.clear()
         self._take_in()
         self._ring_timers()
-        if not self._is_open:
+        if not self._port.is_open:
             self._open_when_due()
-            if not self._is_open:
-                self._fail_all(self._port_error)
+            if not self._port.is_open:
+                self._fail_all(self._port.error)
                 self._rest()
                 return
         if not self._send_next():
@@ -309,16 +288,14 @@ class Bus:
             if isinstance(item, Task):
                 self._advance(item, None, Cancelled() if self._closed else None)
             elif isinstance(item, Slot):
-                self._slots.append(item)
+                self._turns.add(item)
             else:
                 item()
 
     def _ring_timers(self) -> None:
         now = time.monotonic()
-        while self._timers and self._timers[0][0] <= now:
-            _, _, task, pause = heapq.heappop(self._timers)
-            if task.asleep and task.pause == pause:
-                self._end_pause(task)
+        while (task := self._sleepers.take_due(now)) is not None:
+            self._end_pause(task)
 
     def _end_pause(self, task: Task) -> None:
         task.asleep = False
@@ -329,10 +306,10 @@ class Bus:
         """Sleep until something is asked for or a timer rings."""
         if self._inbox or self._stopping:
             return
-        moments = [self._timers[0][0]] if self._timers else []
-        if not self._is_open:
-            moments.append(self._reopen_at)
-        wait = max(0.0, min(moments) - time.monotonic()) if moments else None
+        moment = self._sleepers.next_moment
+        if not self._port.is_open:
+            moment = min(moment, self._port.reopen_at)
+        wait = None if math.isinf(moment) else max(0.0, moment - time.monotonic())
         self._awake.wait(wait)
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
@@ -351,55 +328,34 @@ class Bus:
             return
         self._tasks.add(task)
         if isinstance(awaited, Transfer):
-            self._queues[awaited.priority].append((task, awaited))
+            self._turns.add(Waiting(task, awaited))
         else:
-            task.asleep = True
-            heapq.heappush(self._timers, (awaited.until, next(self._order), task, task.pause))
+            self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
         """Send what is most urgent; false if there is nothing to send."""
-        background_due = self._credit > 0 and any(
-            self._queues[priority] for priority in self._background
-        )
-        if self._send_from(Priority.STOP):
-            return True
-        if not background_due and self._send_in_foreground():
-            return True
-        return any(self._send_from(priority) for priority in tuple(self._background))
-
-    def _send_in_foreground(self) -> bool:
-        # set-points may come faster than the line can carry them, and who then no longer polls
-        # does not see the fault that should stop the motor: so every other turn is for the rest
-        slot_went, self._slot_went = self._slot_went, False
-        if not slot_went and self._write_slot():
-            self._slot_went = True
-            return True
-        return any(self._send_from(priority) for priority in _FOREGROUND) or self._write_slot()
-
-    def _send_from(self, priority: Priority) -> bool:
-        queue = self._queues[priority]
-        if not queue:
+        entry = self._turns.take()
+        if entry is None:
             return False
-        self._exchange(*queue.popleft())
+        if isinstance(entry, Slot):
+            self._write_slot(entry)
+        else:
+            self._exchange(*entry)
         return True
 
-    def _write_slot(self) -> bool:
-        while self._slots:
-            slot = self._slots.popleft()
-            slot.pending = False
-            transfer = slot.make()
-            if transfer is None:
-                continue
-            try:
-                self._transact(transfer)
-            except NotReady as error:
-                self._later(error.until, functools.partial(self.request, slot))
-            except LinkError as error:
-                slot.done(transfer, error)
-            else:
-                slot.done(transfer, None)
-            return True
-        return False
+    def _write_slot(self, slot: Slot) -> None:
+        slot.pending = False
+        transfer = slot.make()
+        if transfer is None:
+            return
+        try:
+            self._transact(transfer)
+        except NotReady as error:
+            self._later(error.until, functools.partial(self.request, slot))
+        except LinkError as error:
+            slot.done(transfer, error)
+        else:
+            slot.done(transfer, None)
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
@@ -413,7 +369,7 @@ class Bus:
 
     def _resume(self, task: Task, transfer: Transfer) -> None:
         if task.awaited is transfer:
-            self._queues[transfer.priority].append((task, transfer))
+            self._turns.add(Waiting(task, transfer))
 
     def _later(self, until: float, function: Callable[[], None]) -> None:
         async def wait() -> None:
@@ -434,77 +390,45 @@ class Bus:
         except NotReady:
             raise
         except LinkError as error:
-            self._account(transfer, started, error)
+            self._account(started, error)
             raise
         except BaseException as error:
             # a mistake in the link must reach the one who asked, not leave him waiting
             _log.exception('error in the link')
             raise LinkError(f'error in the link: {error!r}') from error
-        self._account(transfer, started, None)
+        self._account(started, None)
         return reply
 
-    def _account(self, transfer: Transfer, started: float, error: LinkError | None) -> None:
+    def _account(self, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
-        took = now - started
-        if transfer.priority in self._background:
-            # no debt beyond this one transaction, for what is sent on an idle line harms nobody
-            self._credit = max(self._credit - took, -took)
-            self._background.rotate()
-        else:
-            earned = took * BACKGROUND_SHARE / (1 - BACKGROUND_SHARE)
-            self._credit = min(self._credit + earned, _MOST_CREDIT)
-        recorder = self._recorder
+        self._turns.took(now - started)
         if isinstance(error, PortError):
-            self._lose_port(error)
-            return
-        recorder.busy(now, took)
-        if error is None or isinstance(error, Refused):
-            recorder.answered(took)
-        recorder.timeouts += isinstance(error, NoAnswer)
-        recorder.damaged += isinstance(error, DamagedAnswer)
-        recorder.refused += isinstance(error, Refused)
+            self._port.lose(error, now + REOPEN_PERIOD)
+        else:
+            self._recorder.transaction(now, now - started, error)
 
     def _open_when_due(self) -> None:
         now = time.monotonic()
-        if now < self._reopen_at:
-            return
-        try:
-            self._link.open()
-        except PortError as error:
-            self._lose_port(error)
-        except BaseException as error:
-            _log.exception('error in the link')
-            self._lose_port(PortError(f'error in the link: {error!r}'))
-        else:
-            self._is_open = True
+        if now >= self._port.reopen_at and self._port.open(now + REOPEN_PERIOD):
             self._recorder.opened()
-
-    def _close_link(self) -> None:
-        try:
-            self._link.close()
-        except BaseException:
-            # who waits for an answer must be told all the same
-            _log.exception('error in the link')
-
-    def _lose_port(self, error: PortError) -> None:
-        self._close_link()
-        self._is_open = False
-        self._port_error = error
-        self._reopen_at = time.monotonic() + REOPEN_PERIOD
 
     def _fail_all(self, error: PortError) -> None:
         """Tell everyone who waits that the port is not there."""
-        while self._slots:
-            slot = self._slots.popleft()
-            slot.pending = False
+        for entry in self._turns.clear():
+            if isinstance(entry, Slot):
+                self._fail_slot(entry, error)
+            else:
+                self._advance(entry.task, None, error)
+
+    def _fail_slot(self, slot: Slot, error: PortError) -> None:
+        slot.pending = False
+        try:
             transfer = slot.make()
             if transfer is not None:
                 slot.done(transfer, error)
-        waiting = [entry for queue in self._queues.values() for entry in queue]
-        for queue in self._queues.values():
-            queue.clear()
-        for task, _ in waiting:
-            self._advance(task, None, error)
+        except BaseException:
+            # the others have to be told all the same
+            _log.exception('error in a slot; the bus worker goes on')
 
 
 def _log_unexpected(future: Future[Any]) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the worker of a bus is given to do: coroutines that await transactions, and slots."""
+"""What the worker of a bus is given to do: coroutines that await transactions and pauses; slots."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ from collections.abc import Coroutine
 from collections.abc import Generator
 from concurrent.futures import Future
 import enum
+import heapq
+import itertools
+import math
 from typing import Any
 
 from nfo_sinus_driver.link import Address
@@ -125,6 +128,32 @@ class Task:
         finally:
             self.running = False
         return None
+
+
+class Sleepers:
+    """Tasks in a pause, by the moment at which each ends."""
+
+    def __init__(self) -> None:
+        self._pauses: list[tuple[float, int, Task, int]] = []
+        self._order = itertools.count()
+
+    def add(self, task: Task, until: float) -> None:
+        """Let a task sleep until a moment of the steady clock, s."""
+        task.asleep = True
+        heapq.heappush(self._pauses, (until, next(self._order), task, task.pause))
+
+    def take_due(self, now: float) -> Task | None:
+        """Take out one whose pause is over; ``None`` if all go on."""
+        while self._pauses and self._pauses[0][0] <= now:
+            _, _, task, pause = heapq.heappop(self._pauses)
+            if task.asleep and task.pause == pause:
+                return task
+        return None
+
+    @property
+    def next_moment(self) -> float:
+        """When to look again, s; infinity if nobody sleeps."""
+        return self._pauses[0][0] if self._pauses else math.inf
 
 
 class Slot:

@@ -21,6 +21,11 @@ from dataclasses import dataclass
 import math
 import time
 
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Refused
+
 #: Of how many of the last transactions the round trips are kept.
 _ROUND_TRIPS = 1000
 #: Over how long the utilisation is taken, s.
@@ -70,6 +75,15 @@ class Recorder:
         """Count that the port was opened; every time but the first is a reconnect."""
         self.reconnects = self._opened
         self._opened += 1
+
+    def transaction(self, now: float, seconds: float, error: LinkError | None) -> None:
+        """Count a transaction that kept the line busy until ``now``, and how it ended."""
+        self.busy(now, seconds)
+        if error is None or isinstance(error, Refused):
+            self.answered(seconds)
+        self.timeouts += isinstance(error, NoAnswer)
+        self.damaged += isinstance(error, DamagedAnswer)
+        self.refused += isinstance(error, Refused)
 
     def busy(self, now: float, seconds: float) -> None:
         """Count a transaction that kept the line busy until ``now``."""

@@ -26,6 +26,7 @@ from nfo_sinus_driver.link.interface import Inquiry
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
+from nfo_sinus_driver.link.keeper import Keeper
 from nfo_sinus_driver.link.open import open_link
 from nfo_sinus_driver.link.settings import LineSettings
 
@@ -34,6 +35,7 @@ __all__ = [
     'DamagedAnswer',
     'Identification',
     'Inquiry',
+    'Keeper',
     'LineSettings',
     'Link',
     'LinkError',

@@ -175,8 +175,10 @@ def _open_device(path: str) -> int:
     try:
         fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
+        whole = path.startswith('/')
+        remedy = 'is the adapter plugged in?' if whole else f'should it be /dev/{path}?'
         raise PortError(
-            f'{path} does not exist: is the adapter plugged in? '
+            f'{path} does not exist: {remedy} '
             f'Ports there are: {", ".join(_ports()) or "none"}'
         ) from None
     except PermissionError:

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 import time
+from typing import Any
+from urllib.parse import urlsplit
 
 import serial
 
@@ -25,12 +27,22 @@ from nfo_sinus_driver.link.settings import LineSettings
 
 _READ_SIZE = 512
 _CONNECT_HINT = 'is the device server switched on and its address right?'
+#: The kinds of URL that lead to a device server.
+_SERVERS = ('socket', 'rfc2217')
+_REMEDY = (
+    'write socket://host:port for a TCP connection that passes bytes on, or rfc2217://host:port'
+)
 
 
 class UrlPort:
-    """A ``socket://host:port`` or ``rfc2217://host:port`` of pyserial."""
+    """
+    A ``socket://host:port`` or ``rfc2217://host:port``, or another URL that pyserial knows.
+
+    :raises ValueError: a URL that can never lead anywhere; the message says how to write one.
+    """
 
     def __init__(self, url: str, settings: LineSettings) -> None:
+        _check(url)
         self._url = url
         self._settings = settings
         self._serial: serial.SerialBase | None = None
@@ -39,7 +51,7 @@ class UrlPort:
         """
         Connect.
 
-        :raises PortError: nobody there, or a URL that pyserial does not know.
+        :raises PortError: nobody there.
         """
         try:
             self._serial = serial.serial_for_url(
@@ -96,3 +108,34 @@ class UrlPort:
 
     def _lost(self, error: OSError) -> PortError:
         return PortError(f'{self._url} was lost ({error}): {_CONNECT_HINT}')
+
+
+def _check(url: str) -> None:
+    """
+    Look at a URL without connecting.
+
+    :raises ValueError: an unknown kind, no host, no port, or an option that there is not.
+    """
+    kind = url.split('://')[0].lower()
+    try:
+        port: Any = serial.serial_for_url(url, do_not_open=True)
+    except ValueError:
+        raise ValueError(f'port {url!r}: there is no {kind}:// here; {_REMEDY}') from None
+    except OSError:
+        # known, but what it names is not there yet
+        return
+    if kind not in _SERVERS:
+        return
+    try:
+        parts = urlsplit(url)
+        complete = parts.hostname and parts.port
+    except ValueError:
+        complete = False
+    if not complete:
+        raise ValueError(f'port {url!r} lacks a host or a port from 1 to 65535: {_REMEDY}')
+    try:
+        port.from_url(url)
+    except (OSError, ValueError, LookupError):
+        raise ValueError(
+            f'port {url!r}: leave away {"?" + parts.query!r}, which is no option of {kind}://'
+        ) from None

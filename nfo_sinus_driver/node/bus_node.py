@@ -16,12 +16,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.link import LineSettings
@@ -46,11 +49,12 @@ class BusNode(Node):
     """
     The node of one bus.
 
+    :param overrides: settings that overrule what was given to the node.
     :raises ValueError: a setting makes no sense; the message says what would.
     """
 
-    def __init__(self) -> None:
-        super().__init__(NAME)
+    def __init__(self, overrides: Sequence[Parameter] = ()) -> None:
+        super().__init__(NAME, parameter_overrides=list(overrides))
         values = declare(self, BUS_SETTINGS)
         settings = LineSettings(
             baud_rate=values['baud_rate'] or _FACTORY_BAUD_RATE,

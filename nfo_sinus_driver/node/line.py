@@ -27,6 +27,7 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.node.listener import Listener
 from nfo_sinus_driver.node.outbox import Outbox
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ class Line:
     outbox: Outbox
     retries: int
     drives: list[DriveNode] = field(default_factory=list)
+    listener: Listener = field(default_factory=Listener)
 
     def say(self, log: Callable[[str], object], text: str) -> None:
         """Log a line from the outbox, for the bus must not wait for a log."""

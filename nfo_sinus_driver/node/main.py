@@ -39,9 +39,11 @@ from rclpy.validate_node_name import validate_node_name
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.node.arguments import refuse_other_arguments
 from nfo_sinus_driver.node.arguments import take_out_node_name
+from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.output import Output
+from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 
@@ -88,10 +90,13 @@ class DriverProcess:
     """The nodes of one bus, spun until somebody ends them."""
 
     def __init__(self, arguments: list[str], single_name: str | None) -> None:
-        self._bus_node = BusNode()
-        names = self._bus_node.drive_names
-        if single_name is not None:
-            names = _renamed(names, single_name)
+        if single_name is None:
+            self._bus_node = BusNode()
+            names = self._bus_node.drive_names
+        else:
+            _check_name(single_name)
+            self._bus_node = BusNode(bus_overrides(single_name))
+            names = _renamed(self._bus_node.drive_names, single_name)
         _check_names(names)
         line = self._bus_node.line
         for name in names:
@@ -117,12 +122,14 @@ class DriverProcess:
     def start(self) -> None:
         """Open the port and let the nodes work."""
         self._bus_node.start()
+        self._bus_node.line.listener.start()
         self._thread.start()
 
     @property
     def alive(self) -> bool:
         """The nodes and the bus still work."""
-        return self._thread.is_alive() and self._bus_node.line.bus.alive
+        line = self._bus_node.line
+        return self._thread.is_alive() and line.bus.alive and line.listener.alive
 
     def stop(self, why: str) -> bool:
         """
@@ -135,6 +142,7 @@ class DriverProcess:
         # whoever still waits for the bus is told, so that no callback keeps the executor
         self._bus_node.line.bus.close()
         self._bus_node.line.outbox.close()
+        self._bus_node.line.listener.close(_LAST_CALLBACK)
         self._spinning = False
         self._executor.wake()
         self._thread.join(_LAST_CALLBACK)
@@ -215,16 +223,23 @@ def _renamed(names: list[str], single_name: str) -> list[str]:
 
 def _check_names(names: list[str]) -> None:
     if not names:
-        raise ValueError('drives names no drive: give at least one name')
+        raise ValueError('drives names no drive: write at least one name, such as [nfo_sinus]')
     for name in names:
-        try:
-            validate_node_name(name)
-        except InvalidNodeNameException as error:
-            raise ValueError(f'drives names {name!r}, which is no node name: {error}') from error
+        _check_name(name)
         if names.count(name) > 1:
             raise ValueError(f'drives names {name} more than once: every drive needs its own name')
-        if name == 'nfo_sinus_bus':
-            raise ValueError('a drive cannot be named nfo_sinus_bus: that is the bus node')
+
+
+def _check_name(name: str) -> None:
+    try:
+        validate_node_name(name)
+    except InvalidNodeNameException:
+        raise ValueError(
+            f'{name!r} (in drives, or as __node) is no name for a drive node: it has letters, '
+            'digits and underscores only, and begins with no digit'
+        ) from None
+    if name == BUS_NAME:
+        raise ValueError(f'a drive cannot be named {BUS_NAME}: that is the bus node')
 
 
 def main(args: list[str] | None = None) -> int:

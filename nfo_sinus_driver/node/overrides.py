@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Finds what was given to the nodes and nobody takes: a misspelt parameter, a misspelt node."""
+"""Who gets what was given to the nodes, and what nobody takes: a misspelt parameter or node."""
 
 from __future__ import annotations
 
@@ -24,10 +24,41 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 import yaml
+
+from nfo_sinus_driver.node.settings import BUS_SETTINGS
 
 _PARAMS_FILE = '--params-file'
 _PARAMETERS = 'ros__parameters'
+#: A name, hidden from ``ros2 node list``, that no parameter file knows.
+_NOBODY = '_nobody'
+
+
+def bus_overrides(name: str) -> list[Parameter]:
+    """
+    Return the settings of the bus that were given to a name for the whole process.
+
+    A launch file's ``name=`` and ``namespace=`` put all parameters of the process under that name,
+    which becomes the drive's: the bus node, too, is to see what was meant for it. What is given to
+    every node reaches it anyway.
+    """
+    for_all = _given_to(_NOBODY)
+    given = _given_to(name)
+    return [
+        given[key]
+        for key in (setting.name for setting in BUS_SETTINGS)
+        if key in given and (key not in for_all or given[key].value != for_all[key].value)
+    ]
+
+
+def _given_to(name: str) -> dict[str, Parameter]:
+    """Let ROS itself say what a node of a name gets: it knows files, wildcards and their order."""
+    node = Node(name, enable_rosout=False, start_parameter_services=False)
+    try:
+        return dict(node._parameter_overrides)
+    finally:
+        node.destroy_node()
 
 
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
@@ -59,7 +90,9 @@ def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
 
 
 def _declared(node: Node) -> set[str]:
-    return set(node.get_parameters_by_prefix(''))
+    # those of a drive are declared when it is there
+    later: Iterable[str] = getattr(node, 'later_parameters', ())
+    return set(node.get_parameters_by_prefix('')) | set(later)
 
 
 def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -35,6 +34,15 @@ _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2',
 
 SettingValue = bool | int | float | str | list[str]
 
+#: What the types are called, and how to write one of each.
+_TYPES = {
+    bool: ('a boolean', 'true or false'),
+    int: ('an integer', 'a whole number'),
+    float: ('a double', 'a number'),
+    str: ('a string', 'a text in quotes'),
+    list: ('a list', 'a list of names, such as [left, right]'),
+}
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -42,6 +50,7 @@ class Setting:
     One setting of a node.
 
     :ivar low: the least value; ``None`` where there is no range.
+    :ivar unit: of the range.
     :ivar fixed: it cannot be changed while the process runs.
     """
 
@@ -52,6 +61,28 @@ class Setting:
     high: float = 0.0
     constraints: str = ''
     fixed: bool = False
+    unit: str = ''
+
+    def understood(self, given: object) -> SettingValue:
+        """
+        Take what was given for what was meant: 5 for 5.0, and 8E1 for '8E1'.
+
+        The types of ROS parameters are stricter than people, and YAML takes 8E1 for eighty.
+
+        :raises ValueError: another type altogether, or out of range; the message says what can be.
+        """
+        value = given
+        if type(given) is int and isinstance(self.default, float):
+            value = float(given)
+        elif type(given) is float and self.name == 'char_format':
+            value = _FORMATS_THAT_ARE_NUMBERS.get(given, given)
+        if type(value) is not type(self.default) or not _only_strings(value):
+            what = 'is empty' if given is None else f'is {given!r} ({_type_of(given)})'
+            raise ValueError(f'{self.name} {what}: write {_as(type(self.default), given)}')
+        if self.low is not None and not self.low <= value <= self.high:
+            span = f'{self.low:g} to {self.high:g} {self.unit}'.rstrip()
+            raise ValueError(f'{self.name} {value:g}: allowed are {span}')
+        return value
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what ``ros2 param describe`` shows."""
@@ -108,6 +139,7 @@ BUS_SETTINGS = (
         0.01,
         10.0,
         fixed=True,
+        unit='s',
     ),
     Setting(
         'retries',
@@ -139,19 +171,24 @@ DRIVE_SETTINGS = (
     Setting(
         'autostart',
         True,
-        'Configure and activate by itself, and try until it works',
-        fixed=True,
+        'Configure and activate by itself, and try until it works; read at the start only',
     ),
     Setting(
-        'poll_rate', 0.0, 'Status and actual value, Hz; 0: as fast as the bus allows', 0, 1000
+        'poll_rate',
+        0.0,
+        'Status and actual value, Hz; 0: as fast as the bus allows',
+        0,
+        1000,
+        unit='Hz',
     ),
-    Setting('telemetry_rate', 2.0, 'Measured values, Hz; 0: off', 0, 100),
+    Setting('telemetry_rate', 2.0, 'Measured values, Hz; 0: off', 0, 100, unit='Hz'),
     Setting(
         'setpoint_timeout',
         2.5,
         'No fresh set-point for this long, s: ramp to a stop and warn; 0: off',
         0,
         3600,
+        unit='s',
     ),
     Setting(
         'setpoint_max',
@@ -160,6 +197,7 @@ DRIVE_SETTINGS = (
         "0: the drive's own limit",
         0,
         32767,
+        unit='in the unit of the control mode',
     ),
     Setting(
         'expected_control_mode',
@@ -174,6 +212,7 @@ DRIVE_SETTINGS = (
         'motor when this driver dies; 0: leave it as it is',
         0,
         25,
+        unit='s',
         constraints='0 or at least 1.0',
     ),
     Setting(
@@ -182,55 +221,77 @@ DRIVE_SETTINGS = (
         'How long an exit waits for the drive to confirm that it stops, s',
         0,
         600,
+        unit='s',
+    ),
+    Setting(
+        'apply_parameters',
+        True,
+        'At the first configure, write the parameters of the drive that were given to this node '
+        'and that it has otherwise; false: only report them',
+    ),
+    Setting(
+        'allow_communication_changes',
+        False,
+        'Let the parameters serial.* be changed: the driver may lose the drive by that',
     ),
     Setting('frame_id', '', 'frame_id of the headers'),
 )
 
 
+def _only_strings(value: object) -> bool:
+    return not isinstance(value, list) or all(isinstance(one, str) for one in value)
+
+
+def _type_of(value: object) -> str:
+    return _TYPES.get(type(value), ('a list', ''))[0]
+
+
+def _as(wanted: type, given: object) -> str:
+    """Return how to write what was given in the type that is wanted, or any of that type."""
+    if isinstance(given, str):
+        if wanted is list:
+            return f'[{given}]'
+        if _reads_as(wanted, given):
+            return f'{given} without quotes'
+    if wanted is str and type(given) in (int, float):
+        return f"'{given}' with quotes"
+    if wanted is int and isinstance(given, float) and given.is_integer():
+        return f'{given:.0f}'
+    return _TYPES[wanted][1]
+
+
+def _reads_as(wanted: type, text: str) -> bool:
+    if wanted is bool:
+        return text in ('true', 'false')
+    try:
+        wanted(text)
+    except ValueError:
+        return False
+    return True
+
+
 def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue]:
     """
-    Declare settings on a node and return their values; an integer is taken for a double.
+    Declare settings on a node and return their values.
 
-    :raises rclpy.exceptions.ParameterException: an override has a wrong type or is out of range.
+    :raises ValueError: an override has a wrong type or is out of range; the message says which
+        one, and what it can be.
     """
     for setting in settings:
-        try:
-            node.declare_parameter(setting.name, setting.default, setting.descriptor())
-        except InvalidParameterTypeException:
-            _declare_from_number(node, setting)
+        # rclpy has no other way to see an override first, and its own complaints name no remedy
+        given = node._parameter_overrides.get(setting.name)
+        value = setting.default if given is None else setting.understood(given.value)
+        node.declare_parameter(setting.name, value, setting.descriptor(), ignore_override=True)
     return {setting.name: node.get_parameter(setting.name).value for setting in settings}
 
 
-def _declare_from_number(node: Node, setting: Setting) -> None:
+def understood(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter:
     """
-    Take an override of 5 for 5.0, and of 8E1 for '8E1'.
+    Take what somebody sets for what is meant, if it is one of the settings.
 
-    The types of ROS parameters are stricter than people, and YAML takes 8E1 for eighty.
-
-    :raises InvalidParameterTypeException: the override is of another type altogether.
+    :raises ValueError: another type altogether, or out of range; the message says what can be.
     """
-    dynamic = ParameterDescriptor(dynamic_typing=True)
-    given = node.declare_parameter(setting.name, setting.default, dynamic).value
-    node.undeclare_parameter(setting.name)
-    meant: SettingValue
-    if isinstance(setting.default, float) and type(given) is int:
-        meant = float(given)
-    elif setting.name == 'char_format' and given in _FORMATS_THAT_ARE_NUMBERS:
-        meant = _FORMATS_THAT_ARE_NUMBERS[given]
-    else:
-        node.declare_parameter(setting.name, setting.default, setting.descriptor())
-        return
-    node.declare_parameter(setting.name, meant, setting.descriptor(), ignore_override=True)
-
-
-def integers_to_doubles(
-    parameters: list[Parameter], settings: tuple[Setting, ...]
-) -> list[Parameter]:
-    """Return parameters to set with integers turned into doubles where doubles are declared."""
-    doubles = {setting.name for setting in settings if isinstance(setting.default, float)}
-    return [
-        Parameter(parameter.name, Parameter.Type.DOUBLE, float(parameter.value))
-        if parameter.name in doubles and parameter.type_ is Parameter.Type.INTEGER
-        else parameter
-        for parameter in parameters
-    ]
+    for setting in settings:
+        if setting.name == parameter.name and parameter.type_ is not Parameter.Type.NOT_SET:
+            return Parameter(parameter.name, value=setting.understood(parameter.value))
+    return parameter

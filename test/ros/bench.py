@@ -74,12 +74,14 @@ TOPICS = {
 def wait_until(
     condition: Callable[[], Any], what: str, timeout: float = PATIENCE, period: float = 0.01
 ) -> Any:
-    """Wait for a condition and return what it returned."""
+    """Wait for a condition and return what it returned; not while a driver has crashed."""
     deadline = time.monotonic() + timeout
     while True:
         result = condition()
         if result:
             return result
+        for process in _watched:
+            process.has_not_crashed(what)
         assert time.monotonic() < deadline, f'not within {timeout:g} s: {what}'
         time.sleep(period)
 
@@ -97,6 +99,7 @@ class Process:
 
     def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
         self._log = log
+        self._may_end = False
         with log.open('ab') as stream:
             self._process = subprocess.Popen(
                 command,
@@ -118,12 +121,21 @@ class Process:
         return self._process.poll() is None
 
     def signal(self, number: int) -> None:
-        """Send it a signal."""
+        """Send it a signal, which may end it."""
+        self._may_end = True
         self._process.send_signal(number)
 
     def wait(self) -> int:
         """Wait for its end; return its exit status."""
+        self._may_end = True
         return self._process.wait(PATIENCE)
+
+    def has_not_crashed(self, waiting_for: str) -> None:
+        """Fail, with what it said, if it has ended and nobody in the test ended it."""
+        assert self.running or self._may_end, (
+            f'ended by itself ({self._process.returncode}), no use waiting for {waiting_for}:\n'
+            f'{self.text}'
+        )
 
     def end(self) -> None:
         """End it, gently first."""
@@ -135,6 +147,10 @@ class Process:
             self._process.kill()
             self._process.wait()
             raise
+
+
+#: The drivers at work: what a test waits for will not come when one of them has ended by itself.
+_watched: list[Process] = []
 
 
 class Bench(contextlib.ExitStack):
@@ -149,23 +165,29 @@ class Bench(contextlib.ExitStack):
         self.domain = domain
         self._drivers: list[Process] = []
 
-    def simulator(self, *arguments: str) -> Simulated:
-        """Start a simulated line; return what looks into it."""
+    def simulator(self, *arguments: str, paced: bool = True) -> Simulated:
+        """Start a simulated line, as slow as a real one if paced; return what looks into it."""
         command = [_executable('simulator'), '--link', self.port, '--baud', str(BAUD_RATE)]
-        command += ['--paced', '--trace', str(self.trace), *arguments]
+        command += ['--trace', str(self.trace), *(['--paced'] if paced else []), *arguments]
         process = Process(command, self._environment, self.folder / 'simulator.log')
         self.callback(process.end)
         wait_until(lambda: 'serving' in process.text or not process.running, 'the simulator')
         assert process.running, process.text
         return self.enter_context(Simulated.at_link(self.port))
 
-    def driver(self, *arguments: str) -> Process:
+    def driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
         """Start a driver on the line; ``-p name:=value`` arguments may follow."""
-        settings = ['-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}']
-        command = [_executable('driver'), '--ros-args', *settings, *arguments]
+        settings = ('-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}')
+        return self.bare_driver(*settings, *arguments, through=through)
+
+    def bare_driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
+        """Start a driver with ROS arguments alone, by way of another command if need be."""
+        command = [*through, _executable('driver'), '--ros-args', *arguments]
         log = self.folder / f'driver{len(self._drivers)}.log'
         process = Process(command, self._environment, log)
         self._drivers.append(process)
+        _watched.append(process)
+        self.callback(_watched.remove, process)
         self.callback(_no_traceback, process)
         self.callback(process.end)
         return process
@@ -270,7 +292,7 @@ class Client(contextlib.ExitStack):
         client = self._clients.get(path)
         if client is None:
             client = self._clients[path] = self.node.create_client(type_, path)
-        assert client.wait_for_service(PATIENCE), f'there is no service {path}'
+        wait_until(client.service_is_ready, f'there is a service {path}')
         return client.call_async(type_.Request(**fields))
 
     def call(self, service: str, type_: type = Trigger, **fields: Any) -> Any:

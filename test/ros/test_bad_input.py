@@ -19,11 +19,14 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+import shutil
 import stat
 import subprocess
 import sys
+import time
 
 from bench import A_WHILE
+from bench import BAUD_RATE
 from bench import PATIENCE
 from bench import Bench
 from bench import Client
@@ -106,12 +109,21 @@ def test_what_is_no_serial_port_is_named_so(bench: Bench) -> None:
     _says(bench.driver(), bench.port, 'is not a serial port')
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason='root may open everything')
+def _without_privileges() -> tuple[str, ...]:
+    """Return what a command is run through so that not even root may open everything."""
+    if os.geteuid():
+        return ()
+    through = ('setpriv', '--bounding-set=-dac_override,-dac_read_search')
+    if not shutil.which('setpriv') or subprocess.run((*through, 'true'), check=False).returncode:
+        pytest.skip('root, and not allowed to give up the right to open everything')
+    return through
+
+
 def test_a_port_without_permission_names_the_remedy(bench: Bench) -> None:
     drive = bench.simulator()
     device = os.path.realpath(bench.port)
     os.chmod(device, 0)
-    driver = bench.driver()
+    driver = bench.driver(through=_without_privileges())
     _says(driver, 'no permission', 'dialout')
     _untouched(drive)
     os.chmod(device, stat.S_IRUSR | stat.S_IWUSR)
@@ -222,9 +234,21 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
-        (['-p', 'address:=0'], ['address', '1', '247']),
-        (['-p', 'address:=one'], ['address', 'INTEGER']),
-        (['-p', 'setpoint_timeout:=-1.0'], ['setpoint_timeout']),
+        (['-p', 'address:=0'], ['nfo_sinus: address 0', '1 to 247']),
+        (['-p', 'address:=one'], ["address is 'one' (a string)", 'write a whole number']),
+        (['-p', 'address:="1"'], ["address is '1' (a string)", 'write 1 without quotes']),
+        (['-p', 'address:=2.0'], ['address is 2.0 (a double): write 2']),
+        (['-p', 'frame_id:=7'], ["frame_id is 7 (an integer): write '7' with quotes"]),
+        (['-p', 'rs485:="true"'], ["rs485 is 'true' (a string)", 'true without quotes']),
+        (['-p', 'autostart:=1'], ['autostart is 1 (an integer): write true or false']),
+        (['-p', 'setpoint_timeout:=-1'], ['setpoint_timeout -1', '0 to 3600 s']),
+        (['-p', 'poll_rate:=.nan'], ['poll_rate nan', '0 to 1000 Hz']),
+        (['-p', 'response_timeout:=11.0'], ['response_timeout 11', '0.01 to 10 s']),
+        (['-p', 'retries:=11'], ['retries 11', '0 to 10']),
+        (['-p', 'port:=foo://x'], ['port', 'there is no foo://', 'socket://host:port', 'rfc2217']),
+        (['-p', 'port:=10.0.0.1:502'], ['port', 'no device', 'write socket://10.0.0.1:502']),
+        (['-p', 'port:=""'], ['port is empty']),
+        (['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1']),
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
         (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
@@ -233,7 +257,11 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
         (['-p', 'char_format:=9X1'], ['char_format', '8E1']),
         (['-p', 'drives:=[one, one]'], ['one', 'its own name']),
         (['-p', 'drives:=[nfo_sinus_bus]'], ['nfo_sinus_bus']),
-        (['-p', 'drives:=["1st"]'], ['1st']),
+        (['-p', 'drives:=["1st"]'], ["'1st' (in drives", 'letters, digits and underscores']),
+        (['-p', 'drives:=[]'], ['drives is empty', '[left, right]']),
+        (['-p', 'drives:=left'], ["drives is 'left' (a string): write [left]"]),
+        (['-p', 'drives:=[1, 2]'], ['drives is [1, 2]', 'a list of names']),
+        (['-r', '__node:=1st'], ["'1st' (in drives, or as __node)", 'begins with no digit']),
         (['-p', 'drives:=[one, two]'], ['address 1', 'belongs to one', 'address of its own']),
         (['-p', 'drives:=[one, two]', '-r', '__node:=x'], ['x', '2 drives', 'drives']),
     ],
@@ -287,3 +315,51 @@ def test_a_name_for_the_whole_process_becomes_the_name_of_the_single_drive(bench
     assert 'belt' in nodes
     assert 'nfo_sinus_bus' in nodes
     assert nodes.count('belt') == 1
+
+
+@pytest.mark.parametrize(
+    ('section', 'renames', 'namespace'),
+    [
+        ('belt', ['-r', '__node:=belt'], ''),
+        # what launch makes of name= and namespace=
+        ('/line1/belt', ['-r', '__node:=belt', '-r', '__ns:=/line1'], '/line1'),
+        ('/**/belt', ['-r', '__node:=belt', '-r', '__ns:=/line1'], '/line1'),
+    ],
+)
+def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
+    bench: Bench, section: str, renames: list[str], namespace: str
+) -> None:
+    drive = bench.simulator('--address', '3')
+    parameters = bench.folder / 'named.yaml'
+    parameters.write_text(
+        '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
+        '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
+        f'{section}: {{ros__parameters: {{port: {bench.port}, baud_rate: {BAUD_RATE}, '
+        'address: 3, response_timeout: 0.5}}\n'
+    )
+    driver = bench.bare_driver(*renames, '--params-file', str(parameters))
+    client = bench.client(f'{namespace}/belt').connected()
+    assert client.parameter('address') == 3
+    bus_node = bench.client(f'{namespace}/nfo_sinus_bus')
+    wanted = {'port': bench.port, 'baud_rate': BAUD_RATE, 'response_timeout': 0.5, 'retries': 4}
+    assert {name: bus_node.parameter(name) for name in wanted} == wanted
+    assert 'was given to' not in driver.text, 'nothing was given in vain'
+    assert client.enable().success
+    assert drive.state()['scmd'] == 0x101
+    assert not any('_nobody' in name for name in client.node.get_node_names())
+
+
+# --- the tests themselves -----------------------------------------------------------------------
+
+
+def test_a_driver_that_ends_by_itself_fails_a_test_at_once_with_what_it_said(bench: Bench) -> None:
+    drive = bench.simulator()
+    bench.driver('-p', 'address:=0')
+    client = bench.client()
+    begun = time.monotonic()
+    with pytest.raises(AssertionError, match=r'ended by itself .2.*is connected[^$]*247'):
+        client.connected()
+    with pytest.raises(AssertionError, match=r'ended by itself .2.*a service /nfo_sinus/stop'):
+        client.call('stop')
+    assert time.monotonic() - begun < PATIENCE / 2
+    _untouched(drive)

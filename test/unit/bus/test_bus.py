@@ -35,7 +35,6 @@ import pytest
 
 from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver import statistics as statistics_module
-from nfo_sinus_driver.bus import BACKGROUND_SHARE
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
@@ -49,6 +48,7 @@ from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.turns import BACKGROUND_SHARE
 
 UNIT = 1
 OTHER = 2
@@ -297,7 +297,7 @@ def take_time(
 
 
 @pytest.mark.parametrize('background', [0.0064, 0.013, 0.023])
-@pytest.mark.parametrize('foreground', [0.0064, 0.013, 0.023])
+@pytest.mark.parametrize('foreground', [0.0064, 0.013, 0.023, 0.2])
 def test_background_has_a_fifth_of_the_time(
     link: FakeLink, monkeypatch: pytest.MonkeyPatch, foreground: float, background: float
 ) -> None:
@@ -335,7 +335,7 @@ def test_background_alone_has_the_whole_line(bus: Bus, link: FakeLink) -> None:
         assert result(ask(bus, number, Priority.REFRESH)) == (number,)
 
 
-def test_set_point_never_waits_for_two_of_the_background(
+def test_set_point_goes_before_all_that_the_background_is_owed(
     link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the shortest read there is takes 6.4 ms, at 57600 bit/s
@@ -354,7 +354,8 @@ def test_set_point_never_waits_for_two_of_the_background(
         result(future)
     wait_until(lambda: writer.outcomes)
     bus.close()
-    assert link.numbers[21:].index(50) <= 1
+    # the one that was on the line when it came
+    assert link.numbers[20:22] == [0, 50]
 
 
 # --- slots ----------------------------------------------------------------------------------------
@@ -872,6 +873,24 @@ def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.Monkey
     # it was opened once, so nothing was reconnected
     assert bus.statistics().reconnects == 0
     bus.close()
+
+
+def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> None:
+    link.opening = raiser(PortError('gone'))
+    link.answer = raiser(PortError('gone'))
+    failure(ask(bus, 1, Priority.POLL))
+    broken = Slot(raiser(ValueError('oops')), lambda transfer, error: None)
+    writer = Writer(bus)
+
+    def want_both() -> None:
+        bus.request(broken)
+        writer.want(7)
+
+    bus.call(want_both)
+    # the other one is told all the same
+    wait_until(lambda: writer.outcomes)
+    assert str(writer.outcomes[0][1]) == 'gone'
+    assert not broken.pending
 
 
 def test_sleepers_are_not_troubled_by_a_lost_port(bus: Bus, link: FakeLink) -> None:

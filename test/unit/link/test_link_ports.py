@@ -22,6 +22,7 @@ import errno
 import fcntl
 import os
 from pathlib import Path
+import re
 import select
 import socket
 import termios
@@ -437,10 +438,48 @@ def test_device_server_that_is_not_there(server: Server) -> None:
         port.write(b'x')
 
 
-@pytest.mark.parametrize('url', ['nonsense://127.0.0.1:1', 'socket://127.0.0.1', 'socket://:x'])
-def test_url_that_is_none(url: str) -> None:
-    with pytest.raises(PortError, match=f'{url} cannot be opened'):
-        UrlPort(url, LineSettings()).open()
+@pytest.mark.parametrize(
+    ('url', 'why'),
+    [
+        ('foo://127.0.0.1:1', 'there is no foo:// here; write socket://host:port'),
+        ('://x', 'write socket://host:port'),
+        ('socket://127.0.0.1', 'lacks a host or a port.*write socket://host:port'),
+        ('socket://:4001', 'lacks a host'),
+        ('socket://127.0.0.1:x', 'lacks a host or a port'),
+        ('socket://127.0.0.1:0', '1 to 65535'),
+        ('rfc2217://127.0.0.1:65536', '1 to 65535'),
+        ('socket://127.0.0.1:1?fast', r"leave away '\?fast', which is no option of socket://"),
+        ('rfc2217://127.0.0.1:1?timeout=x', r"leave away '\?timeout=x'"),
+    ],
+)
+def test_url_that_can_lead_nowhere_is_refused_at_once(url: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f'^port {re.escape(repr(url))}.*{why}'):
+        open_link('modbus_rtu', url, LineSettings())
+
+
+@pytest.mark.parametrize(
+    'url', ['RFC2217://server:1?ign_set_control', 'spy:///dev/null', 'hwgrep://not there']
+)
+def test_url_that_may_lead_somewhere_is_not_refused(url: str) -> None:
+    open_link('modbus_rtu', url, LineSettings())
+
+
+@pytest.mark.parametrize('port', ['10.0.0.1:502', 'server:4001', '[::1]:1'])
+def test_host_and_port_without_a_kind_of_url_are_told_the_kind(port: str) -> None:
+    with pytest.raises(ValueError, match=f'^port .*write socket://{re.escape(port)} for'):
+        open_link('modbus_rtu', port, LineSettings())
+
+
+def test_a_device_without_its_folder_is_told_the_whole_path() -> None:
+    with pytest.raises(PortError, match=r'ttyNone does not exist: should it be /dev/ttyNone\?'):
+        SerialPort('ttyNone', LineSettings()).open()
+
+
+def test_no_port_and_seven_data_bits_can_never_work() -> None:
+    with pytest.raises(ValueError, match='port is empty'):
+        open_link('modbus_rtu', '', LineSettings())
+    with pytest.raises(ValueError, match=r"char_format '7O1': modbus_rtu has 8 data bits.* 8O1"):
+        open_link('modbus_rtu', '/dev/x', LineSettings(char_format='7O1'))
 
 
 def test_device_server_that_goes_away(server: Server) -> None:

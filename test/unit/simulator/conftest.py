@@ -67,7 +67,7 @@ class Bench:
 
     @property
     def state(self):
-        return self.drive.phase.value
+        return self.drive.runner.state
 
     @property
     def inv_st(self):

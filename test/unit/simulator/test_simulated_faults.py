@@ -84,7 +84,7 @@ def test_a_stop_cannot_be_given_while_a_fault_stands(bench):
 
 
 def test_a_drive_that_takes_writes_in_spite_of_a_fault(bench):
-    bench.drive.refuses_writes_when_faulted = False
+    bench.drive.runner.refuses_writes_when_faulted = False
     bench.run(20, 5)
     bench.drive.trip(5)
     bench.scmd(0)

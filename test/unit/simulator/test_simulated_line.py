@@ -274,6 +274,27 @@ def test_a_late_answer_comes_after_those_to_later_requests(paced):
     assert rig.trace[3]['last'] >= 100.5
 
 
+@pytest.mark.parametrize('paced', [False, True])
+def test_no_answer_of_a_drive_overtakes_an_earlier_one(paced):
+    rig = Rig(paced=paced)
+    rig.line.faults.add('delay', 1, seconds=0.5)
+    rig.ask(1)
+    rig.wait(0.2)
+    rig.ask(1, bytes.fromhex('06 0294 0003'))
+    rig.wait(0.2)
+    assert not b''.join(rig.answers)
+    assert rig.drives[0].runner.source.mode == 3, 'only the answer waits'
+    rig.wait(1)
+    taken = RTU.wrap(1, bytes.fromhex('06 0294 0003'))
+    assert b''.join(rig.answers) == MODE_IS_STOP + taken
+    late, next_one = rig.trace[2:]
+    assert (late['note'], next_one['note']) == ('delayed', '')
+    assert next_one['first'] - late['last'] > 0.99 * rig.timing.t35, 'a frame of its own'
+    rig.ask(1)
+    rig.wait(0.2)
+    assert len(rig.trace) == 6, 'nothing waits for what has been delivered'
+
+
 def test_a_dropped_answer_is_still_an_obeyed_request():
     rig = Rig()
     rig.line.faults.add('drop', 1)

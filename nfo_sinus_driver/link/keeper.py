@@ -1,0 +1,73 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A link that is opened again whenever it is lost."""
+
+from __future__ import annotations
+
+import logging
+
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.interface import Link
+
+_log = logging.getLogger(__name__)
+
+
+class Keeper:
+    """
+    Opens a link, and again when it was lost; nothing that the link raises gets out.
+
+    :ivar is_open: the link is open.
+    :ivar error: why it is not, or was not when it was closed last.
+    :ivar reopen_at: when it may be tried again, s on the steady clock.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self.is_open = False
+        self.error = PortError('the port is not open yet')
+        self.reopen_at = 0.0
+
+    def open(self, reopen_at: float) -> bool:
+        """
+        Try to open the link.
+
+        :param reopen_at: when to try again if it cannot be opened.
+        :returns: whether it is open.
+        """
+        try:
+            self._link.open()
+        except PortError as error:
+            self.lose(error, reopen_at)
+        except BaseException as error:
+            _log.exception('error in the link')
+            self.lose(PortError(f'error in the link: {error!r}'), reopen_at)
+        else:
+            self.is_open = True
+        return self.is_open
+
+    def lose(self, error: PortError, reopen_at: float) -> None:
+        """Close the link because of an error, until it may be tried again."""
+        self.close()
+        self.error = error
+        self.reopen_at = reopen_at
+
+    def close(self) -> None:
+        """Close the link."""
+        self.is_open = False
+        try:
+            self._link.close()
+        except BaseException:
+            # who waits for an answer must be told all the same
+            _log.exception('error in the link')

@@ -1,0 +1,121 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages that cannot wait for the executor: one thread takes them as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import logging
+import threading
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.guard_condition import GuardCondition
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.utilities import get_default_context
+
+_log = logging.getLogger(__name__)
+
+_FOR_EVER = -1
+
+
+class _Apart(ReentrantCallbackGroup):
+    """Keeps subscriptions, though not their events, from the executor of their node."""
+
+    def can_execute(self, entity: object) -> bool:
+        return not isinstance(entity, Subscription)
+
+
+class Listener:
+    """
+    Listens to a few topics for which an executor would be too slow.
+
+    An executor of rclpy looks through everything of every node before it waits again, and hands a
+    message from thread to thread. This waits for its subscriptions alone, as
+    ``rclpy.wait_for_message`` does. They are the node's like any other, under its name and with
+    its remappings.
+    """
+
+    def __init__(self) -> None:
+        self._context = get_default_context()
+        self._ways: list[tuple[Subscription, Callable[[Any], None]]] = []
+        self._guard = GuardCondition(None, None, self._context)
+        self._closing = False
+        self._thread = threading.Thread(target=self._work, name='listener', daemon=True)
+
+    def listen(
+        self,
+        node: Node,
+        message_type: type,
+        topic: str,
+        callback: Callable[[Any], None],
+        quality: QoSProfile,
+    ) -> None:
+        """Have a function called with each message, once the listener was started."""
+        subscription = node.create_subscription(
+            message_type, topic, callback, quality, callback_group=_Apart()
+        )
+        self._ways.append((subscription, callback))
+
+    def start(self) -> None:
+        """Start the thread; all that it listens to has to be known by then."""
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        """The thread works."""
+        return self._thread.is_alive()
+
+    def close(self, timeout: float = 2.0) -> None:
+        """End the thread after its present message."""
+        self._closing = True
+        self._guard.trigger()
+        if self._thread.is_alive():
+            self._thread.join(timeout)
+
+    def _work(self) -> None:
+        try:
+            with self._context.handle:
+                self._take_all()
+        except Exception:
+            # who is deaf must not go on as if nobody spoke: the process ends, and stops the motors
+            _log.exception('set-points can no longer be received')
+
+    def _take_all(self) -> None:
+        wait_set = rclpy_implementation.WaitSet(
+            len(self._ways), 1, 0, 0, 0, 0, self._context.handle
+        )
+        while not self._closing:
+            wait_set.clear_entities()
+            wait_set.add_guard_condition(self._guard.handle)
+            for subscription, _ in self._ways:
+                wait_set.add_subscription(subscription.handle)
+            wait_set.wait(_FOR_EVER)
+            ready = wait_set.get_ready_entities('subscription')
+            for subscription, callback in self._ways:
+                if subscription.handle.pointer in ready:
+                    self._take(subscription, callback)
+
+    def _take(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
+        try:
+            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            if taken is not None:
+                callback(taken[0])
+        except Exception:
+            # a message that makes trouble must not keep the next one out
+            _log.exception('error in a callback; the driver goes on')

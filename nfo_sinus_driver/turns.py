@@ -1,0 +1,124 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Whose turn it is on one line.
+
+What waits for the line, and which of it goes next. No thread, no clock and nothing sent:
+:class:`nfo_sinus_driver.bus.Bus` asks, sends, and says how long that kept the line.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Literal
+from typing import NamedTuple
+
+from nfo_sinus_driver.jobs import Priority
+from nfo_sinus_driver.jobs import Slot
+from nfo_sinus_driver.jobs import Task
+from nfo_sinus_driver.jobs import Transfer
+
+__all__ = ['BACKGROUND_SHARE', 'Turns', 'Waiting']
+
+#: The share of the time that TELEMETRY and REFRESH get when everything above asks for more.
+BACKGROUND_SHARE = 0.2
+#: How much of its share the background may be owed while it waits for it, s: what it earns by
+#: two requests that nobody answers, when the time-out is that of the factory.
+_MOST_OWED = 0.1
+#: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
+_MOST_SAVED = 0.005
+
+_SLOT: Literal['slot'] = 'slot'
+_Rank = Priority | Literal['slot']
+
+
+class Waiting(NamedTuple):
+    """A transaction, and the task that awaits it."""
+
+    task: Task
+    transfer: Transfer
+
+
+class Turns:
+    """
+    What waits for the line, the next one in front.
+
+    A stop goes first and a set-point in a slot next, so either waits for the transaction on the
+    line and no other. The background (TELEMETRY and REFRESH, which take turns) goes ahead of all
+    else as long as it is owed its share of the time. Set-points may come faster than the line can
+    carry them, and who then no longer polls does not see the fault that should stop the motor: so
+    after each of them something else has a turn, the background's share included.
+    """
+
+    def __init__(self) -> None:
+        self._queues: dict[_Rank, deque[Slot | Waiting]] = {
+            rank: deque() for rank in (*Priority, _SLOT)
+        }
+        #: What shares the guaranteed time, the one that is next in front.
+        self._background = deque((Priority.TELEMETRY, Priority.REFRESH))
+        #: How much time the background is owed, s; it owes if that is negative.
+        self._owed = 0.0
+        self._given: _Rank = _SLOT
+        self._slot_went = False
+
+    def add(self, entry: Slot | Waiting) -> None:
+        """Let a slot or a transaction wait for its turn, behind its equals."""
+        rank = _SLOT if isinstance(entry, Slot) else entry.transfer.priority
+        self._queues[rank].append(entry)
+
+    def take(self) -> Slot | Waiting | None:
+        """Take out what goes next; ``None`` if nothing waits."""
+        for rank in self._order():
+            if self._queues[rank]:
+                self._given = rank
+                return self._queues[rank].popleft()
+        return None
+
+    def took(self, seconds: float) -> None:
+        """Account for the time, s, for which what was taken out last has kept the line."""
+        self._slot_went = self._given == _SLOT
+        if self._given in self._background:
+            # no debt beyond this one transaction, for what is sent on an idle line harms nobody
+            self._owed = max(self._owed - seconds, -seconds)
+            self._background.rotate()
+            return
+        earned = seconds * BACKGROUND_SHARE / (1 - BACKGROUND_SHARE)
+        waits = any(self._queues[priority] for priority in self._background)
+        self._owed = min(self._owed + earned, _MOST_OWED if waits else _MOST_SAVED)
+
+    def withdraw(self, task: Task) -> None:
+        """Take out all that a task waits to send."""
+        for queue in self._queues.values():
+            for entry in tuple(queue):
+                if isinstance(entry, Waiting) and entry.task is task:
+                    queue.remove(entry)
+
+    def clear(self) -> list[Slot | Waiting]:
+        """Take out everything."""
+        entries = [entry for queue in self._queues.values() for entry in queue]
+        for queue in self._queues.values():
+            queue.clear()
+        return entries
+
+    def _order(self) -> Iterator[_Rank]:
+        yield Priority.STOP
+        if not self._slot_went:
+            yield _SLOT
+        if self._owed > 0:
+            yield from self._background
+        yield from (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
+        yield _SLOT
+        yield from self._background

@@ -1,0 +1,261 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whose turn it is, without a line, a clock or a thread."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+from typing import cast
+
+import pytest
+
+from nfo_sinus_driver.jobs import Priority
+from nfo_sinus_driver.jobs import Slot
+from nfo_sinus_driver.jobs import Task
+from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.turns import BACKGROUND_SHARE
+from nfo_sinus_driver.turns import Turns
+from nfo_sinus_driver.turns import Waiting
+
+_SLOT = 'slot'
+_BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
+#: A read at 57600 bit/s takes this long, s.
+_READ = 0.0064
+_TURNS = 4000
+
+
+def entry(kind: object, name: str = '') -> Slot | Waiting:
+    """Something that waits; a name stands for its task."""
+    if kind == _SLOT:
+        return Slot(lambda: None, lambda transfer, error: None)
+    transfer = Transfer(1, Address((1,), 1), cast(Priority, kind))
+    return Waiting(cast(Task, name), transfer)
+
+
+def kind_of(taken: Slot | Waiting | None) -> object:
+    """What was taken out: ``slot``, a priority, or ``None``."""
+    if isinstance(taken, Waiting):
+        return taken.transfer.priority
+    return None if taken is None else _SLOT
+
+
+def without_end(kinds: Iterable[object], took: dict[object, float]) -> list[object]:
+    """Return who goes when each asks again as soon as it has been on the line."""
+    turns = Turns()
+    for kind in kinds:
+        turns.add(entry(kind))
+    went = []
+    for _ in range(_TURNS):
+        kind = kind_of(turns.take())
+        turns.took(took.get(kind, _READ))
+        went.append(kind)
+        turns.add(entry(kind))
+    return went
+
+
+def share(went: list[object], took: dict[object, float]) -> dict[Any, float]:
+    """Return the part of the time that each had."""
+    total = sum(took.get(kind, _READ) for kind in went)
+    return {
+        kind: count * took.get(kind, _READ) / total for kind, count in Counter(went).items()
+    }
+
+
+def test_most_urgent_goes_first() -> None:
+    turns = Turns()
+    for kind in (*sorted(Priority, reverse=True), _SLOT):
+        turns.add(entry(kind))
+    went = []
+    while (taken := turns.take()) is not None:
+        went.append(kind_of(taken))
+        turns.took(0.0)
+    assert went[:6] == [
+        Priority.STOP,
+        _SLOT,
+        Priority.SETPOINT,
+        Priority.SERVICE,
+        Priority.POLL,
+        Priority.TELEMETRY,
+    ]
+    assert went[6:] == [Priority.REFRESH]
+
+
+@pytest.mark.parametrize('kind', [*Priority, _SLOT])
+def test_equals_go_in_the_order_they_came(kind: object) -> None:
+    turns = Turns()
+    entries = [entry(kind, str(number)) for number in range(5)]
+    for waiting in entries:
+        turns.add(waiting)
+    assert [turns.take() for _ in range(6)] == [*entries, None]
+
+
+# --- the background -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('background', [_READ, 0.023])
+@pytest.mark.parametrize('foreground', [_READ, 0.023, 0.2])
+@pytest.mark.parametrize('kind', [Priority.SETPOINT, Priority.SERVICE, Priority.POLL])
+def test_background_has_a_fifth_of_the_time(
+    kind: Priority, foreground: float, background: float
+) -> None:
+    took = {kind: foreground, **dict.fromkeys(_BACKGROUND, background)}
+    went = without_end((kind, *_BACKGROUND), took)
+    found = share(went, took)
+    assert found[kind] == pytest.approx(1 - BACKGROUND_SHARE, rel=0.02)
+    assert found[Priority.TELEMETRY] == pytest.approx(found[Priority.REFRESH], rel=0.02)
+
+
+def test_background_has_a_fifth_beside_set_points_and_polls_without_end() -> None:
+    found = share(without_end((_SLOT, Priority.POLL, *_BACKGROUND), {}), {})
+    background = found[Priority.TELEMETRY] + found[Priority.REFRESH]
+    assert background == pytest.approx(BACKGROUND_SHARE, rel=0.02)
+    # every other turn is theirs, and nobody starves
+    assert found[_SLOT] == pytest.approx(0.5, rel=0.02)
+    assert found[Priority.POLL] == pytest.approx(0.3, rel=0.02)
+
+
+def test_what_only_a_part_of_the_background_wants_goes_to_no_other() -> None:
+    found = share(without_end((Priority.POLL, Priority.REFRESH), {}), {})
+    assert found[Priority.REFRESH] == pytest.approx(BACKGROUND_SHARE, rel=0.02)
+
+
+def test_who_asked_for_nothing_is_owed_little() -> None:
+    turns = Turns()
+    for _ in range(1000):
+        turns.add(entry(Priority.POLL))
+        turns.take()
+        turns.took(0.2)
+    for kind in (Priority.POLL, *_BACKGROUND):
+        turns.add(entry(kind))
+    went = []
+    for _ in range(3):
+        went.append(kind_of(turns.take()))
+        turns.took(_READ)
+    # one of the two at once, the other one in its time
+    assert went[0] in _BACKGROUND
+    assert went[1] == Priority.POLL
+
+
+def test_background_that_waited_long_does_not_keep_the_line_for_long() -> None:
+    turns = Turns()
+    for kind in (*[Priority.STOP] * 1000, *[Priority.TELEMETRY] * 1000, Priority.POLL):
+        turns.add(entry(kind))
+    for _ in range(1000):
+        turns.take()
+        turns.took(_READ)
+    passed = 0.0
+    while kind_of(turns.take()) != Priority.POLL:
+        turns.took(_READ)
+        passed += _READ
+    # what it earns in half a second
+    assert passed <= 0.1 + _READ
+
+
+def test_background_on_an_idle_line_makes_no_debt() -> None:
+    turns = Turns()
+    for _ in range(1000):
+        turns.add(entry(Priority.TELEMETRY))
+        turns.take()
+        turns.took(_READ)
+    turns.add(entry(Priority.TELEMETRY))
+    went = []
+    for _ in range(6):
+        turns.add(entry(Priority.POLL))
+        went.append(kind_of(turns.take()))
+        turns.took(_READ)
+    assert went.index(Priority.TELEMETRY) <= 5
+
+
+# --- set-points -----------------------------------------------------------------------------------
+
+
+def test_set_point_goes_before_all_that_the_background_is_owed() -> None:
+    turns = Turns()
+    for kind in (Priority.POLL, *[Priority.TELEMETRY] * 10):
+        turns.add(entry(kind))
+    turns.take()
+    turns.took(10.0)
+    turns.take()
+    turns.took(_READ)
+    turns.add(entry(_SLOT))
+    assert kind_of(turns.take()) == _SLOT
+    turns.took(_READ)
+    # and then it goes on with what it is owed
+    turns.add(entry(_SLOT))
+    turns.add(entry(Priority.POLL))
+    assert kind_of(turns.take()) == Priority.TELEMETRY
+
+
+@pytest.mark.parametrize('kind', [Priority.SERVICE, Priority.POLL])
+def test_set_points_without_end_leave_every_other_turn_to_the_others(kind: Priority) -> None:
+    turns = Turns()
+    for _ in range(20):
+        turns.add(entry(_SLOT))
+        turns.add(entry(kind))
+    went = []
+    for _ in range(10):
+        went.append(kind_of(turns.take()))
+        turns.took(_READ)
+    assert went == [_SLOT, kind] * 5
+
+
+def test_stop_goes_before_a_set_point() -> None:
+    turns = Turns()
+    turns.add(entry(_SLOT))
+    turns.add(entry(Priority.STOP))
+    assert kind_of(turns.take()) == Priority.STOP
+
+
+def test_set_point_that_was_not_sent_had_no_turn() -> None:
+    turns = Turns()
+    for kind in (_SLOT, _SLOT, Priority.POLL):
+        turns.add(entry(kind))
+    # the first has nothing to say any more
+    turns.take()
+    assert kind_of(turns.take()) == _SLOT
+
+
+# --- leaving --------------------------------------------------------------------------------------
+
+
+def test_what_a_task_waits_for_can_be_withdrawn() -> None:
+    turns = Turns()
+    slot = entry(_SLOT)
+    for waiting in (
+        entry(Priority.POLL, 'mine'),
+        slot,
+        entry(Priority.POLL, 'other'),
+        entry(Priority.STOP, 'mine'),
+        entry(Priority.POLL, 'mine'),
+    ):
+        turns.add(waiting)
+    turns.withdraw(cast(Task, 'mine'))
+    assert turns.take() is slot
+    left = turns.take()
+    assert isinstance(left, Waiting) and left.task == cast(Task, 'other')
+    assert turns.take() is None
+
+
+def test_everything_can_be_taken_out_at_once() -> None:
+    turns = Turns()
+    entries = [entry(kind, str(kind)) for kind in (*Priority, _SLOT)]
+    for waiting in entries:
+        turns.add(waiting)
+    cleared = turns.clear()
+    assert sorted(map(id, cleared)) == sorted(map(id, entries))
+    assert turns.take() is None
