@@ -17,6 +17,7 @@
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
+from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -27,6 +28,7 @@ from nfo_sinus_driver.drive.snapshot import Telemetry
 
 __all__ = [
     'CONTROL_METHODS',
+    'Change',
     'Drive',
     'DriveError',
     'DriveSettings',

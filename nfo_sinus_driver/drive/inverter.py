@@ -116,7 +116,9 @@ class Inverter:
     async def read_timeout(self) -> None:
         """Read whether the drive has a time-out of its own."""
         self.sio_tot = await self._registers.read_number('serial.sio_tot', Priority.SERVICE)
-        self.auto_stop = bool(await self._registers.read('serial.auto_stop', Priority.SERVICE))
+        words = await self._registers.read_words('serial.auto_stop', Priority.SERVICE)
+        # a code that means neither ON nor OFF is not relied upon
+        self.auto_stop = words == self._registers.words('serial.auto_stop', True)
 
     async def identify(self) -> Identity:
         """

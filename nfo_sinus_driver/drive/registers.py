@@ -69,9 +69,27 @@ class Registers:
         """
         return self.model[key].quantise(value, self._protocol)
 
+    def value(self, key: str, words: Words) -> Value:
+        """
+        Return what the drive means by words.
+
+        :raises ValueError: a code that the manual does not list, where the type has no room for it.
+        """
+        return self.model[key].decode(words, self._protocol)
+
+    def reaches(self, key: str) -> bool:
+        """Tell whether a parameter can be reached over this line."""
+        return self._protocol in self.model[key].places
+
+    def limits(self, key: str) -> tuple[float, float, float]:
+        """Return the least value of a number, the greatest, and the step between two."""
+        parameter = self.model[key]
+        low, high = parameter.span(self._protocol)
+        return float(low), float(high), float(parameter.factor(self._protocol))
+
     def number(self, key: str, words: Words) -> float:
         """Return the value of words as the drive understands them."""
-        value = self.model[key].decode(words, self._protocol)
+        value = self.value(key, words)
         assert not isinstance(value, str), key
         return float(value)
 
@@ -88,9 +106,12 @@ class Registers:
         self, key: str, priority: Priority, *, once: bool = False
     ) -> tuple[Value, float]:
         """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        parameter = self.model[key]
         reply = await self._ask(self.address(key), priority, None, once)
-        return parameter.decode(reply.words, self._protocol), reply.arrived
+        return self.value(key, reply.words), reply.arrived
+
+    async def read_words(self, key: str, priority: Priority, *, once: bool = False) -> Words:
+        """Read a parameter as it stands in the drive."""
+        return (await self._ask(self.address(key), priority, None, once)).words
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
@@ -120,7 +141,13 @@ class Registers:
         :param once: do not repeat the request when nobody answers.
         :raises LinkError: as the link does.
         """
-        await self._ask(self.address(key), priority, self.words(key, value), once)
+        await self.write_words(key, self.words(key, value), priority, once=once)
+
+    async def write_words(
+        self, key: str, words: Words, priority: Priority, *, once: bool = False
+    ) -> None:
+        """Write a parameter as it shall stand in the drive, whatever its range."""
+        await self._ask(self.address(key), priority, words, once)
 
     async def _ask(
         self, address: Address, priority: Priority, words: Words | None, once: bool

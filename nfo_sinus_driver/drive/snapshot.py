@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 import enum
 import math
@@ -155,6 +156,9 @@ class Listener(Protocol):
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Take measured values."""
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        """Take note that these settings of the drive have new values."""
 
     def on_event(self, severity: Severity, text: str) -> None:
         """Take a line for the log."""

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 from builtin_interfaces.msg import Time
@@ -25,6 +26,7 @@ from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import PortError
@@ -50,8 +52,15 @@ def drive_status(
     address: int,
     identity: Identity | None,
     stop_unconfirmed: bool,
+    parameters: str,
+    drift: Sequence[Change],
 ) -> DiagnosticStatus:
-    """Return how one drive is doing."""
+    """
+    Return how one drive is doing.
+
+    :param parameters: how many of them are known.
+    :param drift: what is otherwise than the parameter file says.
+    """
     if stop_unconfirmed:
         level = DiagnosticStatus.ERROR
         message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
@@ -65,6 +74,9 @@ def drive_status(
         message = snapshot.text
         if snapshot.kind is not Kind.STATUS:
             message = f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
+        elif drift:
+            level = DiagnosticStatus.WARN
+            message = f'{snapshot.text}; {len(drift)} parameters differ from the parameter file'
     code = '' if snapshot.status is None else str(snapshot.status.code)
     serial = identity.serial if identity else ''
     values = {
@@ -76,6 +88,8 @@ def drive_status(
         'inverter status': f'{code} {snapshot.text}'.strip(),
         'control method': snapshot.control_method,
         'control mode': snapshot.control_mode,
+        'parameters': parameters,
+        'differs from the parameter file': ', '.join(str(change) for change in drift),
         'enabled': str(snapshot.enabled),
         'setpoint': _quantity(snapshot.setpoint, snapshot.unit),
         'actual': _quantity(snapshot.actual, snapshot.unit),

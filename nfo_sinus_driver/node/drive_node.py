@@ -17,16 +17,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
-import math
 import time
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.lifecycle import LifecycleNodeMixin
@@ -34,19 +33,19 @@ from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
 
+from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.node.line import NEWEST
+from nfo_sinus_driver.node.commands import Commands
+from nfo_sinus_driver.node.drive_parameters import DriveParameters
+from nfo_sinus_driver.node.drive_parameters import wanted_state
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import declare
-from nfo_sinus_driver.node.settings import integers_to_doubles
+from nfo_sinus_driver.node.settings import understood
 
 #: How often autostart looks whether it should try, s.
 _AUTOSTART_PERIOD = 0.25
@@ -54,9 +53,7 @@ _AUTOSTART_PERIOD = 0.25
 #: the lifecycle, and the drives that do answer have the bus.
 _AUTOSTART_REST = 1.0
 _AUTOSTART_LONGEST_REST = 4.0
-#: How long a service waits for the bus before it says that it does not know, s. A start delay of
-#: the drive may last an hour.
-_LONGEST_COMMAND = 3700.0
+#: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 #: What identifies a drive or how it is commanded cannot change under way.
 _ONLY_UNCONFIGURED = ('address', 'model', 'control_method')
@@ -98,15 +95,13 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.settings = self._drive_settings(values)
         self._reporter = Reporter(self, line)
         self._drive = Drive(line.bus, self.settings, self._reporter)
+        self.drive_parameters = DriveParameters(self)
+        self._wanted = wanted_state(self, self._drive)
         self._reporter.start(lambda: self._drive)
-        self.add_pre_set_parameters_callback(
-            lambda parameters: integers_to_doubles(parameters, DRIVE_SETTINGS)
-        )
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
-        self._create_commands()
-        self._told_idle_setpoint = False
-        self._autostart_tries = bool(values['autostart'])
+        self._commands = Commands(self, line)
+        self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
         self._autostarting = False
         self._autostart_complaint = ''
         self._autostart_rest = 0.0
@@ -125,6 +120,14 @@ class DriveNode(LifecycleNodeMixin, Node):
         label: str = self._state_machine.current_state[1]
         return label
 
+    def why_not_active(self) -> str:
+        """Return why the node is not active, and what to do."""
+        if self.state == 'finalized':
+            return 'the node was shut down: start the driver again'
+        if self._autostart_complaint:
+            return f'the drive has not answered yet: {self._autostart_complaint}'
+        return f'the node is {self.state}: activate it first'
+
     def stop_for_good(self, patience: float) -> Future[str]:
         """
         Stop the motor, and see to it that nobody can start it again.
@@ -133,8 +136,13 @@ class DriveNode(LifecycleNodeMixin, Node):
         """
         self._barred = True
         self._autostart_tries = False
-        self._told_idle_setpoint = True
+        self._commands.be_quiet_about_setpoints(True)
         return self._drive.stop_for_good(patience)
+
+    @property
+    def later_parameters(self) -> list[str]:
+        """The names of the parameters that will be declared when the drive is there."""
+        return [parameter.key for parameter in self._drive.model.settings]
 
     @property
     def drive(self) -> Drive:
@@ -155,7 +163,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self._drive.settings != self.settings:
             self._drive = Drive(self._line.bus, self.settings, self._reporter)
         try:
-            self._drive.connect(patient=not self._autostarting).result()
+            self._drive.connect(patient=not self._autostarting, parameters=True).result()
         except DriveError as error:
             self._complain_of_start(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -164,6 +172,8 @@ class DriveNode(LifecycleNodeMixin, Node):
             self._stop_for('let go', self._disconnect)
             return TransitionCallbackReturn.FAILURE
         self._drive.settings = self.settings
+        self.drive_parameters.declare(self._drive)
+        self._apply_wanted_state()
         self._autostart_complaint = ''
         self._note_person()
         return TransitionCallbackReturn.SUCCESS
@@ -175,7 +185,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             return TransitionCallbackReturn.FAILURE
         self._note_person()
         self._drive.activate()
-        self._told_idle_setpoint = False
+        self._commands.be_quiet_about_setpoints(False)
         return super().on_activate(state)
 
     @_guarded
@@ -190,6 +200,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         """Give control back and leave the drive alone."""
         self._note_person()
         self._stop_for('cleaned up', self._disconnect)
+        self.drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
 
     @_guarded
@@ -207,7 +218,15 @@ class DriveNode(LifecycleNodeMixin, Node):
         """Stop the motor, whatever went wrong, and begin anew."""
         self._stop_for('an error happened', self._drive.stop)
         self._stop_for('an error happened', self._disconnect)
+        self.drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
+
+    def _apply_wanted_state(self) -> None:
+        """Bring the drive into the state of the parameter file, once in the life of a process."""
+        wanted, self._wanted = self._wanted, {}
+        write = self.get_parameter('apply_parameters').value
+        if wanted:
+            self._drive.parameters.apply(wanted, write=write).result()
 
     def _disconnect(self) -> Future[str]:
         return self._drive.disconnect(self.settings.shutdown_timeout)
@@ -269,20 +288,43 @@ class DriveNode(LifecycleNodeMixin, Node):
             )
         return settings
 
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """
+        Set parameters for somebody outside, all of them or none.
+
+        Only what comes this way is written to the drive: declaring and following it do not.
+        """
+        try:
+            meant = [understood(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
+            admitted = self.drive_parameters.admit(meant)
+        except (ValueError, DriveError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        with self.drive_parameters.from_outside():
+            return super().set_parameters_atomically(admitted)
+
     def _check_settings(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
             self._settings_with(parameters)
+            changes = self.drive_parameters.write(parameters)
             for parameter in parameters:
                 if parameter.name == 'drive_timeout':
-                    self._try_drive_timeout(parameter.value)
+                    self._try_drive_timeout(parameter.value, changes)
         except (ValueError, DriveError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
+        """
+        Return the settings as they would be.
+
+        :raises ValueError: they make no sense, or cannot be changed now.
+        """
         values = dataclasses.asdict(self.settings)
         del values['retries']
         changed = {parameter.name: parameter.value for parameter in parameters}
+        # not read_only for rclpy, so that what was dumped can be loaded
+        if changed.get('autostart', self._autostart_wanted) != self._autostart_wanted:
+            raise ValueError('autostart is read when the driver starts: give it then')
         for name in _ONLY_UNCONFIGURED:
             if changed.get(name, values[name]) != values[name] and not self._is_loose:
                 raise ValueError(
@@ -291,13 +333,18 @@ class DriveNode(LifecycleNodeMixin, Node):
                 )
         return self._drive_settings({**values, **changed})
 
-    def _try_drive_timeout(self, seconds: float) -> None:
-        """Set the drive's own time-out if the drive is there; else configure does it."""
+    def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
+        """
+        Set the drive's own time-out if the drive is there; else configure does it.
+
+        :param changes: what is undone if the drive does not take it.
+        """
         if self.state in ('inactive', 'active') and seconds != self.settings.drive_timeout:
             try:
                 self._drive.set_drive_timeout(seconds).result(_LONGEST_STOP)
-            except FutureTimeoutError:
-                raise DriveError('the drive did not take drive_timeout in time') from None
+            except (DriveError, FutureTimeoutError) as error:
+                self.drive_parameters.put_back(changes)
+                raise DriveError(f'drive_timeout: {error or "not in time"}') from None
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.settings = self._settings_with(parameters)
@@ -313,87 +360,3 @@ class DriveNode(LifecycleNodeMixin, Node):
         return all(
             getattr(settings, name) == getattr(self.settings, name) for name in _ONLY_UNCONFIGURED
         )
-
-    # --- commands -----------------------------------------------------------------------------
-
-    def _create_commands(self) -> None:
-        """Give each kind of command a callback group, so that none waits for another."""
-        self.create_subscription(
-            Float32,
-            '~/setpoint',
-            self._on_setpoint,
-            NEWEST,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
-        # reentrant, for to disable must not wait for an enable that waits for a start delay
-        group = ReentrantCallbackGroup()
-        self.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
-        for name, callback in (
-            ('~/stop', self._on_stop),
-            ('~/quick_stop', self._on_quick_stop),
-            ('~/fault_ack', self._on_fault_ack),
-        ):
-            group = MutuallyExclusiveCallbackGroup()
-            self.create_service(Trigger, name, callback, callback_group=group)
-
-    def _on_setpoint(self, message: Float32) -> None:
-        if self.state != 'active':
-            return
-        if not math.isfinite(message.data):
-            self.get_logger().warning(
-                f'set-point {message.data} ignored: it is not a finite number',
-                throttle_duration_sec=10.0,
-            )
-            return
-        self._drive.set_setpoint(message.data)
-        if self._drive.armed:
-            self._told_idle_setpoint = False
-        elif not self._told_idle_setpoint:
-            self._told_idle_setpoint = True
-            self.get_logger().info(
-                'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
-            )
-
-    def _on_enable(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
-        if not request.data:
-            return self._answer(response, self._drive.stop, _LONGEST_STOP)
-        if self.state != 'active':
-            response.success = False
-            response.message = self._why_not_active()
-            return response
-        return self._answer(response, self._drive.enable, _LONGEST_COMMAND)
-
-    def _why_not_active(self) -> str:
-        if self.state == 'finalized':
-            return 'the node was shut down: start the driver again'
-        if self._autostart_complaint:
-            return f'the drive has not answered yet: {self._autostart_complaint}'
-        return f'the node is {self.state}: activate it first'
-
-    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._drive.stop, _LONGEST_STOP)
-
-    def _on_quick_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._drive.quick_stop, _LONGEST_STOP)
-
-    def _on_fault_ack(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._drive.acknowledge, _LONGEST_STOP)
-
-    def _answer(self, response, command: Callable[[], Future[str]], timeout: float):  # type: ignore[no-untyped-def]
-        try:
-            response.message = command().result(timeout)
-            response.success = True
-        except DriveError as error:
-            response.message = str(error)
-            response.success = False
-        except FutureTimeoutError:
-            response.message = f'the bus did not get to it within {timeout:g} s'
-            response.success = False
-        except Exception as error:
-            # an exception that leaves a service callback would end the executor
-            self.get_logger().error(f'error in a service: {error!r}')
-            response.message = f'error in the driver: {error}'
-            response.success = False
-        return response

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
@@ -93,6 +94,10 @@ class Reporter:
         """Publish measured values."""
         self._line.outbox.put(lambda: self._tell_telemetry(telemetry))
 
+    def on_parameters(self, keys: Collection[str]) -> None:
+        """Have the ROS parameters follow the drive."""
+        self._node.drive_parameters.note(keys)
+
     def on_event(self, severity: Severity, text: str) -> None:
         """Log a line."""
         # one call site for each level: rclpy forbids another level at the same place
@@ -155,6 +160,8 @@ class Reporter:
             address=drive.settings.address,
             identity=drive.identity,
             stop_unconfirmed=drive.stop_unconfirmed,
+            parameters=drive.parameters.progress,
+            drift=drive.parameters.drift,
         )
         diagnosis = (status.level, status.message)
         if on_change and diagnosis == self._last_diagnosis:

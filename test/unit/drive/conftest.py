@@ -28,8 +28,8 @@ import pytest
 
 from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import drive as drive_module
 from nfo_sinus_driver.drive import motion
+from nfo_sinus_driver.drive import watch as watch_module
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def make_rig(tmp_path: Path) -> Iterator[MakeRig]:
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver try again soon, where it is not tested how long it waits."""
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.05)
-    monkeypatch.setattr(drive_module, '_RECONNECT_PERIOD', 0.1)
+    monkeypatch.setattr(watch_module, '_RECONNECT_PERIOD', 0.1)
     monkeypatch.setattr(motion, '_LOST_RETRY_PERIOD', 0.1)
 
 

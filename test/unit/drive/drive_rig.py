@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Collection
 import dataclasses
 import json
 import math
@@ -71,12 +72,16 @@ class Notes:
         self.snapshots: list[Snapshot] = []
         self.telemetry: list[Telemetry] = []
         self.events: list[tuple[Severity, str]] = []
+        self.news: list[str] = []
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         self.snapshots.append(snapshot)
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         self.telemetry.append(telemetry)
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        self.news += keys
 
     def on_event(self, severity: Severity, text: str) -> None:
         self.events.append((severity, text))

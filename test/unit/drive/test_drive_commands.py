@@ -534,11 +534,12 @@ def test_drive_timeout_is_set(make_rig: MakeRig) -> None:
     rig.connect()
     assert timeouts(rig) == (25, 1)
     assert rig.far.writes == {'serial.sio_tot': 1, 'serial.auto_stop': 1}
-    assert rig.notes.told('serial.sio_tot: 0.0 -> 2.5, serial.auto_stop: False -> True')
+    assert rig.notes.told('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
+    assert rig.notes.told('serial.auto_stop: false -> true (drive_timeout)')
     assert not rig.notes.told('SioTot is 0')
     # parameters live in EEPROM: what is right is not written again
     assert rig.drive.set_drive_timeout(2.5).result(PATIENCE) == ''
-    assert 'serial.sio_tot: 2.5 -> 3.0' in rig.drive.set_drive_timeout(3.0).result(PATIENCE)
+    assert 'serial.sio_tot: 2.5 -> 3 s' in rig.drive.set_drive_timeout(3.0).result(PATIENCE)
     assert rig.far.writes == {'serial.sio_tot': 2, 'serial.auto_stop': 1}
 
 
@@ -570,7 +571,9 @@ def test_drive_timeout_that_the_drive_changes(
         lambda key, raw: store(key, max(raw, 50) if key == 'serial.sio_tot' else raw),
     )
     message = rig.refused(rig.drive.set_drive_timeout(2.0))
-    assert message == 'the drive keeps serial.sio_tot = 5.0 where 2.0 was written'
+    assert message == (
+        'serial.sio_tot: the drive keeps 5 s where 2 s was written; it is 7 s as before'
+    )
     assert timeouts(rig) == (70, 0)
 
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
 
 from drive_rig import MODE
 from drive_rig import PATIENCE
@@ -35,8 +34,8 @@ from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import drive as drive_module
 from nfo_sinus_driver.drive import motion
+from nfo_sinus_driver.drive import watch as watch_module
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -140,7 +139,7 @@ def test_keypad_that_takes_over_is_left_alone(rig: Rig) -> None:
 def test_control_mode_changed_at_the_keypad(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(drive_module, '_MODE_PERIOD', 0.05)
+    monkeypatch.setattr(watch_module, '_MODE_PERIOD', 0.05)
     rig.turn()
     rig.simulator.inject('set', 'control.mode', 'Speed')
     wait_until(lambda: not rig.drive.armed)
@@ -252,24 +251,8 @@ def test_bad_line_is_no_reason_to_stop(make_rig: MakeRig) -> None:
     assert figures.timeouts + figures.damaged >= 1
 
 
-def keep_order(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no answer overtake a late one: a drive carries out one request after the other."""
-    line, latest = rig.simulator.line, 0.0
-    schedule = line._schedule
-
-    def in_order(at: float, *more: Any) -> None:
-        nonlocal latest
-        latest = max(latest, at)
-        schedule(latest, *more)
-
-    monkeypatch.setattr(line, '_schedule', in_order)
-
-
-def test_late_answers_are_never_taken_for_others(
-    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_late_answers_are_never_taken_for_others(make_rig: MakeRig) -> None:
     rig = make_rig(retries=3)
-    keep_order(rig, monkeypatch)
     rig.turn(10.0)
     wait_until(lambda: rig.drive.snapshot.text == 'Bus Run' and rig.drive.snapshot.speed > 280)
     rig.set_response_timeout(0.05)

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import threading
 
 from nfo_sinus_driver.bus import Bus
@@ -40,6 +41,8 @@ class _Deaf:
     def on_snapshot(self, snapshot: Snapshot) -> None: ...
 
     def on_telemetry(self, telemetry: Telemetry) -> None: ...
+
+    def on_parameters(self, keys: Collection[str]) -> None: ...
 
     def on_event(self, severity: Severity, text: str) -> None: ...
 

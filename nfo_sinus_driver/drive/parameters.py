@@ -1,0 +1,424 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The settings of one drive: read once, watched for ever, changed on request."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Coroutine
+from collections.abc import Mapping
+from collections.abc import Sequence
+from concurrent.futures import Future
+import contextlib
+import logging
+import time
+from typing import Any
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.lock import Lock
+from nfo_sinus_driver.drive.parameter_guard import after_change
+from nfo_sinus_driver.drive.parameter_guard import why_not
+from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
+from nfo_sinus_driver.drive.parameter_writer import Written
+from nfo_sinus_driver.drive.parameter_writer import describe_drift
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Words
+
+_log = logging.getLogger(__name__)
+
+#: How long one round of reading every parameter again takes at least, s: a change at the keypad
+#: is seen within 10 s, and a fast line is not kept busy for nothing.
+_ROUND = 8.0
+#: How often it is looked whether there is something to read, s.
+_WAIT = 0.5
+#: How often progress is logged while the parameters are read for the first time, s.
+_PROGRESS = 5.0
+
+Run = Callable[[Callable[[], Coroutine[Any, Any, Any]]], 'Future[Any]']
+
+
+class Parameters:
+    """
+    The settings of one drive.
+
+    Reading and watching never write. Public methods may be called from any thread, those that end
+    in ``_now`` on the bus alone.
+
+    :param run: runs a coroutine on the bus; its errors are for people.
+    :param told: called on the bus with the keys of parameters whose value is new.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        inverter: Inverter,
+        registers: Registers,
+        run: Run,
+        told: Callable[[Collection[str]], None],
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._registers = registers
+        self._run = run
+        self._told = told
+        self._writer = ParameterWriter(inverter, registers)
+        self._keys: tuple[str, ...] = ()
+        self._words: dict[str, Words] = {}
+        self._values: dict[str, Value] = {}
+        self._wanted: dict[str, Value] = {}
+        self._turn = Lock(bus)
+        #: What is being written, and may be put back yet.
+        self._changing: Collection[str] = ()
+        #: How many are still to be read, and of how many, before the drive is known.
+        self._unread = self._total = 0
+
+    # --- any thread ---------------------------------------------------------------------------
+
+    @property
+    def values(self) -> Mapping[str, Value]:
+        """The settings that the drive has, by key, as last read."""
+        return self._values
+
+    @property
+    def words(self) -> Mapping[str, Words]:
+        """The same as they stand in the drive, meaningful or not."""
+        return self._words
+
+    @property
+    def progress(self) -> str:
+        """How far the first reading has come, for diagnostics."""
+        if self._unread:
+            return f'{self._total - self._unread} of {self._total} read'
+        return f'{len(self._keys)} read' if self._keys else 'not read'
+
+    @property
+    def drift(self) -> tuple[Change, ...]:
+        """What the drive has otherwise than it was wanted, as wanted -> what it has."""
+        words, values = self._words, self._values
+        return tuple(
+            Change(key, wanted, self._writer.value(key, words[key]), self._inverter.model[key].unit)
+            for key, wanted in self._wanted.items()
+            if key in words and values.get(key) != wanted
+        )
+
+    def exact(self, key: str, value: Value) -> Value:
+        """
+        Return a value as the drive would show it.
+
+        :raises ParameterError: it cannot have it.
+        """
+        if self._values.get(key) == value:
+            # it has it, also where no manual says that it can [C19]
+            return self._values[key]
+        model = self._inverter.model
+        if key not in model or not model[key].is_setting or not self.reaches(key):
+            raise ParameterError(f'{key} is no parameter that can be changed here')
+        try:
+            return self._registers.value(key, self._registers.words(key, value))
+        except ValueError as error:
+            raise ParameterError(str(error)) from None
+
+    def limits(self, key: str) -> tuple[float, float, float]:
+        """Return the least value of a number, the greatest, and the step of the drive."""
+        return self._registers.limits(key)
+
+    def reaches(self, key: str) -> bool:
+        """Tell whether a parameter can be reached over this line."""
+        return self._registers.reaches(key)
+
+    def available(self, only: Collection[str] | None = None) -> list[str]:
+        """Return the settings that the drive should have, all or some of them, in their order."""
+        every = [parameter.key for parameter in self._inverter.model.settings]
+        return [
+            key
+            for key in every
+            if (only is None or key in only) and self.reaches(key) and self._inverter.has(key)
+        ]
+
+    def admit(self, key: str, value: Value) -> Value:
+        """
+        Return a value as the drive will show it; nothing is asked of the drive.
+
+        :raises ParameterError: the drive cannot have this value, or it may not be changed.
+        """
+        exact = self.exact(key, value)
+        reason = why_not(key, self._inverter)
+        if reason and self._values.get(key) != exact:
+            raise ParameterError(f'{key}: {reason}')
+        return exact
+
+    def read(self, only: Collection[str] | None = None) -> Future[None]:
+        """Read every setting that the drive has, or only some."""
+        return self._run(lambda: self.read_now(only))
+
+    def change(self, wanted: Mapping[str, Value]) -> Future[tuple[Change, ...]]:
+        """Do as :meth:`change_now`."""
+        return self._run(lambda: self.change_now(wanted))
+
+    def write_each(
+        self, wanted: Mapping[str, Words], wrote: Callable[[Change], None]
+    ) -> Future[None]:
+        """Do as :meth:`write_each_now`."""
+        return self._run(lambda: self.write_each_now(wanted, wrote))
+
+    def refresh(self) -> Future[str]:
+        """Read every parameter again; the answer says which have changed."""
+        return self._run(self._refresh)
+
+    def apply(self, wanted: Mapping[str, Value], *, write: bool) -> Future[None]:
+        """
+        Take a state as the wanted one, bring the drive into it, and report what drifts later.
+
+        What cannot be written is logged, and stays reported as drift.
+
+        :param write: false to report only.
+        """
+        return self._run(lambda: self._apply(wanted, write))
+
+    # --- on the bus ---------------------------------------------------------------------------
+
+    async def read_now(self, only: Collection[str] | None = None) -> None:
+        """
+        Read every setting that the drive has, or only some.
+
+        :raises LinkError: the drive does not answer.
+        """
+        inverter = self._inverter
+        self._keys = ()
+        self._words, self._values = {}, {}
+        keys = self.available(only)
+        self._unread = self._total = len(keys)
+        started = time.monotonic()
+        try:
+            await self._read_first(keys)
+        except BaseException:
+            self._words, self._values = {}, {}
+            raise
+        finally:
+            self._unread = 0
+        self._keys = tuple(key for key in keys if key in self._words)
+        seconds = time.monotonic() - started
+        inverter.tell(Severity.INFO, f'parameters: {self.progress} in {seconds:.1f} s')
+
+    async def _read_first(self, keys: Sequence[str]) -> None:
+        """Read what is not known yet; what is refused again and again is not there."""
+        told_at = time.monotonic()
+        while keys:
+            refused: dict[str, Refused] = {}
+            for key in keys:
+                try:
+                    await self._read(key, once=False)
+                    self._unread -= 1
+                except Refused as error:
+                    # by a busy drive, perhaps: asked again when the others are read
+                    refused[key] = error
+                if time.monotonic() > told_at + _PROGRESS:
+                    told_at = time.monotonic()
+                    self._inverter.tell(Severity.INFO, f'parameters: {self.progress}')
+            if len(refused) == len(keys):
+                for key, refusal in refused.items():
+                    self._inverter.tell(Severity.WARNING, f'{key} cannot be read: {refusal}')
+                return
+            keys = tuple(refused)
+
+    async def watch_now(self) -> None:
+        """Read the settings one after the other, again and again, for ever."""
+        inverter = self._inverter
+        while True:
+            keys = self._keys
+            for key in keys:
+                earliest = time.monotonic() + _ROUND / len(keys)
+                if keys is not self._keys:
+                    # they are read anew
+                    break
+                if inverter.connected and inverter.answering:
+                    try:
+                        await self._read(key, once=True)
+                    except Refused:
+                        pass
+                    except LinkError:
+                        # the poll says so if the drive is lost
+                        inverter.answering = False
+                await self._bus.sleep(earliest - time.monotonic())
+            if not keys:
+                await self._bus.sleep(_WAIT)
+
+    async def change_now(
+        self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
+    ) -> tuple[Change, ...]:
+        """
+        Write what differs, all of it or nothing, and read it back.
+
+        :param because: what the log says of the reason.
+        :param guarded: false for what the driver sets itself.
+        :returns: what was changed.
+        :raises ParameterError: why not.
+        """
+        take = self.admit if guarded else self.exact
+        exact = {key: take(key, value) for key, value in wanted.items()}
+        if guarded:
+            # what may not be changed was only admitted because the drive has it already
+            exact = {key: value for key, value in exact.items() if not why_not(key, self._inverter)}
+        words = {key: self._words_of(key, value) for key, value in exact.items()}
+        async with self._alone(words):
+            await self._require_standstill(words)
+            try:
+                changes = await self._writer.write(words)
+            except ParameterError as error:
+                hint = after_change({key: exact[key] for key in error.left})
+                if not hint:
+                    raise
+                raise ParameterError(f'{error}; {hint}', error.left) from error
+            self._wanted.update((key, exact[key]) for key in exact if key in self._wanted)
+            written = {change.key for change in changes}
+            for key in words:
+                self._learn(key, words[key], quiet=key in written)
+        for change in changes:
+            self._inverter.tell(Severity.INFO, f'{change}{because}')
+        hint = after_change({change.key: change.new for change in changes})
+        if hint:
+            self._inverter.tell(Severity.WARNING, hint)
+        return changes
+
+    async def write_each_now(
+        self, wanted: Mapping[str, Words], wrote: Callable[[Change], None]
+    ) -> None:
+        """
+        Write what differs, one after the other; what was written before a refusal stays.
+
+        :param wrote: told of each on the bus; what it raises ends the writing.
+        :raises ParameterError: something may not be changed, or was not taken.
+        """
+        for key in wanted:
+            reason = why_not(key, self._inverter)
+            if reason:
+                raise ParameterError(f'{key}: {reason}')
+
+        def learn(written: Written) -> None:
+            self._learn(written.key, written.after, quiet=True)
+            wrote(self._writer.describe(written))
+
+        async with self._alone(wanted):
+            await self._require_standstill(wanted)
+            await self._writer.write_each(wanted, learn)
+
+    @contextlib.asynccontextmanager
+    async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:
+        """Change parameters while nobody else does; they are no news before it is done."""
+        async with self._turn:
+            self._changing = keys
+            try:
+                yield
+            finally:
+                self._changing = ()
+
+    def _words_of(self, key: str, value: Value) -> Words:
+        if self._values.get(key) == value:
+            return self._words[key]
+        return self._registers.words(key, value)
+
+    async def _require_standstill(self, words: Mapping[str, Words]) -> None:
+        new = [key for key, wanted in words.items() if self._words.get(key) != wanted]
+        await self._writer.require_standstill(new)
+
+    async def _refresh(self) -> str:
+        before = self._values
+        keys = self._keys
+        for key in keys:
+            with contextlib.suppress(Refused):
+                # a person waits for it, so it goes by turns with the polls
+                await self._read(key, once=False, priority=Priority.POLL)
+        changed = [key for key in keys if before.get(key) != self._values.get(key)]
+        return f'{len(keys)} parameters read, changed: {", ".join(changed) or "none"}'
+
+    async def _apply(self, wanted: Mapping[str, Value], write: bool) -> None:
+        inverter = self._inverter
+        here = {key: value for key, value in wanted.items() if key in self._words}
+        self._wanted = {key: self.exact(key, value) for key, value in here.items()}
+        missing = [key for key in wanted if key not in here]
+        if missing:
+            inverter.tell(
+                Severity.WARNING, f'this drive has no {", ".join(missing)}: not applied'
+            )
+        drifts = self.drift
+        while drifts:
+            refused: list[ParameterError] = []
+            for drift in drifts:
+                if not write:
+                    inverter.tell(Severity.WARNING, describe_drift(drift))
+                    continue
+                try:
+                    await self.change_now(
+                        {drift.key: drift.old}, because=', as the parameter file says'
+                    )
+                except ParameterError as error:
+                    refused.append(error)
+            if len(refused) == len(drifts):
+                for refusal in refused:
+                    text = f'not applied from the parameter file: {refusal}'
+                    inverter.tell(Severity.ERROR, text)
+            # values that bound each other may stand in any order
+            drifts = self.drift if write and len(refused) < len(drifts) else ()
+
+    async def _read(
+        self, key: str, *, once: bool, priority: Priority = Priority.REFRESH
+    ) -> None:
+        """
+        Read one parameter.
+
+        :raises LinkError: it cannot be read.
+        """
+        words = await self._registers.read_words(key, priority, once=once)
+        if key not in self._changing or key not in self._words:
+            self._learn(key, words)
+
+    def _learn(self, key: str, words: Words, *, quiet: bool = False) -> None:
+        """Take what the drive has for a parameter, and tell it if it is news."""
+        if self._words.get(key) == words:
+            return
+        # others may be reading the old ones just now
+        self._words = {**self._words, key: words}
+        values = dict(self._values)
+        before = values.pop(key, None)
+        try:
+            values[key] = self._registers.value(key, words)
+        except ValueError as error:
+            # and nobody may rely on what it was before
+            self._inverter.tell(Severity.WARNING, str(error))
+        self._values = values
+        if not quiet and before is not None and key in values:
+            self._tell_news(Change(key, before, values[key], self._inverter.model[key].unit))
+        try:
+            self._told((key,))
+        except Exception:
+            _log.exception('a new value of %s could not be told', key)
+
+    def _tell_news(self, change: Change) -> None:
+        """Say that somebody else changed a parameter."""
+        drift = [drift for drift in self.drift if drift.key == change.key]
+        if drift:
+            self._inverter.tell(Severity.WARNING, describe_drift(drift[0]))
+        else:
+            self._inverter.tell(Severity.INFO, f'changed at the drive: {change}')

@@ -1,0 +1,252 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The watch over one drive: polls it, judges what it sees, notices when it is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Coroutine
+import logging
+import math
+import time
+from typing import Any
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.picture import take_picture
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+
+_log = logging.getLogger(__name__)
+
+#: How often a drive is looked at while its node is not active, s.
+_IDLE_PERIOD = 0.5
+#: How often the control mode is read; it can only change while the motor stands, s.
+_MODE_PERIOD = 1.0
+#: How often the status is read at least while the motor runs, s.
+_WATCH_PERIOD = 0.2
+#: How often a drive that does not answer is tried again, at first and at last, s.
+_RECONNECT_PERIOD = 1.0
+_SLOWEST_RECONNECT = 4.0
+#: The bus is silent for no more than this share of the drive's own time-out.
+_KEEP_ALIVE_SHARE = 1 / 3
+#: The value that is polled beside frequency and speed, by control mode.
+_ACTUAL_KEYS = {'Torque': 'status.trq_act', 'PI-Reg': 'status.reg_act'}
+
+
+class Watch:
+    """
+    Watches one drive, for ever once it was begun; used on the bus alone.
+
+    :param motion: how it is commanded; ``None`` if this driver only reads.
+    :param connect: connects to the drive again after it was lost.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        inverter: Inverter,
+        registers: Registers,
+        setpoint: Setpoint,
+        motion: Motion | None,
+        listener: Listener,
+        connect: Callable[[], Coroutine[Any, Any, None]],
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._registers = registers
+        self._setpoint = setpoint
+        self._motion = motion
+        self._listener = listener
+        self._connect = connect
+        self._task: Task | None = None
+        #: Poll at full rate.
+        self.active = False
+        #: The newest poll.
+        self.snapshot = take_picture(inverter, setpoint, None)
+        self._misses = 0
+        #: How often in a row nobody answered an attempt to connect.
+        self._silences = 0
+        #: When the control mode was last read.
+        self._mode_read_at = 0.0
+        self._complaint = ''
+        self._told_fault = 0
+
+    @property
+    def begun(self) -> bool:
+        """It watches."""
+        return self._task is not None
+
+    def begin(self) -> None:
+        """Watch from now on."""
+        self._task = self._bus.spawn(self._poll_for_ever())
+
+    def end(self) -> None:
+        """Leave the drive alone."""
+        if self._task is not None:
+            task, self._task = self._task, None
+            self._bus.cancel(task)
+        self._bus.forget_cycle(self._inverter.settings.address)
+        self._publish(None)
+
+    def wake(self) -> None:
+        """Look at the drive at once."""
+        if self._task is not None:
+            self._bus.wake(self._task)
+
+    def connected(self) -> None:
+        """Begin anew to count what goes wrong: the drive has been found."""
+        self._misses = self._silences = 0
+        self._complaint = ''
+
+    async def _poll_for_ever(self) -> None:
+        polled_at = -math.inf
+        while True:
+            started = time.monotonic()
+            due = started >= polled_at + self._period
+            try:
+                if not self._inverter.connected:
+                    await self._connect()
+                elif due:
+                    await self._poll()
+                else:
+                    await self._look()
+                self._misses = 0
+            except (LinkError, DriveError) as error:
+                self._miss(error)
+            except Exception as error:
+                # a drive that is no longer watched must not go on running
+                self._miss(DriveError(f'error in the driver: {error!r}'))
+            if due:
+                if self._inverter.connected and self.active and polled_at > 0:
+                    self._bus.note_cycle(self._inverter.settings.address, started - polled_at)
+                polled_at = started
+            await self._bus.sleep(self._pause(polled_at))
+
+    def _pause(self, polled_at: float) -> float:
+        """Return how long to wait until the drive is asked again, s."""
+        inverter = self._inverter
+        if not inverter.connected:
+            # a drive that stays silent costs its neighbours less and less
+            return min(_RECONNECT_PERIOD * max(1, self._silences), _SLOWEST_RECONNECT)
+        pause = polled_at + self._period - time.monotonic()
+        # however seldom somebody wants to read the status, a motor that runs is watched
+        return min(pause, _WATCH_PERIOD) if self._setpoint.armed else pause
+
+    @property
+    def _period(self) -> float:
+        """The time from one poll to the next, s."""
+        if not self.active:
+            period = _IDLE_PERIOD
+        else:
+            rate = self._inverter.settings.poll_rate
+            period = 1 / rate if rate else 0.0
+        if self._inverter.sio_tot:
+            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
+        return period
+
+    async def _look(self) -> InverterStatus:
+        """Read the status and judge it."""
+        # a request that fails is not repeated at once, so that a silent drive costs its
+        # neighbours no more than one time-out in each of their cycles
+        seen = await self._inverter.look(Priority.POLL, once=True)
+        self._inverter.answering = True
+        self._tell_fault(seen)
+        if self._motion is not None:
+            self._motion.watch(seen)
+        return seen
+
+    async def _poll(self) -> None:
+        inverter = self._inverter
+        seen = await self._look()
+        if time.monotonic() - self._mode_read_at > _MODE_PERIOD:
+            self._mode_read_at = time.monotonic()
+            await inverter.read_control_mode(Priority.POLL)
+        inverter.frequency = frequency = await self._measure('status.frq_act')
+        inverter.speed = speed = await self._measure('status.spd_act')
+        actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
+        if inverter.control_mode in _ACTUAL_KEYS:
+            actual = await self._measure(_ACTUAL_KEYS[inverter.control_mode])
+        self._publish(seen, frequency=frequency, speed=speed, actual=actual)
+
+    def _tell_fault(self, seen: InverterStatus) -> None:
+        """Say on change that a fault stands; one that ends a ride is told by who ends it."""
+        code = seen.code if seen.faulted else 0
+        if code and code != self._told_fault and not self._setpoint.armed:
+            fault = self._inverter.model.inv_st(code)
+            self._inverter.tell(
+                Severity.ERROR,
+                f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}; '
+                'then call ~/fault_ack',
+            )
+        self._told_fault = code
+
+    async def _measure(self, key: str) -> float:
+        """Read a measured value; NaN if the drive refuses it, for it answers all the same."""
+        try:
+            return await self._registers.read_number(key, Priority.POLL, once=True)
+        except Refused:
+            return NAN
+
+    def _miss(self, error: LinkError | DriveError) -> None:
+        """Count a failed poll; too many in a row and the drive is lost."""
+        inverter = self._inverter
+        self._misses += 1
+        inverter.answering = False
+        if inverter.connected and (
+            self._misses > inverter.settings.retries or isinstance(error, PortError)
+        ):
+            inverter.connected = False
+            explained = self._explain(error)
+            self._bus.forget_cycle(self._inverter.settings.address)
+            if self._motion is not None:
+                self._motion.lost()
+            inverter.tell(Severity.ERROR, f'lost: {explained}; trying again for ever')
+            try:
+                self._publish(None)
+            except Exception:
+                # a mistake of who listens must not end the watch
+                _log.exception('the loss of the drive could not be told')
+        elif not inverter.connected:
+            self._silences += 1
+            if isinstance(error, DriveError):
+                self._complain(str(error))
+
+    def _complain(self, text: str) -> None:
+        """Say what keeps the drive from being used, once."""
+        if text != self._complaint:
+            self._complaint = text
+            self._inverter.tell(Severity.ERROR, text)
+
+    def _publish(self, seen: InverterStatus | None, **values: float) -> None:
+        self.snapshot = take_picture(self._inverter, self._setpoint, seen, **values)
+        self._listener.on_snapshot(self.snapshot)
+
+    def _explain(self, error: LinkError | DriveError) -> str:
+        if isinstance(error, DriveError):
+            return str(error)
+        return explain(error, self._inverter.settings.address, known=True)

@@ -1,0 +1,125 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands of one drive: its services, and the set-points that it follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import math
+from typing import TYPE_CHECKING
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
+from std_msgs.msg import Float32
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.line import NEWEST
+from nfo_sinus_driver.node.line import Line
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: How long a service waits for the bus before it says that it does not know, s. A start delay of
+#: the drive may last an hour.
+_LONGEST_COMMAND = 3700.0
+_LONGEST_STOP = 10.0
+_LONGEST_REFRESH = 300.0
+
+_Command = Callable[[Drive], Future[str]]
+
+
+class Commands:
+    """
+    Takes commands for the drive of a node.
+
+    Each kind has a callback group of its own, so that none waits for another.
+    """
+
+    def __init__(self, node: DriveNode, line: Line) -> None:
+        self._node = node
+        self._told_idle_setpoint = False
+        line.listener.listen(node, Float32, '~/setpoint', self._on_setpoint, NEWEST)
+        # reentrant, for to disable must not wait for an enable that waits for a start delay
+        group = ReentrantCallbackGroup()
+        node.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
+        self._offer('~/stop', Drive.stop, _LONGEST_STOP)
+        self._offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
+        self._offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
+        self._offer(
+            '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
+        )
+
+    def be_quiet_about_setpoints(self, quiet: bool) -> None:
+        """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
+        self._told_idle_setpoint = quiet
+
+    def _offer(self, name: str, command: _Command, timeout: float) -> None:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            return self._answer(response, command, timeout)
+
+        group = MutuallyExclusiveCallbackGroup()
+        self._node.create_service(Trigger, name, answer, callback_group=group)
+
+    def _on_setpoint(self, message: Float32) -> None:
+        node = self._node
+        if node.state != 'active':
+            return
+        if not math.isfinite(message.data):
+            node.get_logger().warning(
+                f'set-point {message.data} ignored: it is not a finite number',
+                throttle_duration_sec=10.0,
+            )
+            return
+        node.drive.set_setpoint(message.data)
+        if node.drive.armed:
+            self._told_idle_setpoint = False
+        elif not self._told_idle_setpoint:
+            self._told_idle_setpoint = True
+            node.get_logger().info(
+                'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
+            )
+
+    def _on_enable(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        if not request.data:
+            return self._answer(response, Drive.stop, _LONGEST_STOP)
+        if self._node.state != 'active':
+            response.success = False
+            response.message = self._node.why_not_active()
+            return response
+        return self._answer(response, Drive.enable, _LONGEST_COMMAND)
+
+    def _answer(self, response, command: _Command, timeout: float):  # type: ignore[no-untyped-def]
+        try:
+            response.message = command(self._node.drive).result(timeout)
+            response.success = True
+        except DriveError as error:
+            response.message = str(error)
+            response.success = False
+        except FutureTimeoutError:
+            response.message = f'the bus did not get to it within {timeout:g} s'
+            response.success = False
+        except Exception as error:
+            # an exception that leaves a service callback would end the executor
+            self._node.get_logger().error(f'error in a service: {error!r}')
+            response.message = f'error in the driver: {error}'
+            response.success = False
+        return response

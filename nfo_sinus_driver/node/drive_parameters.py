@@ -1,0 +1,246 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The settings of a drive as ROS parameters of its node."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from collections.abc import Iterable
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import contextlib
+import threading
+
+from rcl_interfaces.msg import FloatingPointRange
+from rcl_interfaces.msg import IntegerRange
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from nfo_sinus_driver.catalog import Parameter as CatalogParameter
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive import Change
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+
+#: How long a change may wait for the bus before it is said that it is not known, s.
+_LONGEST_CHANGE = 30.0
+
+_KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
+
+
+class DriveParameters:
+    """
+    Keeps the parameters of a node and the settings of its drive the same.
+
+    Both can begin: who sets a parameter writes to the drive, and what changes at the drive shows
+    as a parameter event. Declaring and following never write, so the origin of every change has to
+    be known: it is this thread, between :meth:`from_outside` and its end, or it is the drive.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._drive: Drive | None = None
+        self._declared: set[str] = set()
+        self._news: set[str] = set()
+        self._lock = threading.Lock()
+        self._outside: int | None = None
+        # in the group of the parameter services, so that a value is never changed by both at once
+        self._guard = node.create_guard_condition(self._follow, node.default_callback_group)
+
+    # --- from the drive -----------------------------------------------------------------------
+
+    def declare(self, drive: Drive) -> None:
+        """Declare every setting that the drive has, with the value that it has."""
+        self.undeclare()
+        self._drive = drive
+        for key, value in drive.parameters.values.items():
+            self._node.declare_parameter(
+                key, value, descriptor(drive, key, value), ignore_override=True
+            )
+            self._declared.add(key)
+        # what came in between
+        self.note(self._declared)
+
+    def undeclare(self) -> None:
+        """Take back what was declared: nobody knows any more what the drive has."""
+        self._drive = None
+        while self._declared:
+            self._node.undeclare_parameter(self._declared.pop())
+
+    def note(self, keys: Collection[str]) -> None:
+        """Have parameters follow the drive; may be called from any thread."""
+        with self._lock:
+            self._news.update(keys)
+        self._guard.trigger()
+
+    def _follow(self) -> None:
+        with self._lock:
+            news, self._news = self._news, set()
+        drive = self._drive
+        if drive is None:
+            return
+        for key in news & self._declared:
+            value = drive.parameters.values.get(key)
+            if value is None or value == self._node.get_parameter(key).value:
+                continue
+            # the drive is right, also where the manual does not allow what it has
+            parameter = Parameter(key, value=value)
+            self._node.set_descriptor(
+                key, descriptor(drive, key, value), parameter.get_parameter_value()
+            )
+            self._node.set_parameters([parameter])
+
+    # --- to the drive -------------------------------------------------------------------------
+
+    def admit(self, parameters: Iterable[Parameter]) -> list[Parameter]:
+        """
+        Return parameters to set as the drive will have them; nothing is asked of the drive.
+
+        :raises DriveError: the drive cannot have a value, or it may not be changed.
+        """
+        return [self._admit(parameter) for parameter in parameters]
+
+    def _admit(self, parameter: Parameter) -> Parameter:
+        drive = self._drive
+        unset = parameter.type_ is Parameter.Type.NOT_SET
+        if drive is None or unset or parameter.name not in self._declared:
+            return parameter
+        value = understood(drive.model[parameter.name], parameter.value)
+        return Parameter(parameter.name, value=drive.parameters.admit(parameter.name, value))
+
+    @contextlib.contextmanager
+    def from_outside(self) -> Iterator[None]:
+        """What is set by this thread meanwhile is meant for the drive."""
+        self._outside = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._outside = None
+
+    def write(self, parameters: Iterable[Parameter]) -> tuple[Change, ...]:
+        """
+        Write parameters that somebody sets to the drive; all of them or none.
+
+        :returns: what was changed.
+        :raises DriveError: why not; the drive is as it was, or the message says what is not.
+        """
+        drive = self._drive
+        if drive is None or self._outside != threading.get_ident():
+            return ()
+        wanted = {one.name: one.value for one in parameters if one.name in self._declared}
+        return self._change(drive, wanted) if wanted else ()
+
+    def put_back(self, changes: Sequence[Change]) -> None:
+        """
+        Undo changes.
+
+        :raises DriveError: why not.
+        """
+        if changes and self._drive is not None:
+            self._change(self._drive, {change.key: change.old for change in changes})
+
+    @staticmethod
+    def _change(drive: Drive, wanted: Mapping[str, Value]) -> tuple[Change, ...]:
+        try:
+            return drive.parameters.change(wanted).result(_LONGEST_CHANGE)
+        except FutureTimeoutError:
+            raise DriveError(
+                f'{", ".join(wanted)}: the bus did not get to it within {_LONGEST_CHANGE:g} s'
+            ) from None
+
+
+def understood(parameter: CatalogParameter, given: object) -> Value:
+    """
+    Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for 'OFF'.
+
+    :raises DriveError: another type altogether.
+    """
+    kind = parameter.kind
+    if kind is str and isinstance(given, bool):
+        switched = ('off', 'no') if not given else ('on', 'yes')
+        meant = [label for label in parameter.labels.values() if label.lower() in switched]
+        if meant:
+            return meant[0]
+    if kind is float and type(given) is int:
+        return float(given)
+    if type(given) is not kind:
+        wanted = _KINDS[kind]
+        if kind is str:
+            wanted = f'one of {", ".join(parameter.labels.values())}'
+        raise DriveError(f'{parameter.key}: {given!r} is given, but it takes {wanted}')
+    assert isinstance(given, (bool, int, float, str))
+    return given
+
+
+def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
+    """
+    Return the settings of a drive that were given to its node, in a parameter file or by ``-p``.
+
+    :raises DriveError: one of them is of a wrong type, or the drive cannot have it.
+    """
+    # rclpy has no other way to see the overrides that nobody declared
+    given = node._parameter_overrides
+    wanted: dict[str, Value] = {}
+    for parameter in drive.model.settings:
+        if parameter.key in given:
+            value = understood(parameter, given[parameter.key].value)
+            # what cannot be reached over this line is told when the drive is there
+            reached = drive.parameters.reaches(parameter.key)
+            wanted[parameter.key] = (
+                drive.parameters.exact(parameter.key, value) if reached else value
+            )
+    return wanted
+
+
+def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
+    """
+    Return what ``ros2 param describe`` shows.
+
+    :param value: what the drive has; the range takes it in, even if the manual does not.
+    """
+    parameter = drive.model[key]
+    unit = f' [{parameter.unit}]' if parameter.unit else ''
+    shown = ParameterDescriptor(
+        name=key,
+        type=Parameter.Type.from_parameter_value(value).value,
+        description=f'{parameter.name}: {parameter.description}{unit}',
+        additional_constraints='; '.join(_constraints(parameter)),
+    )
+    if isinstance(value, (bool, str)):
+        return shown
+    low, high, step = drive.parameters.limits(key)
+    low, high = min(low, value), max(high, value)
+    if isinstance(value, int):
+        # RegAmp is -1 or 1, and nothing between
+        step = 2 if parameter.labels else 1
+        span = IntegerRange(from_value=int(low), to_value=int(high), step=step)
+        shown.integer_range = [span]
+    else:
+        shown.floating_point_range = [
+            FloatingPointRange(from_value=low, to_value=high, step=step)
+        ]
+    return shown
+
+
+def _constraints(parameter: CatalogParameter) -> Iterator[str]:
+    if parameter.kind is str:
+        yield f'one of {", ".join(parameter.labels.values())}'
+    if parameter.stopped:
+        yield 'the motor must be stopped'
+    if parameter.key.startswith('serial.'):
+        yield 'needs allow_communication_changes'
