@@ -88,6 +88,8 @@ class Bus:
         self._closed = False
         self._tasks: set[Task] = set()
         self._recorder = Recorder()
+        #: How many coroutines read parameters again and again; they share the time for it.
+        self.refreshing = 0
         self._current: Task | None = None
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
 

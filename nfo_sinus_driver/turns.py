@@ -33,13 +33,15 @@ from nfo_sinus_driver.jobs import Transfer
 
 __all__ = ['BACKGROUND_SHARE', 'Turns', 'Waiting']
 
-#: The share of the time that TELEMETRY and REFRESH get when everything above asks for more.
-BACKGROUND_SHARE = 0.2
-#: How much of its share the background may be owed while it waits for it, s: what it earns by
-#: two requests that nobody answers, when the time-out is that of the factory.
-_MOST_OWED = 0.1
+#: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above asks
+#: for more.
+BACKGROUND_SHARE = 1 / 6
+#: How much of its share each may be owed while it waits for it, s: what it earns by two requests
+#: that nobody answers, when the time-out is that of the factory.
+_MOST_OWED = 0.07
 #: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
+_BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 
 _SLOT: Literal['slot'] = 'slot'
 _Rank = Priority | Literal['slot']
@@ -57,8 +59,8 @@ class Turns:
     What waits for the line, the next one in front.
 
     A stop goes first and a set-point in a slot next, so either waits for the transaction on the
-    line and no other. The background (TELEMETRY and REFRESH, which take turns) goes ahead of all
-    else as long as it is owed its share of the time. Set-points may come faster than the line can
+    line and no other. The background, TELEMETRY and REFRESH, goes ahead of all else as long as it
+    is owed its share of the time; who is owed more goes first. Set-points may come faster than the line can
     carry them, and who then no longer polls does not see the fault that should stop the motor: so
     after each of them something else has a turn, the background's share included.
     """
@@ -67,10 +69,8 @@ class Turns:
         self._queues: dict[_Rank, deque[Slot | Waiting]] = {
             rank: deque() for rank in (*Priority, _SLOT)
         }
-        #: What shares the guaranteed time, the one that is next in front.
-        self._background = deque((Priority.TELEMETRY, Priority.REFRESH))
         #: How much time the background is owed, s; it owes if that is negative.
-        self._owed = 0.0
+        self._owed = dict.fromkeys(_BACKGROUND, 0.0)
         self._given: _Rank = _SLOT
         self._slot_went = False
 
@@ -90,14 +90,14 @@ class Turns:
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
-        if self._given in self._background:
-            # no debt beyond this one transaction, for what is sent on an idle line harms nobody
-            self._owed = max(self._owed - seconds, -seconds)
-            self._background.rotate()
-            return
-        earned = seconds * BACKGROUND_SHARE / (1 - BACKGROUND_SHARE)
-        waits = any(self._queues[priority] for priority in self._background)
-        self._owed = min(self._owed + earned, _MOST_OWED if waits else _MOST_SAVED)
+        for priority in _BACKGROUND:
+            owed = self._owed[priority] + seconds * BACKGROUND_SHARE
+            if priority == self._given:
+                # no debt beyond this one transaction, for what is sent on an idle line harms nobody
+                self._owed[priority] = max(owed - seconds, -seconds)
+            else:
+                most = _MOST_OWED if self._queues[priority] else _MOST_SAVED
+                self._owed[priority] = min(owed, most)
 
     def withdraw(self, task: Task) -> None:
         """Take out all that a task waits to send."""
@@ -117,8 +117,10 @@ class Turns:
         yield Priority.STOP
         if not self._slot_went:
             yield _SLOT
-        if self._owed > 0:
-            yield from self._background
+        background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        for priority in background:
+            if self._owed[priority] > 0:
+                yield priority
         yield from (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
         yield _SLOT
-        yield from self._background
+        yield from background

@@ -55,6 +55,8 @@ _ROUND = 8.0
 _WAIT = 0.5
 #: How often progress is logged while the parameters are read for the first time, s.
 _PROGRESS = 5.0
+#: After how many rounds that brought nothing a parameter is not there.
+_REFUSALS = 2
 
 Run = Callable[[Callable[[], Coroutine[Any, Any, Any]]], 'Future[Any]']
 
@@ -225,7 +227,8 @@ class Parameters:
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
         told_at = time.monotonic()
-        while keys:
+        refusals = 0
+        while keys and refusals < _REFUSALS:
             refused: dict[str, Refused] = {}
             for key in keys:
                 try:
@@ -237,33 +240,46 @@ class Parameters:
                 if time.monotonic() > told_at + _PROGRESS:
                     told_at = time.monotonic()
                     self._inverter.tell(Severity.INFO, f'parameters: {self.progress}')
-            if len(refused) == len(keys):
-                for key, refusal in refused.items():
-                    self._inverter.tell(Severity.WARNING, f'{key} cannot be read: {refusal}')
-                return
+            refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
+        for key in keys:
+            self._inverter.tell(Severity.WARNING, f'{key} cannot be read: {refused[key]}')
 
     async def watch_now(self) -> None:
         """Read the settings one after the other, again and again, for ever."""
+        self._bus.refreshing += 1
+        try:
+            while True:
+                await self._watch_round()
+        finally:
+            self._bus.refreshing -= 1
+
+    async def _watch_round(self) -> None:
         inverter = self._inverter
-        while True:
-            keys = self._keys
-            for key in keys:
-                earliest = time.monotonic() + _ROUND / len(keys)
-                if keys is not self._keys:
-                    # they are read anew
-                    break
-                if inverter.connected and inverter.answering:
-                    try:
-                        await self._read(key, once=True)
-                    except Refused:
-                        pass
-                    except LinkError:
-                        # the poll says so if the drive is lost
-                        inverter.answering = False
-                await self._bus.sleep(earliest - time.monotonic())
-            if not keys:
-                await self._bus.sleep(_WAIT)
+        keys = self._keys
+        due = [key for key in keys if not self._cannot_change(key)]
+        for key in due:
+            # many drives on a line take their time, lest nothing but that goes on
+            earliest = time.monotonic() + _ROUND * self._bus.refreshing / len(due)
+            if inverter.connected and inverter.answering:
+                try:
+                    await self._read(key, once=True)
+                except Refused:
+                    pass
+                except LinkError:
+                    # the poll says so if the drive is lost
+                    inverter.answering = False
+            await self._bus.sleep(earliest - time.monotonic())
+            if keys is not self._keys:
+                # they are read anew
+                return
+        if not due:
+            await self._bus.sleep(_WAIT)
+
+    def _cannot_change(self, key: str) -> bool:
+        """Tell whether a running motor keeps everybody from changing a parameter."""
+        seen = self._inverter.seen
+        return self._inverter.model[key].stopped and seen is not None and seen.driven
 
     async def change_now(
         self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
