@@ -132,6 +132,11 @@ class Bus:
             self._enter(slot)
 
     @property
+    def space(self) -> str:
+        """How parameters are addressed on this line: ``modbus`` or ``classic``."""
+        return self._link.space
+
+    @property
     def alive(self) -> bool:
         """The worker works."""
         return self._thread.is_alive()

@@ -34,6 +34,7 @@ from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.mode_scmd import ModeScmd
+from nfo_sinus_driver.drive.mode_scmd import ModeSmode
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
@@ -47,6 +48,8 @@ from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 
 _T = TypeVar('_T')
+
+_METHODS = {'sinus_g2': ModeScmd, 'sinus_optimal': ModeSmode}
 
 _MONITOR = 'control_method is monitor: this driver only reads; set control_method to mode_scmd'
 
@@ -77,7 +80,7 @@ class Drive:
         )
         self._motion: Motion | None = None
         if settings.control_method != 'monitor':
-            method = ModeScmd(self._registers)
+            method = _METHODS[settings.model](self._registers)
             self._motion = Motion(bus, self._inverter, method, self._setpoint)
         self._watch = Watch(
             bus,
@@ -265,14 +268,19 @@ class Drive:
         inverter = self._inverter
         if self._motion is None or (inverter.sio_tot and inverter.auto_stop):
             return
-        why = 'AutoStop is OFF' if inverter.sio_tot else 'SioTot is 0'
+        if not inverter.can_time_out:
+            why, remedy = 'none is known of this model', 'use the RUN input'
+        elif inverter.sio_tot:
+            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
+        else:
+            why, remedy = 'SioTot is 0', 'set drive_timeout'
         if why == self._told_timeout:
             return
         self._told_timeout = why
         inverter.tell(
             Severity.WARNING,
             f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
-            'is cut, the motor runs on; set drive_timeout',
+            f'is cut, the motor runs on; {remedy}',
         )
 
     async def _disconnect(self, timeout: float) -> str:
@@ -299,6 +307,8 @@ class Drive:
             raise DriveError(_MONITOR)
         if not seconds:
             return ''
+        if not self._inverter.can_time_out:
+            raise DriveError('drive_timeout: this model has no SioTot, so it must be 0')
         wanted = {'serial.sio_tot': seconds, 'serial.auto_stop': True}
         changes = await self.parameters.change_now(
             wanted, guarded=False, because=' (drive_timeout)'

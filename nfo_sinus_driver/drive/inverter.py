@@ -23,9 +23,9 @@ import logging
 import math
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -34,6 +34,8 @@ from nfo_sinus_driver.drive.snapshot import Severity
 
 _log = logging.getLogger(__name__)
 
+#: As long as RunDly of the G2 can be, s.
+_LONGEST_START_DELAY = 3600.0
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -42,15 +44,15 @@ class Identity:
     """
     Who answers; ``''`` is what it does not tell.
 
-    :ivar firmware: SWVer, such as 4.38 [M0 §8.1].
+    :ivar firmware: SWVer, such as 4.38 [M0 §8.1]; NaN if it does not tell.
     :ivar motor_firmware: NFOVer, such as 4018.
     :ivar vendor: who made it.
     :ivar model: its product name and size, such as ``NFO Sinus 1.50/400`` [M0 §6.2.4].
     :ivar serial: its serial number.
     """
 
-    firmware: float
-    motor_firmware: int
+    firmware: float = math.nan
+    motor_firmware: int = 0
     vendor: str = ''
     model: str = ''
     serial: str = ''
@@ -58,12 +60,13 @@ class Identity:
     @property
     def versions(self) -> str:
         """Both firmwares, such as ``4.38 / 4018``."""
+        if math.isnan(self.firmware):
+            return ''
         return f'{self.firmware:.2f} / {self.motor_firmware}'
 
     def __str__(self) -> str:
-        serial = (f'serial {self.serial}',) if self.serial else ()
-        model = (self.model,) if self.model else ()
-        return ', '.join((*model, f'firmware {self.versions}', *serial))
+        told = {'': self.model, 'firmware ': self.versions, 'serial ': self.serial}
+        return ', '.join(f'{name}{value}' for name, value in told.items() if value)
 
 
 class Inverter:
@@ -102,19 +105,26 @@ class Inverter:
         code = await self._registers.read_number('fieldbus.inv_st', priority, once=once)
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
-        kind = self.model.inv_st(int(code)).kind
-        if kind is Kind.FAULT and not word & Status.FAULTED:
+        seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
+        if seen.listed.kind is Kind.FAULT and not seen.faulted:
             # either the fault came between the two, or the drive treats it as an alarm [C95]
             word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
             assert isinstance(word, int)
-        seen = InverterStatus(at, word & 0xFFFF, int(code))
+            seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
         # a look of low priority may be overtaken by one that began later
         if self.seen is None or seen.at >= self.seen.at:
             self.seen = seen
         return seen
 
+    @property
+    def can_time_out(self) -> bool:
+        """It has a time-out of its own that can be read and set over this line."""
+        return self.has('serial.sio_tot') and self.has('serial.auto_stop')
+
     async def read_timeout(self) -> None:
         """Read whether the drive has a time-out of its own."""
+        if not self.can_time_out:
+            return
         self.sio_tot = await self._registers.read_number('serial.sio_tot', Priority.SERVICE)
         words = await self._registers.read_words('serial.auto_stop', Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
@@ -126,6 +136,11 @@ class Inverter:
 
         :raises LinkError: nobody does.
         """
+        if not self._registers.reaches('fieldbus.sw_ver'):
+            # it does not tell its firmware, so anything will do that every drive answers
+            await self._registers.read('fieldbus.inv_st', Priority.SERVICE)
+            self.identity = Identity()
+            return self.identity
         firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
         motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
         self.identity = Identity(firmware, int(motor))
@@ -150,13 +165,32 @@ class Inverter:
         return self.identity
 
     async def read_control_mode(self, priority: Priority = Priority.SERVICE) -> str:
-        """Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``."""
-        self.control_mode = await self.read_label('control.mode', priority)
+        """
+        Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``.
+
+        The Optimal has no register that tells it [C58]: it is what the settings expect.
+        """
+        if self._registers.reaches('control.mode'):
+            self.control_mode = await self.read_label('control.mode', priority)
+        else:
+            self.control_mode = self.settings.expected_control_mode or 'Freque'
         if self.control_mode == 'PI-Reg':
             self.unit = await self.read_label('pi_reg.unit', priority)
         else:
             self.unit = _UNITS.get(self.control_mode, '')
         return self.control_mode
+
+    async def coasts_to_stop(self) -> bool:
+        """Tell whether an ordinary stop releases the motor [C97]."""
+        if self._registers.reaches('control.st_mode'):
+            return await self.read_label('control.st_mode', Priority.STOP) == 'Release'
+        return self.seen is not None and Fact.STOP_MODE_BRAKE not in self.seen.facts
+
+    async def read_start_delay(self) -> float:
+        """Read how long the drive waits after a run command, s; an hour if it does not tell."""
+        if self._registers.reaches('control.run_dly'):
+            return await self.read_number('control.run_dly')
+        return _LONGEST_START_DELAY
 
     async def read_label(self, key: str, priority: Priority = Priority.SERVICE) -> str:
         """Read a parameter that is an enumeration."""
@@ -168,20 +202,16 @@ class Inverter:
 
     @property
     def kind(self) -> Kind:
-        """How grave the inverter status is; the fault bit has the last word [C95]."""
-        if self.seen is None:
-            return Kind.STATUS
-        kind = self.model.inv_st(self.seen.code).kind
-        if self.seen.faulted:
-            return Kind.FAULT
-        return Kind.ALARM if kind is Kind.FAULT else kind
+        """How grave the inverter status is."""
+        return Kind.STATUS if self.seen is None else self.seen.kind
 
     @property
     def text(self) -> str:
         """The inverter status as on the display."""
         if self.seen is None:
             return ''
-        firmware = Fraction(self.identity.firmware) if self.identity else None
+        told = self.identity is not None and not math.isnan(self.identity.firmware)
+        firmware = Fraction(self.identity.firmware) if told and self.identity else None
         return self.model.inv_st_text(self.seen.code, firmware)
 
     def describe(self) -> str:
@@ -191,10 +221,12 @@ class Inverter:
         return f'{self.seen.code} {self.text}'
 
     def has(self, key: str) -> bool:
-        """Tell whether the drive's firmware is new enough for a parameter."""
+        """Tell whether the drive has a parameter: its model, this line and its firmware do."""
+        if not self._registers.reaches(key):
+            return False
         since = self.model[key].since
-        firmware = self.identity.firmware if self.identity else math.inf
-        return since is None or firmware > float(since) - 0.001
+        firmware = self.identity.firmware if self.identity else math.nan
+        return since is None or not firmware < float(since) - 0.001
 
     def tell(self, severity: Severity, text: str) -> None:
         """Say something to a person; what cannot be told keeps nothing from being done."""

@@ -12,12 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Control through MODE and SCMD [M0 §7.2 tables 17 and 18].
-
-A control method knows what to write, and nothing of when; `motion` decides that. Every method
-has the shape of this one.
-"""
+"""Control through MODE and SCMD [M0 §7.2 tables 17 and 18], or MODE and SMODE [M1]."""
 
 from __future__ import annotations
 
@@ -27,23 +22,21 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.catalog.words_optimal import Mode as OptimalMode
+from nfo_sinus_driver.catalog.words_optimal import Smode
 from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Refused
 
-#: The register that takes the set-point, and the value reached, by control mode [M0 §8.3].
-SETPOINT_KEYS = {
-    'Freque': 'status.frq_set',
-    'Speed': 'status.spd_set',
-    'Torque': 'status.trq_set',
-    'PI-Reg': 'status.reg_set',
-}
-
 
 class ModeScmd:
-    """Control of one drive through MODE and SCMD; coroutines for the bus."""
+    """Control of one Sinus G2 through MODE and SCMD; a control method."""
 
     name = 'mode_scmd'
+    coasts = True
+    #: The parameter that takes the run command; its codes for stop and run are the same on both.
+    _command = 'fieldbus.scmd'
 
     def __init__(self, registers: Registers) -> None:
         self._registers = registers
@@ -62,7 +55,7 @@ class ModeScmd:
         if mode == Mode.INHIBIT:
             raise DriveError('the drive lets nobody take control now (MODE is Inhibit: tuning?)')
         if mode == Mode.BUS:
-            await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.SERVICE)
+            await self._registers.write(self._command, Scmd.STOP, Priority.SERVICE)
         else:
             await self._registers.write('fieldbus.mode', Mode.BUS, Priority.SERVICE)
 
@@ -72,15 +65,15 @@ class ModeScmd:
 
         :raises DriveError: the drive keeps another value.
         """
-        key = SETPOINT_KEYS[control_mode]
-        await self._registers.write(key, 0, priority)
-        kept = await self._registers.read(key, priority)
+        reference = Reference(self._registers, control_mode)
+        await reference.write_zero(priority, once=False)
+        kept = await reference.read(priority)
         if kept != 0:
             raise DriveError(f'the drive keeps a set-point of {kept} where 0 was written')
 
     async def run(self) -> None:
         """Give the run command; once, for nobody knows what has happened before a second one."""
-        await self._registers.write('fieldbus.scmd', Scmd.FIELDBUS, Priority.SERVICE, once=True)
+        await self._registers.write(self._command, Scmd.FIELDBUS, Priority.SERVICE, once=True)
 
     async def stop(self, control_mode: str) -> None:
         """
@@ -91,11 +84,9 @@ class ModeScmd:
         :raises LinkError: the drive does not answer, or refuses although the bus has control.
         """
         try:
-            await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)
+            await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)
             if control_mode:
-                await self._registers.write(
-                    SETPOINT_KEYS[control_mode], 0, Priority.STOP, once=True
-                )
+                await Reference(self._registers, control_mode).write_zero(Priority.STOP)
         except Refused:
             if await self.in_control(Priority.STOP):
                 raise
@@ -106,7 +97,8 @@ class ModeScmd:
         if control_mode:
             # a drive may well refuse a set-point while the bus has no control
             with contextlib.suppress(Refused):
-                await self._registers.write(SETPOINT_KEYS[control_mode], 0, Priority.STOP)
+                reference = Reference(self._registers, control_mode)
+                await reference.write_zero(Priority.STOP, once=False)
 
     async def release(self) -> None:
         """Give control back; never by MODE = Ext, which can start the motor [C43]."""
@@ -118,3 +110,36 @@ class ModeScmd:
         await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
         if code == SIO_FAIL:
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+
+
+class ModeSmode(ModeScmd):
+    """
+    Control of one Sinus Optimal through MODE and SMODE [M1]; a control method.
+
+    Its MODE has no Stop: 1 is Manual, the keypad's, and 2 is Auto, which may start the motor and is
+    never written [C51]. It has no way to release the motor at once [C96].
+    """
+
+    coasts = False
+    _command = 'fieldbus.smode'
+
+    async def take_control(self) -> None:
+        """Put the drive under bus control with no run command standing."""
+        if await self.in_control(Priority.SERVICE):
+            await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
+        else:
+            await self._registers.write('fieldbus.mode', OptimalMode.BUS, Priority.SERVICE)
+
+    async def quick_stop(self, control_mode: str) -> None:
+        """Stop as usual: there is no other way."""
+        await self.stop(control_mode)
+
+    async def release(self) -> None:
+        """Give control back to the keypad, once no run command stands."""
+        if await self.in_control(Priority.SERVICE):
+            await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
+            await self._registers.write('fieldbus.mode', OptimalMode.MANUAL, Priority.SERVICE)
+
+    async def acknowledge(self, code: int) -> None:
+        """Acknowledge a fault by reading the status that does [M1]."""
+        await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)

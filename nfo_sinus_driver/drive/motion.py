@@ -29,13 +29,11 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
-from nfo_sinus_driver.catalog.inv_st import LOCAL
-from nfo_sinus_driver.catalog.inv_st import START_DELAY
+from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.mode_scmd import ModeScmd
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
@@ -66,7 +64,7 @@ class Motion:
     """Arms, stops and watches one drive."""
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, method: ModeScmd, setpoint: Setpoint
+        self, bus: Bus, inverter: Inverter, method: ControlMethod, setpoint: Setpoint
     ) -> None:
         self._bus = bus
         self._inverter = inverter
@@ -135,15 +133,19 @@ class Motion:
             return self._no_control(seen)
         if not seen.driven:
             return f'stopped ({text})'
-        coasts = await self._inverter.read_label('control.st_mode', Priority.STOP) == 'Release'
+        coasts = await self._inverter.coasts_to_stop()
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
     async def quick_stop(self) -> str:
         """
-        Release the motor at once: it coasts, and control is given back [C96].
+        Release the motor at once: it coasts, and control is given back.
+
+        Where the drive has no way to do that, stop as usual [C96].
 
         :raises DriveError: the drive does not confirm it; the stop is tried on and on.
         """
+        if not self._method.coasts:
+            return f'{await self.stop()} (this drive has no quick stop)'
         ours = self.concerned
         self.disarm()
         try:
@@ -211,7 +213,8 @@ class Motion:
         try:
             await self._await_status(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
-            if not await self._inverter.read_number('serial.sio_tot'):
+            await self._inverter.read_timeout()
+            if not self._inverter.sio_tot:
                 return f'{stopped}; it was left to its ramp, under bus control'
             stopped = 'released to coast, for the time-out of the drive would end the ramp'
         await self._method.release()
@@ -313,14 +316,15 @@ class Motion:
                 return
             if seen.faulted:
                 raise DriveError(f'the drive did not start: {self._inverter.describe()}')
-            if seen.code == START_DELAY and not delayed:
+            if Fact.RUN_INPUT_MISSING in seen.facts:
+                raise DriveError(_NO_RUN)
+            if seen.code == seen.codes.start_delay and not delayed:
                 delayed = True
-                deadline += await self._inverter.read_number('control.run_dly')
+                deadline += await self._inverter.read_start_delay()
             if time.monotonic() > deadline:
-                standby = seen.code in BUS_STANDBY
                 raise DriveError(
                     _NO_RUN
-                    if standby
+                    if seen.standby
                     else f'the drive does not start: {self._inverter.describe()}'
                 )
             await self._bus.sleep(_LOOK_PERIOD)
@@ -421,8 +425,10 @@ class Motion:
             fault = self._inverter.model.inv_st(seen.code)
             return f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}'
         if not seen.from_bus:
-            by = 'keypad or terminals' if seen.code in LOCAL else 'somebody else'
+            by = 'keypad or terminals' if seen.code in seen.codes.local else 'somebody else'
             return f'{by} took control ({self._inverter.describe()})'
+        if Fact.RUN_INPUT_MISSING in seen.facts:
+            return f'the RUN input was lost ({self._inverter.describe()})'
         if not seen.runs:
             return f'the drive stopped by itself, RUN input lost? ({self._inverter.describe()})'
         return ''

@@ -131,9 +131,10 @@ class Parameters:
 
         :raises ParameterError: it cannot have it.
         """
-        if self._values.get(key) == value:
+        known = self._values.get(key)
+        if known is not None and type(known) is type(value) and known == value:
             # it has it, also where no manual says that it can [C19]
-            return self._values[key]
+            return known
         model = self._inverter.model
         if key not in model or not model[key].is_setting or not self.reaches(key):
             raise ParameterError(f'{key} is no parameter that can be changed here')

@@ -29,8 +29,9 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
-#: Parameters of different sizes that are safe to read at any time.
-_PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status')
+#: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
+#: one word, its counters two.
+_PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status', 'status.op_time')
 
 
 class Registers:
@@ -45,12 +46,13 @@ class Registers:
         self._bus = bus
         self._unit = unit
         self._retries = retries
-        self._protocol = Protocol.MODBUS
-        bus.use_probes(unit, tuple(self.address(key) for key in _PROBES))
+        #: How parameters are addressed on this line.
+        self.protocol = Protocol(bus.space)
+        bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
-        place = self.model[key].place(self._protocol)
+        place = self.model[key].place(self.protocol)
         return Address(place.addresses, place.words)
 
     def words(self, key: str, value: Value) -> Words:
@@ -59,7 +61,7 @@ class Registers:
 
         :raises ValueError: out of range, between two steps, or an unknown label.
         """
-        return self.model[key].encode(value, self._protocol)
+        return self.model[key].encode(value, self.protocol)
 
     def nearest_words(self, key: str, value: float) -> Words:
         """
@@ -67,7 +69,7 @@ class Registers:
 
         :raises ValueError: out of range or not finite.
         """
-        return self.model[key].quantise(value, self._protocol)
+        return self.model[key].quantise(value, self.protocol)
 
     def value(self, key: str, words: Words) -> Value:
         """
@@ -75,17 +77,17 @@ class Registers:
 
         :raises ValueError: a code that the manual does not list, where the type has no room for it.
         """
-        return self.model[key].decode(words, self._protocol)
+        return self.model[key].decode(words, self.protocol)
 
     def reaches(self, key: str) -> bool:
-        """Tell whether a parameter can be reached over this line."""
-        return self._protocol in self.model[key].places
+        """Tell whether the drive has a parameter and it can be reached over this line."""
+        return key in self.model and self.protocol in self.model[key].places
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""
         parameter = self.model[key]
-        low, high = parameter.span(self._protocol)
-        return float(low), float(high), float(parameter.factor(self._protocol))
+        low, high = parameter.span(self.protocol)
+        return float(low), float(high), float(parameter.factor(self.protocol))
 
     def number(self, key: str, words: Words) -> float:
         """Return the value of words as the drive understands them."""
@@ -148,6 +150,12 @@ class Registers:
     ) -> None:
         """Write a parameter as it shall stand in the drive, whatever its range."""
         await self._ask(self.address(key), priority, words, once)
+
+    async def write_at(
+        self, address: Address, words: Words, priority: Priority, *, once: bool = False
+    ) -> None:
+        """Write words to an address."""
+        await self._ask(address, priority, words, once)
 
     async def _ask(
         self, address: Address, priority: Priority, words: Words | None, once: bool

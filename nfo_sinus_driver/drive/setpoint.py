@@ -26,7 +26,7 @@ from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.mode_scmd import SETPOINT_KEYS
+from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Severity
@@ -64,6 +64,7 @@ class Setpoint:
         #: The newest request and when it came in; written by any thread, at once.
         self._request: tuple[float, float] = (NAN, -math.inf)
         self.control_mode = ''
+        self._reference: Reference | None = None
         self._armed_at = math.inf
         self._written: tuple[int, ...] = ()
         self._written_at = 0.0
@@ -102,8 +103,9 @@ class Setpoint:
     def arm(self, control_mode: str) -> None:
         """Follow set-points that come in from now on; 0 stands in the drive."""
         self.control_mode = control_mode
+        self._reference = Reference(self._registers, control_mode)
         self._armed_at = time.monotonic()
-        self._written = self._registers.words(SETPOINT_KEYS[control_mode], 0)
+        self._written = self._reference.words(0.0)
         self._written_at = self._armed_at
         self.commanded = 0.0
         self.clamped = False
@@ -132,22 +134,20 @@ class Setpoint:
         timeout = self._inverter.settings.setpoint_timeout
         return bool(timeout) and time.monotonic() - at > timeout
 
-    def _limited(self, value: float) -> float:
-        parameter = self._registers.model[SETPOINT_KEYS[self.control_mode]]
-        assert parameter.maximum is not None, parameter.key
-        most = float(parameter.maximum)
+    def _limited(self, value: float, most: float) -> float:
         if self._inverter.settings.setpoint_max:
             most = min(most, self._inverter.settings.setpoint_max)
         return max(-most, min(most, value))
 
     def _make(self) -> Transfer | None:
         value, at = self._request
-        if at <= self._armed_at or self._is_old(at):
+        reference = self._reference
+        if reference is None or at <= self._armed_at or self._is_old(at):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
             return None
-        limited = self._limited(value)
+        limited = self._limited(value, reference.most)
         self.clamped = limited != value
         if self.clamped and not self._clamp_told:
             self._tell(
@@ -160,13 +160,10 @@ class Setpoint:
         if self._warned:
             self._warned = False
             self._tell(Severity.INFO, 'set-points arrive again')
-        key = SETPOINT_KEYS[self.control_mode]
-        words = self._registers.nearest_words(key, limited)
+        words = reference.words(limited)
         if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
             return None
-        return self._bus.write(
-            self._unit, self._registers.address(key), words, Priority.SETPOINT
-        )
+        return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
@@ -187,7 +184,8 @@ class Setpoint:
 
     def _value(self, words: Words) -> float:
         """Return the set-point that words mean to the drive, after its own rounding."""
-        return self._registers.number(SETPOINT_KEYS[self.control_mode], words)
+        assert self._reference is not None
+        return self._reference.value(words)
 
     async def _watch_age(self) -> None:
         try:
@@ -215,10 +213,10 @@ class Setpoint:
                     f'no set-point for {timeout:g} s: the motor ramps to a stop '
                     'until the next one arrives',
                 )
-            key = SETPOINT_KEYS[self.control_mode]
+            assert self._reference is not None
             before = self._request
             try:
-                await self._registers.write(key, 0, Priority.STOP, once=True)
+                await self._reference.write_zero(Priority.STOP)
             except Refused as error:
                 self._refused(f'it refused set-point 0: {error}')
                 return
@@ -228,7 +226,7 @@ class Setpoint:
                 return
             if self._request is before:
                 self.commanded = 0.0
-            self._written = self._registers.words(key, 0)
+            self._written = self._reference.words(0.0)
             self._written_at = time.monotonic()
         self._expired = True
 

@@ -22,12 +22,12 @@ import enum
 import math
 from typing import Protocol
 
+from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import InvStCode
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog import state_of
-from nfo_sinus_driver.catalog.inv_st import BUS_RUNNING
-from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
+from nfo_sinus_driver.catalog.dialect import Codes
 
 NAN = math.nan
 
@@ -53,37 +53,61 @@ class InverterStatus:
     :ivar at: when the answer arrived, s of ``time.monotonic``.
     :ivar word: DriveStatus, the low 16 bits [C24].
     :ivar code: the inverter status code, read without acknowledging.
+    :ivar model: whose words these are.
     """
 
     at: float
     word: int
     code: int
+    model: Model
 
     @property
-    def status(self) -> Status:
-        """The bits of the status word."""
-        return Status(self.word)
+    def listed(self) -> InvStCode:
+        """What the model's table says of the code."""
+        return self.model.inv_st(self.code)
+
+    @property
+    def codes(self) -> Codes:
+        """The model's codes by what they mean."""
+        return self.model.dialect.codes
+
+    @property
+    def facts(self) -> Fact:
+        """What the drive says of itself; only the facts in ``model.dialect.valid`` count."""
+        return self.model.dialect.facts(self.word, self.listed.kind)
+
+    @property
+    def kind(self) -> Kind:
+        """How grave the code is; the bits have the last word ([C50], [C95])."""
+        return self.model.dialect.kind(self.word, self.listed.kind)
 
     @property
     def state(self) -> State:
         """The state of the generic state machine."""
-        return state_of(self.word)
+        return self.model.dialect.state(self.word)
 
     @property
     def faulted(self) -> bool:
         """A fault stands, or waits for being acknowledged [M0 table 15]."""
-        return Status.FAULTED in self.status
+        return Fact.FAULT in self.facts
+
+    @property
+    def standby(self) -> bool:
+        """It waits for a command over the bus."""
+        return self.code in self.codes.bus_standby
 
     @property
     def from_bus(self) -> bool:
         """The bus has control."""
-        return Status.CTRL_FROM_NET in self.status or self.code in BUS_RUNNING | BUS_STANDBY
+        codes = self.codes
+        by_code = self.code in codes.bus_running or self.code in codes.bus_standby
+        return by_code or Fact.NETWORK_CONTROL in self.facts
 
     @property
     def runs(self) -> bool:
         """The motor is driven and not on its way to a stop."""
         if self.state is State.UNKNOWN:
-            return self.code in BUS_RUNNING
+            return self.code in self.codes.bus_running
         return self.state is State.OPERATION_ENABLED
 
     @property
@@ -95,7 +119,7 @@ class InverterStatus:
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN:
-            return self.code in BUS_RUNNING
+            return self.code in self.codes.bus_running
         return self.state in _DRIVEN
 
 

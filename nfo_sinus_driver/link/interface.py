@@ -92,7 +92,13 @@ class Inquiry(Protocol):
 
 
 class Link(Protocol):
-    """One line to several units, used by one thread."""
+    """
+    One line to several units, used by one thread.
+
+    :ivar space: how parameters are addressed: ``modbus`` by register, ``classic`` by id.
+    """
+
+    space: str
 
     def open(self) -> None:
         """

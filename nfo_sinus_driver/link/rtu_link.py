@@ -70,6 +70,8 @@ class RtuLink:
     answered (units answer in order), or after :data:`LATEST_ANSWER` time-outs of silence.
     """
 
+    space = 'modbus'
+
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings

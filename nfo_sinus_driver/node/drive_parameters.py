@@ -116,6 +116,12 @@ class DriveParameters:
         return [self._admit(parameter) for parameter in parameters]
 
     def _admit(self, parameter: Parameter) -> Parameter:
+        if not self._node.has_parameter(parameter.name):
+            # rclpy refuses it too, but its message leaves out the name
+            raise DriveError(
+                f'{parameter.name}: there is no such parameter; those of the drive are there once '
+                'the node is configured'
+            )
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:

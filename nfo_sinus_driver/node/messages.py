@@ -25,9 +25,9 @@ from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
 from std_msgs.msg import Header
 
+from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -46,25 +46,6 @@ _CONTROL_MODES = {
 }
 _STATES = {state: getattr(DriveStatus, state.name) for state in State}
 _KINDS = {Kind.STATUS: InvSt.STATUS, Kind.ALARM: InvSt.ALARM, Kind.FAULT: InvSt.FAULT}
-
-#: What the G2's status word and inverter status tell; the rest it does not report ([M0 table 15],
-#: [C90]).
-_VALID = (
-    DriveStatus.VALID_READY
-    | DriveStatus.VALID_SWITCHED_ON
-    | DriveStatus.VALID_OPERATION_ENABLED
-    | DriveStatus.VALID_FAULT
-    | DriveStatus.VALID_ALARM
-    | DriveStatus.VALID_VOLTAGE_ENABLED
-    | DriveStatus.VALID_QUICK_STOP_ACTIVE
-    | DriveStatus.VALID_SWITCH_ON_DISABLED
-    | DriveStatus.VALID_NETWORK_REFERENCE
-    | DriveStatus.VALID_NETWORK_CONTROL
-    | DriveStatus.VALID_SETPOINT_REACHED
-    | DriveStatus.VALID_LIMIT_ACTIVE
-    | DriveStatus.VALID_REVERSE
-    | DriveStatus.VALID_STOPPING
-)
 
 #: The fields of Telemetry and where they come from.
 _TELEMETRY = {
@@ -102,31 +83,18 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
         state=DriveStatus.UNKNOWN,
     )
     if snapshot.status is not None:
-        _fill_bits(message, snapshot.status, snapshot.kind)
+        _fill_facts(message, snapshot.status)
     return message
 
 
-def _fill_bits(message: DriveStatus, seen: InverterStatus, kind: Kind) -> None:
-    status = seen.status
-    state = seen.state
-    message.state = _STATES[state]
+def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
+    facts = seen.facts
+    message.state = _STATES[seen.state]
     message.status_word = seen.word
-    message.valid = _VALID
-    message.ready = Status.READY_TO_SWITCH_ON in status
-    message.switched_on = Status.SWITCHED_ON in status
-    message.operation_enabled = bool(status & (Status.OP_ENABLED | Status.REV_OP_ENABLED))
-    message.fault = Status.FAULTED in status
-    message.alarm = kind is Kind.ALARM
-    message.voltage_enabled = Status.VOLTAGE_ENABLED in status
-    # bit 5 is undefined outside the driven states, so the state decides [M0 table 16]
-    message.quick_stop_active = state is State.QUICK_STOP
-    message.switch_on_disabled = Status.SWITCH_ON_DISABLED in status
-    message.network_reference = Status.REF_FROM_NET in status
-    message.network_control = Status.CTRL_FROM_NET in status
-    message.setpoint_reached = Status.SETPOINT_REACHED in status
-    message.limit_active = Status.LIMIT_ACTIVE in status
-    message.reverse = Status.REV_OP_ENABLED in status
-    message.stopping = Status.STOPPING in status
+    message.valid = seen.model.dialect.valid.value
+    # the facts have the names and the bits that the message has
+    for fact in Fact:
+        setattr(message, str(fact.name).lower(), fact in facts)
 
 
 def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:

@@ -63,6 +63,8 @@ class FakeLink:
     :ivar opening: called when the port is opened; may raise.
     """
 
+    space = 'modbus'
+
     def __init__(self) -> None:
         self.done: list[Done] = []
         self.answer: Callable[[Done], Words] = lambda done: (done.number,)

@@ -94,6 +94,8 @@ class Notes:
 class Tap:
     """A link with somebody who sees every transaction just before it is sent."""
 
+    space = 'modbus'
+
     def __init__(self, link: Link) -> None:
         self._link = link
         self.before: Callable[[int, Words | None], None] = lambda register, words: None

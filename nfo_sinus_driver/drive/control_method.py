@@ -1,0 +1,78 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The shape of a control method, and which there are.
+
+A control method knows what to write, and nothing of when; `motion` decides that.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from nfo_sinus_driver.bus import Priority
+
+
+class ControlMethod(Protocol):
+    """
+    What to write so that a drive does something; coroutines for the bus.
+
+    :ivar coasts: it can release the motor at once.
+    """
+
+    name: str
+    coasts: bool
+
+    async def in_control(self, priority: Priority) -> bool:
+        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+
+    async def take_control(self) -> None:
+        """
+        Put the drive under bus control with no run command standing.
+
+        :raises DriveError: it lets nobody.
+        """
+
+    async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
+        """
+        Write set-point 0 in the unit of a control mode, and read it back.
+
+        :raises DriveError: the drive keeps another value.
+        """
+
+    async def run(self) -> None:
+        """Give the run command; once, for nobody knows what has happened before a second one."""
+
+    async def stop(self, control_mode: str) -> None:
+        """
+        Take the run command back and write set-point 0, at the head of the bus.
+
+        Does nothing to a drive that is not under bus control.
+
+        :raises LinkError: the drive does not answer, or refuses although the bus has control.
+        """
+
+    async def quick_stop(self, control_mode: str) -> None:
+        """Release the motor at once, if the drive has a way; control may be given back by it."""
+
+    async def release(self) -> None:
+        """Give control back; never by a MODE that can start the motor [C43], [C51]."""
+
+    async def acknowledge(self, code: int) -> None:
+        """
+        Acknowledge a fault.
+
+        :param code: the inverter status code that stands.
+        """

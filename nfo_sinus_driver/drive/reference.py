@@ -1,0 +1,85 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where the set-point of a control mode goes, on each model and over each protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Words
+
+#: The parameter that takes the set-point, by control mode; the first that the model has.
+_KEYS: Mapping[str, tuple[str, ...]] = {
+    'Freque': ('fieldbus.input_freq_setpoint', 'status.frq_set'),
+    'Speed': ('fieldbus.input_speed_setpoint', 'status.spd_set'),
+    'Torque': ('status.trq_set',),
+    'PI-Reg': ('status.reg_set',),
+}
+#: Over Classic all of them are written here, in the unit of the control mode ([C11], [C12]).
+_CLASSIC = 'fieldbus.setpoint'
+#: The greatest set-point over a bus in either direction [M2 table 2].
+_MOST = {'Freque': 150.0, 'Speed': 9000.0, 'Torque': 200.0, 'PI-Reg': 150.0}
+
+
+class Reference:
+    """
+    The place of the set-point in one control mode.
+
+    :ivar most: the greatest value in either direction, in the unit of the control mode.
+    :ivar address: where it is written.
+    :raises DriveError: the drive takes no set-point in this control mode.
+    """
+
+    def __init__(self, registers: Registers, control_mode: str) -> None:
+        self._registers = registers
+        keys = [key for key in _KEYS.get(control_mode, ()) if key in registers.model]
+        if not keys:
+            raise DriveError(
+                f'the drive takes no set-point over the bus in control mode {control_mode or "?"}'
+            )
+        self._key = keys[0]
+        self.most = _MOST[control_mode]
+        classic = registers.protocol is Protocol.CLASSIC
+        self.address: Address = registers.address(_CLASSIC if classic else self._key)
+
+    def words(self, value: float) -> Words:
+        """
+        Return the words of the drive's step nearest to a set-point.
+
+        :raises ValueError: out of range or not finite.
+        """
+        return self._registers.nearest_words(self._key, value)
+
+    def value(self, words: Words) -> float:
+        """Return the set-point that words mean to the drive, after its own rounding."""
+        return self._registers.number(self._key, words)
+
+    async def write_zero(self, priority: Priority, *, once: bool = True) -> None:
+        """
+        Write set-point 0.
+
+        :param once: do not repeat the request when nobody answers.
+        :raises LinkError: the drive does not answer, or refuses.
+        """
+        await self._registers.write_at(self.address, self.words(0.0), priority, once=once)
+
+    async def read(self, priority: Priority) -> float:
+        """Read what the drive was given last."""
+        return await self._registers.read_number(self._key, priority)

@@ -1,0 +1,421 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters are read and watched, and nothing of that writes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drive_rig import PATIENCE
+from drive_rig import MakeRig
+from drive_rig import Rig
+from drive_rig import wait_until
+from parameters_rig import SILENCE
+from parameters_rig import at_keypad
+from parameters_rig import connect
+from parameters_rig import far
+from parameters_rig import news
+from parameters_rig import on_read
+from parameters_rig import put_raw
+from parameters_rig import watch_only
+from parameters_rig import written
+import pytest
+
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import parameters as parameters_module
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
+
+#: Read registers, and who are you.
+ONLY_READ = {3, 17, 43}
+
+
+@pytest.fixture
+def busy_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a round of reading take no longer than it must."""
+    monkeypatch.setattr(parameters_module, '_ROUND', 0.0)
+    monkeypatch.setattr(parameters_module, '_WAIT', 0.01)
+
+
+def functions(rig: Rig) -> set[int]:
+    """The functions of all requests so far."""
+    return {
+        bytes.fromhex(frame['hex'])[1] for frame in rig.trace() if frame['direction'] == 'request'
+    }
+
+
+# --- the first reading ----------------------------------------------------------------------------
+
+
+def test_all_are_read_and_nothing_is_written(rig: Rig) -> None:
+    parameters = rig.drive.parameters
+    assert parameters.progress == 'not read'
+    connect(rig)
+    # any_bus of the manual's 120 has no register
+    assert len(parameters.values) == 119
+    assert 'control.any_bus' not in parameters.values
+    assert list(parameters.values.values()) == far(rig, *parameters.values)
+    assert parameters.progress == '119 read'
+    assert set(rig.notes.news) == set(parameters.values)
+    assert rig.notes.told('parameters: 119 read in ', Severity.INFO)
+    assert not news(rig)
+    parameters.refresh().result(PATIENCE)
+    rig.next_snapshots()
+    assert written(rig) == {}
+    assert functions(rig) <= ONLY_READ
+
+
+def test_progress(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parameters_module, '_PROGRESS', 0.0)
+    seen: list[str] = []
+    on_read(rig, monkeypatch, lambda key: seen.append(rig.drive.parameters.progress))
+    connect(rig)
+    assert '60 of 119 read' in seen
+    assert rig.notes.told('parameters: 60 of 119 read', Severity.INFO)
+
+
+def test_older_firmware_lacks_what_came_later(make_rig: MakeRig) -> None:
+    newest = 'error.short_c_err_cnt'
+    rig = make_rig(parameters={'fieldbus.sw_ver': 4.31})
+    assert newest not in connect(rig).values
+    assert len(rig.drive.parameters.values) == 118
+
+
+def test_firmware_that_has_it_since_just_then(make_rig: MakeRig) -> None:
+    rig = make_rig(parameters={'fieldbus.sw_ver': 4.32})
+    assert 'error.short_c_err_cnt' in connect(rig).values
+
+
+def test_one_that_the_drive_does_not_show_is_not_there(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
+) -> None:
+    asked: list[str] = []
+
+    def refuse(key: str) -> None:
+        if key == 'freque.f_fix1':
+            asked.append(key)
+            raise Refused(Reason.ADDRESS, 'no such thing')
+
+    on_read(rig, monkeypatch, refuse)
+    parameters = connect(rig)
+    assert len(parameters.values) == 118
+    assert 'freque.f_fix1' not in parameters.values
+    told = [text for _, text in rig.notes.events if text.startswith('freque.f_fix1 cannot be read')]
+    assert len(told) == 1
+    assert 'the drive has no such parameter' in told[0]
+    before = len(asked)
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: parameters.values['control.accel'] == 9)
+    assert len(asked) == before
+    message = rig.refused(parameters.change({'freque.f_fix1': 7}))
+    assert message == 'freque.f_fix1: the drive has no such parameter (exception 2)'
+
+
+@pytest.mark.parametrize('reason', [Reason.ADDRESS, Reason.VALUE, Reason.STATE])
+def test_drive_that_refuses_every_third_request(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, reason: Reason
+) -> None:
+    count = iter(range(10**9))
+
+    def refuse(key: str) -> None:
+        if rig.drive.parameters._unread and next(count) % 3 == 2:
+            raise Refused(reason, 'every third')
+
+    on_read(rig, monkeypatch, refuse)
+    parameters = connect(rig)
+    assert list(parameters.values.values()) == far(rig, *parameters.values)
+    assert parameters.progress == '119 read'
+    assert not rig.notes.told('cannot be read')
+
+
+def test_switch_that_is_neither_on_nor_off(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
+) -> None:
+    put_raw(rig, 'serial.auto_stop', 2)
+    parameters = connect(rig)
+    assert 'serial.auto_stop' not in parameters.values
+    assert rig.notes.told('serial.auto_stop: the drive has code 2', Severity.WARNING)
+    at_keypad(rig, 'serial.auto_stop', True)
+    wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
+    wait_until(lambda: rig.drive._inverter.auto_stop)
+    # nobody relies on a value that is gone
+    put_raw(rig, 'serial.auto_stop', 2)
+    wait_until(lambda: 'serial.auto_stop' not in parameters.values)
+    wait_until(lambda: not rig.drive._inverter.auto_stop)
+    told = [text for _, text in rig.notes.events if 'has code 2' in text]
+    assert len(told) == 2
+
+
+def test_switch_that_is_neither_can_be_set(rig: Rig) -> None:
+    put_raw(rig, 'control.energy_save', 2)
+    parameters = connect(rig)
+    (change,) = parameters.change({'control.energy_save': True}).result(PATIENCE)
+    assert str(change) == 'control.energy_save: 0002h -> true'
+    assert parameters.values['control.energy_save'] is True
+    assert far(rig, 'control.energy_save') == [True]
+
+
+def test_drive_that_disappears_while_it_is_read(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = make_rig(response_timeout=0.3, retries=1)
+    asked: list[str] = []
+
+    def vanish(key: str) -> None:
+        asked.append(key)
+        if len(asked) == 60:
+            rig.far.silence(SILENCE)
+
+    on_read(rig, monkeypatch, vanish)
+    parameters = rig.drive.parameters
+    assert 'did not answer' in rig.refused(rig.drive.connect(parameters=True))
+    assert parameters.values == {}
+    assert parameters.progress == 'not read'
+    with rig.simulator.lock:
+        rig.far.silence(0)
+    connect(rig)
+    assert parameters.progress == '119 read'
+    assert list(parameters.values.values()) == far(rig, *parameters.values)
+    assert not news(rig)
+    assert written(rig) == {}
+
+
+def test_reading_anew_does_not_end_the_watch(rig: Rig, busy_watch: None) -> None:
+    parameters = connect(rig)
+    for _ in range(3):
+        parameters.read().result(PATIENCE)
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: parameters.values.get('control.accel') == 9)
+
+
+# --- the watch ------------------------------------------------------------------------------------
+
+
+def test_change_at_the_keypad_shows_within_a_round_and_is_told_once(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
+) -> None:
+    parameters = connect(rig)
+    rounds: list[str] = []
+    on_read(rig, monkeypatch, rounds.append)
+    at_keypad(rig, 'freque.f_fix1', 12.5)
+    before = len(rounds)
+    wait_until(lambda: parameters.values['freque.f_fix1'] == 12.5)
+    # those of the poll count too, but that reads only the control mode
+    assert len([key for key in rounds[before:] if key != 'control.mode']) <= 119 + 2
+    after = len(rounds)
+    wait_until(lambda: len(rounds) >= after + 2 * 119)
+    assert news(rig) == ['changed at the drive: freque.f_fix1: 10 -> 12.5 Hz']
+    assert rig.notes.news.count('freque.f_fix1') == 2
+    assert written(rig) == {}
+
+
+def test_refresh_says_what_has_changed(rig: Rig) -> None:
+    parameters = connect(rig)
+    rig.drive.parameters._keys = tuple(parameters.values)
+    answer = parameters.refresh().result(PATIENCE)
+    assert answer == '119 parameters read, changed: none'
+    at_keypad(rig, 'control.accel', 9)
+    at_keypad(rig, 'control.st_mode', 'Release')
+    answer = parameters.refresh().result(PATIENCE)
+    assert answer == '119 parameters read, changed: control.accel, control.st_mode'
+    assert parameters.values['control.st_mode'] == 'Release'
+
+
+def test_refresh_of_a_drive_that_refuses_one(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters = connect(rig)
+
+    def refuse(key: str) -> None:
+        if key == 'control.accel':
+            raise Refused(Reason.STATE, 'not now')
+
+    on_read(rig, monkeypatch, refuse)
+    at_keypad(rig, 'control.accel', 9)
+    at_keypad(rig, 'control.retard', 9)
+    answer = parameters.refresh().result(PATIENCE)
+    assert answer == '119 parameters read, changed: control.retard'
+    assert not rig.notes.told('cannot be read')
+
+
+def test_watch_goes_on_when_the_drive_is_back(
+    make_rig: MakeRig, busy_watch: None, hasty: None
+) -> None:
+    rig = make_rig(response_timeout=0.3, retries=1)
+    parameters = connect(rig)
+    with rig.simulator.lock:
+        rig.far.silence(SILENCE)
+    wait_until(lambda: rig.notes.told('lost: ', Severity.ERROR))
+    with rig.simulator.lock:
+        rig.far.silence(0)
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: parameters.values['control.accel'] == 9)
+    assert len(news(rig)) == 1
+
+
+def test_listener_that_fails_does_not_end_the_watch(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    parameters = connect(rig)
+    watch_only(rig, monkeypatch, 'control.accel', 'control.retard')
+
+    def fail(keys: Any) -> None:
+        raise RuntimeError('a mistake of who listens')
+
+    monkeypatch.setattr(rig.notes, 'on_parameters', fail)
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: parameters.values['control.accel'] == 9)
+    at_keypad(rig, 'control.retard', 9)
+    wait_until(lambda: parameters.values['control.retard'] == 9)
+    assert 'a mistake of who listens' in caplog.text
+
+
+@pytest.mark.parametrize('auto', [True, False])
+def test_time_out_of_the_drive_reaches_the_keeping_alive(
+    rig: Rig, busy_watch: None, auto: bool
+) -> None:
+    parameters = connect(rig)
+    inverter = rig.drive._inverter
+    at_keypad(rig, 'serial.sio_tot', 5)
+    at_keypad(rig, 'serial.auto_stop', auto)
+    wait_until(lambda: inverter.sio_tot == 5 and inverter.auto_stop is auto)
+    rig.drive.set_drive_timeout(7).result(PATIENCE)
+    assert inverter.sio_tot == 7
+    assert inverter.auto_stop
+    assert parameters.values['serial.sio_tot'] == 7
+    assert far(rig, 'serial.sio_tot', 'serial.auto_stop') == [7, True]
+
+
+def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig) -> None:
+    rig = make_rig(allow_communication_changes=True)
+    connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
+    assert rig.drive._inverter.sio_tot == 3
+    assert rig.drive._inverter.auto_stop
+
+
+# --- the wanted state -----------------------------------------------------------------------------
+
+
+def drifts(rig: Rig) -> list[str]:
+    return [text for _, text in rig.notes.events if 'was asked for: it is left so' in text]
+
+
+def test_wanted_state_is_written_where_it_differs(rig: Rig) -> None:
+    parameters = connect(rig)
+    wanted = {'control.accel': 7, 'control.retard': 0.2, 'control.st_mode': 'Release'}
+    parameters.apply(wanted, write=True).result(PATIENCE)
+    assert written(rig) == {'control.accel': 1, 'control.st_mode': 1}
+    assert far(rig, *wanted) == [7, 0.2, 'Release']
+    assert parameters.drift == ()
+    text = 'control.accel: 0.2 -> 7 s, as the parameter file says'
+    assert rig.notes.told(text, Severity.INFO)
+    assert not rig.notes.told('control.retard')
+    parameters.apply(wanted, write=True).result(PATIENCE)
+    assert sum(written(rig).values()) == 2
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'monitor'])
+def test_wanted_state_is_only_reported(make_rig: MakeRig, method: str) -> None:
+    rig = make_rig(control_method=method)
+    parameters = connect(rig)
+    parameters.apply({'control.accel': 7}, write=False).result(PATIENCE)
+    assert [str(drift) for drift in parameters.drift] == ['control.accel: 7 -> 0.2 s']
+    assert drifts(rig) == [
+        'control.accel is 0.2 s in the drive, but 7 was asked for: it is left so'
+    ]
+    assert written(rig) == {}
+
+
+def test_monitor_writes_nothing(make_rig: MakeRig, busy_watch: None) -> None:
+    rig = make_rig(control_method='monitor', allow_communication_changes=True)
+    parameters = connect(rig)
+    for key, value in (('control.accel', 7), ('serial.sio_tot', 7)):
+        assert 'this driver only reads' in rig.refused(parameters.change({key: value}))
+    parameters.apply({'control.accel': 7}, write=True).result(PATIENCE)
+    assert rig.notes.told('not applied from the parameter file: control.accel', Severity.ERROR)
+    assert parameters.drift
+    # what it has already is no change
+    assert parameters.change({'control.accel': 0.2}).result(PATIENCE) == ()
+    parameters.refresh().result(PATIENCE)
+    at_keypad(rig, 'control.accel', 7)
+    wait_until(lambda: not parameters.drift)
+    assert functions(rig) <= ONLY_READ
+
+
+def test_drift_is_told_once_and_not_reverted(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters = connect(rig)
+    parameters.apply({'control.accel': 7}, write=True).result(PATIENCE)
+    watch_only(rig, monkeypatch, 'control.accel', 'control.retard')
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: drifts(rig))
+    assert drifts(rig) == ['control.accel is 9 s in the drive, but 7 was asked for: it is left so']
+    assert [str(drift) for drift in parameters.drift] == ['control.accel: 7 -> 9 s']
+    at_keypad(rig, 'control.retard', 9)
+    wait_until(lambda: parameters.values['control.retard'] == 9)
+    assert far(rig, 'control.accel') == [9]
+    assert len(drifts(rig)) == 1
+    assert len(news(rig)) == 1
+    # who sets it through the driver wants that from now on
+    parameters.change({'control.accel': 8}).result(PATIENCE)
+    assert parameters.drift == ()
+    at_keypad(rig, 'control.accel', 9)
+    wait_until(lambda: len(drifts(rig)) == 2)
+    at_keypad(rig, 'control.accel', 8)
+    wait_until(lambda: not parameters.drift)
+    assert written(rig) == {'control.accel': 2}
+
+
+def test_drift_to_what_means_nothing(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters = connect(rig)
+    parameters.apply({'control.energy_save': True}, write=True).result(PATIENCE)
+    watch_only(rig, monkeypatch, 'control.energy_save')
+    put_raw(rig, 'control.energy_save', 2)
+    wait_until(lambda: parameters.drift)
+    assert [str(drift) for drift in parameters.drift] == ['control.energy_save: true -> 0002h']
+
+
+def test_wanted_switch_that_is_neither_is_written(rig: Rig) -> None:
+    put_raw(rig, 'control.energy_save', 2)
+    connect(rig).apply({'control.energy_save': False}, write=True).result(PATIENCE)
+    assert far(rig, 'control.energy_save') == [False]
+
+
+def test_wanted_state_with_what_this_drive_lacks(make_rig: MakeRig) -> None:
+    rig = make_rig(parameters={'fieldbus.sw_ver': 4.31})
+    parameters = connect(rig)
+    wanted = {'error.short_c_err_cnt': 1, 'control.any_bus': 1, 'control.accel': 7}
+    parameters.apply(wanted, write=True).result(PATIENCE)
+    text = 'this drive has no error.short_c_err_cnt, control.any_bus: not applied'
+    assert rig.notes.told(text, Severity.WARNING)
+    assert written(rig) == {'control.accel': 1}
+
+
+def test_wanted_state_that_no_drive_can_have_changes_nothing(rig: Rig) -> None:
+    parameters = connect(rig)
+    message = rig.refused(parameters.apply({'control.accel': 7, 'control.retard': -1}, write=True))
+    assert message.startswith('control.retard: -1 is out of range')
+    assert written(rig) == {}
+
+
+def test_wanted_state_that_the_drive_refuses_in_part(rig: Rig) -> None:
+    rig.far.set_run_input(True)
+    parameters = connect(rig)
+    rig.enable()
+    rig.publish(20.0)
+    rig.wait_for_frequency(20.0)
+    wanted = {'motor.i_magn': 2.0, 'control.retard': 7}
+    parameters.apply(wanted, write=True).result(PATIENCE)
+    assert written(rig) == {'control.retard': 1}
+    assert [drift.key for drift in parameters.drift] == ['motor.i_magn']
+    text = 'not applied from the parameter file: motor.i_magn: only while the motor is stopped'
+    assert sum(text in told for _, told in rig.notes.events) == 1
