@@ -31,6 +31,7 @@ from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.line import RELIABLE
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.outbox import Outbox
@@ -66,6 +67,7 @@ class BusNode(Node):
         self._port: str = values['port']
         link = open_link(values['protocol'], self._port, settings)
         self.line = Line(Bus(link), Outbox(), values['retries'])
+        self._all_drives = AllDrives(self, self.line)
         self._told_port: str | None = ''
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import ctypes
 import logging
 import signal
 import sys
@@ -49,9 +50,13 @@ from nfo_sinus_driver.node.overrides import unknown_parameters
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
 _GROUPS_OF_A_DRIVE = 10
-_GROUPS_OF_THE_BUS = 3
+_GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
+#: glibc gives threads up to eight arenas a core, and each keeps the most that it ever had: with so
+#: many threads, memory would grow by steps for hours.
+_M_ARENA_MAX = -8
+_ARENAS = 2
 _POLL_SIGNALS = 0.5
 #: What the last request of an exit may take beyond ``shutdown_timeout``, s.
 _LAST_ANSWER = 0.5
@@ -102,7 +107,7 @@ class DriverProcess:
         for name in names:
             try:
                 line.drives.append(DriveNode(name, line))
-            except (ParameterException, ValueError) as error:
+            except (ParameterException, ValueError, DriveError) as error:
                 raise ValueError(f'{name}: {error}') from error
         self._drives = line.drives
         self._warn_of_unknown_names(arguments)
@@ -245,6 +250,7 @@ def _check_name(name: str) -> None:
 def main(args: list[str] | None = None) -> int:
     """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
+    _limit_arenas()
     # blocked before any thread exists, so that only the main thread ever sees them
     signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING | _SUSPENDING)
     output = Output()
@@ -252,6 +258,14 @@ def main(args: list[str] | None = None) -> int:
         return _run(*take_out_node_name(sys.argv if args is None else args))
     finally:
         output.close()
+
+
+def _limit_arenas() -> None:
+    try:
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)
+    except (OSError, AttributeError):
+        # another C library has other habits
+        return
 
 
 def _run(arguments: list[str], single_name: str | None) -> int:

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-A whole NFO Sinus G2 made of software: parameters, commands, state machine, motor, faults.
+A whole NFO Sinus made of software: parameters, commands, state machine, motor, faults.
 
 It knows parameters by catalog key and raw numbers, and time only as it is told of it; which
 protocol asks is not its business. Where the manuals leave the drive's behaviour open, it does
 what makes a careless driver fail: a run command stands through a lost RUN input and through a
-fault, a set-point through a power cycle, and MODE = Ext starts the motor.
+fault, a set-point through a power cycle, and MODE = Ext or Auto starts the motor.
 """
 
 from __future__ import annotations
@@ -28,21 +28,17 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.simulator import identification
-from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
-from nfo_sinus_driver.simulator.control_source import TUNING_COMMANDS
 from nfo_sinus_driver.simulator.control_source import Source
 from nfo_sinus_driver.simulator.faults import SERIAL
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.identification import KNOWN
+from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
@@ -50,12 +46,18 @@ from nfo_sinus_driver.simulator.memory import RegisterMap
 from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.runner import SETPOINTS
 from nfo_sinus_driver.simulator.runner import Runner
 from nfo_sinus_driver.simulator.runner import nameplate
+from nfo_sinus_driver.simulator.runner_g2 import G2Runner
+from nfo_sinus_driver.simulator.runner_optimal import OptimalRunner
 from nfo_sinus_driver.simulator.serial_side import SerialSide
-from nfo_sinus_driver.simulator.state_machine import Phase
 
+#: What a factory reset leaves as it is: without them the drive would not hear the line any more.
+LINE_SETTINGS = frozenset(
+    {'serial.bus_type', 'serial.address', 'serial.si_baud', 'serial.si_prot'}
+)
+#: Who runs the motor, by drive family: what one does its own way.
+_RUNNERS: Mapping[str, type[Runner]] = {'sinus_g2': G2Runner, 'sinus_optimal': OptimalRunner}
 #: The longest step of model time (s) while something moves, and while nothing does.
 _STEP = 0.005
 _IDLE_STEP = 0.1
@@ -77,7 +79,6 @@ class SimulatedDrive:
 
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
     :ivar time: model time since the start (s).
-    :ivar refuses_writes_when_faulted: while a fault stands every write is refused [M0 §6.1.5].
     :ivar identification: the objects of Read Device Identification, by number [M0 §6.2.4].
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
     :ivar command_writes: how often it wrote each set-point or command, by key.
@@ -97,24 +98,25 @@ class SimulatedDrive:
         newer_functions: str = KNOWN,
     ) -> None:
         self.model = load_model(model)
+        machine = machine_of(self.model)
+        self._setpoints = frozenset(_RUNNERS[model].setpoint_of.values())
         self.settings = frozenset(
             key
-            for key, parameter in self.model.items()
+            for key, parameter in machine.items()
             if parameter.access is Access.READ_WRITE
             and not key.startswith('fieldbus.')
-            and key not in SETPOINTS
+            and key not in self._setpoints
         )
-        self.memory = Memory(self.model, {**(settings or {}), 'serial.address': address})
+        self.memory = Memory(machine, {**(settings or {}), 'serial.address': address})
         self.faults = Faults(self.model)
         self.motor = Motor(nameplate(self.memory))
-        self.runner = Runner(self.memory, self.motor)
-        self.runner.run_input = run_input
         self.counters = Counters()
+        self.runner = _RUNNERS[model](self.memory, self.motor, self.faults, self.counters)
+        self.runner.run_input = run_input
         self.serial_number = identification.serial_number(serial_number, address)
         self.identification = identification.device_objects(self.memory)
         self.newer_functions = newer_functions
         self.boot_time = boot_time
-        self.refuses_writes_when_faulted = True
         self.writes: Counter[str] = Counter()
         self.command_writes: Counter[str] = Counter()
         self.ack_reads = 0
@@ -189,7 +191,7 @@ class SimulatedDrive:
 
         :raises Refused: ADDRESS; it can only be written.
         """
-        if self.model[key].access is Access.WRITE:
+        if self.memory.model[key].access is Access.WRITE:
             raise Refused(Reason.ADDRESS, f'{key} cannot be read')
         if key == 'fieldbus.inv_st_with_ack':
             self.ack_reads += 1
@@ -207,24 +209,18 @@ class SimulatedDrive:
         """
         if key == 'fieldbus.setpoint':
             key = self.runner.setpoint_key
-        parameter = self.model[key]
+        parameter = self.memory.model[key]
         if parameter.access not in (Access.WRITE, Access.READ_WRITE):
             raise Refused(Reason.ADDRESS, f'{key} cannot be written')
         Memory.check(parameter, raw)
-        if key == 'fieldbus.mode':
-            self._write_mode(raw)
-        elif key == 'fieldbus.scmd':
-            self._write_scmd(raw)
-        elif key == 'fieldbus.drive_control':
-            self._write_control(Control(raw))
-        elif key == 'fieldbus.drv_ctrl_write_mask':
-            keep, add = Control(raw & 0xFFFF), Control(raw >> 16)
-            self._write_control(self.runner.word & keep | add)
-        else:
-            self._refuse_when_faulted()
+        if not self.runner.write(key, raw):
+            self.runner.refuse_when_faulted()
             if parameter.stopped and (self.motor.driven or self.motor.turning):
                 raise Refused(Reason.STATE, f'{key} changes only while the motor stands')
             self._store(key, raw)
+        elif key == 'fieldbus.mode':
+            self.mode_ext_writes += raw == Mode.EXT
+            self.heard()
         counter = self.writes if key in self.settings else self.command_writes
         counter[key] += 1
         self._settle()
@@ -273,10 +269,16 @@ class SimulatedDrive:
 
         :raises ValueError: an unknown key or a value that the drive would refuse.
         """
-        if key not in self.settings and key not in SETPOINTS:
+        if key not in self.settings and key not in self._setpoints:
             raise ValueError(f'{key} cannot be changed at the keypad')
         self.memory.set(key, value)
         self._store(key, self.memory.raw(key))
+        self._settle()
+
+    def factory_reset(self) -> None:
+        """Give the parameters their factory values, but those of the line, so that it answers."""
+        for key in self.settings - LINE_SETTINGS:
+            self._store(key, self.memory.factory_raw(key))
         self._settle()
 
     def power_cycle(self, boot_time: float | None = None) -> None:
@@ -304,39 +306,22 @@ class SimulatedDrive:
         """The inverter status, without acknowledging anything [M0 table 19]."""
         return self.faults.shown or self.runner.inv_st
 
-    @property
-    def status_word(self) -> Status:
-        """DriveStatus [M0 table 15]."""
-        return self.runner.status_word
-
-    @property
-    def phase(self) -> Phase:
-        """The state of the generic state machine."""
-        return self.runner.machine.phase
-
     # ---- inside ----
 
     def _peek(self, key: str) -> int:
         """Read a parameter without side effects."""
         if key == 'fieldbus.setpoint':
             key = self.runner.setpoint_key
-        parameter = self.model[key]
-        measured = measure(parameter, self.motor, self.counters)
-        if measured is not None:
-            return measured
-        if key == 'fieldbus.mode':
-            return int(self.runner.source.mode)
         if key in ('fieldbus.inv_st', 'fieldbus.inv_st_with_ack'):
             return self.inv_st
-        if key == 'fieldbus.drive_control':
-            return int(self.runner.word)
-        if key in ('fieldbus.drive_status', 'fieldbus.profidrive_status'):
-            return int(self.status_word)
-        return self.memory.raw(key)
+        shown = measure(self.memory.model[key], self.motor, self.counters)
+        if shown is None:
+            shown = self.runner.show(key)
+        return self.memory.raw(key) if shown is None else shown
 
     def peek(self, key: str) -> Value:
         """Return a parameter in engineering units, without side effects."""
-        return Memory.show(self.model[key], self._peek(key))
+        return Memory.show(self.memory.model[key], self._peek(key))
 
     def _store(self, key: str, raw: int) -> None:
         self.memory.put(key, raw)
@@ -344,44 +329,6 @@ class SimulatedDrive:
             self.motor.plate = nameplate(self.memory)
         if key.startswith('serial.'):
             self.serial.changed()
-
-    def _refuse_when_faulted(self) -> None:
-        if self.faults and self.refuses_writes_when_faulted:
-            raise Refused(Reason.STATE, f'fault {self.faults.shown} stands')
-
-    def _write_mode(self, raw: int) -> None:
-        if raw not in (Mode.STOP, Mode.EXT, Mode.BUS):
-            raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
-        if raw == Mode.STOP and self.faults.serial:
-            self.faults.acknowledge_serial()
-        else:
-            self._refuse_when_faulted()
-        if raw == Mode.EXT:
-            self.mode_ext_writes += 1
-        sources = {Mode.STOP: Source.STOP, Mode.EXT: Source.EXT, Mode.BUS: Source.SCMD}
-        self.runner.take(sources[Mode(raw)])
-        self.heard()
-
-    def _write_scmd(self, raw: int) -> None:
-        if raw not in set(Scmd):
-            raise Refused(Reason.VALUE, f'SCMD has no code {raw:#x}')
-        self._refuse_when_faulted()
-        if not self._bus_controls:
-            raise Refused(Reason.STATE, 'SCMD needs MODE = Bus')
-        if raw in TUNING_COMMANDS:
-            raise Refused(Reason.STATE, 'tuning is not simulated')
-        if raw == Scmd.ERASE_E_LOG:
-            self.faults.log.clear()
-        elif raw == Scmd.RESET_E_OUT:
-            self.counters.e_out = 0.0
-        elif raw in RUN_COMMANDS or raw == Scmd.STOP:
-            self.runner.command(Scmd(raw))
-
-    def _write_control(self, word: Control) -> None:
-        # acknowledging goes this way, so a fault does not refuse it [M0 table 16, FAULTED]
-        if self.runner.machine.asks_reset(word):
-            self.faults.acknowledge()
-        self.runner.control(word)
 
     def _booted(self) -> None:
         self._boot_left = 0.0
@@ -402,7 +349,7 @@ class SimulatedDrive:
 
     @property
     def _bus_controls(self) -> bool:
-        return self.runner.source.mode is Mode.BUS
+        return self.runner.mode == Mode.BUS
 
     def _pass(self, dt: float) -> None:
         self.time += dt
@@ -422,4 +369,4 @@ class SimulatedDrive:
         self._settle()
 
     def _settle(self) -> None:
-        self.runner.settle(fault=bool(self.faults))
+        self.runner.settle()

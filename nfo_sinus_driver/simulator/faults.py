@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The faults of a simulated drive: what stands, what may be acknowledged, and the error log."""
+"""The faults and alarms of a simulated drive, their acknowledgement, and the error log."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
@@ -40,28 +41,40 @@ class LogEntry:
 
 class Faults:
     """
-    The faults that stand and those that were.
+    The faults that stand and those that were; true if one stands.
+
+    A drive whose status word has a bit for alarms can have alarms too, which stop nothing.
 
     :ivar log: the error log, newest first.
     """
 
     def __init__(self, model: Model) -> None:
         self._model = model
+        self._kinds = {Kind.FAULT}
+        if Fact.ALARM in model.dialect.by_bit.values():
+            self._kinds.add(Kind.ALARM)
+        #: Faults that an acknowledgement of their own ends [C42].
+        self._kept = {SIO_FAIL} if 'fieldbus.sio_err' in model else set()
         self._present: dict[int, bool] = {}
         self.log: list[LogEntry] = []
 
     def __bool__(self) -> bool:
-        return bool(self._present)
+        return bool(self.codes)
 
     @property
     def codes(self) -> list[int]:
         """The faults that stand, the first one first."""
-        return list(self._present)
+        return self._of(Kind.FAULT)
+
+    @property
+    def alarms(self) -> list[int]:
+        """The alarms that stand, the first one first."""
+        return self._of(Kind.ALARM)
 
     @property
     def shown(self) -> int:
-        """The fault that InvSt shows: the first one; 0 when none stands."""
-        return next(iter(self._present), 0)
+        """What InvSt shows of them: the first fault, else the first alarm; 0 when none stands."""
+        return next(iter(self.codes + self.alarms), 0)
 
     @property
     def serial(self) -> bool:
@@ -74,8 +87,8 @@ class Faults:
 
         :raises ValueError: the model has no such fault.
         """
-        if self._model.inv_st(code).kind is not Kind.FAULT:
-            raise ValueError(f'{code} is no fault of {self._model.name}: see InvSt [M0 table 19]')
+        if self._model.inv_st(code).kind not in self._kinds:
+            raise ValueError(f'{code} is no fault of {self._model.name}: see its InvSt')
         if code not in self._present:
             self.log.insert(0, LogEntry(code, op_time))
             del self.log[_LOG_SIZE:]
@@ -89,11 +102,11 @@ class Faults:
         """
         Acknowledge, as reading 02A4h does.
 
-        A fault whose cause is still there stands on, and so does Sio Fail, which has an
+        A fault whose cause is still there stands on, and so does Sio Fail where it has an
         acknowledgement of its own [C42].
         """
         self._present = {
-            code: cause for code, cause in self._present.items() if cause or code == SIO_FAIL
+            code: cause for code, cause in self._present.items() if cause or code in self._kept
         }
 
     def acknowledge_serial(self) -> None:
@@ -103,3 +116,6 @@ class Faults:
     def restart(self) -> None:
         """Forget the faults whose cause is gone, as a power cycle does; the log stays."""
         self._present = {code: True for code, cause in self._present.items() if cause}
+
+    def _of(self, kind: Kind) -> list[int]:
+        return [code for code in self._present if self._model.inv_st(code).kind is kind]

@@ -158,7 +158,7 @@ def _keypad(target: Target, given: dict[str, Any]) -> None:
 
 def _set(target: Target, given: dict[str, Any]) -> None:
     drive = target.one
-    value = parse_setting(drive.model, given['key'], given['value'])
+    value = parse_setting(drive.memory.model, given['key'], given['value'])
     drive.set_from_keypad(given['key'], value)
 
 
@@ -187,7 +187,7 @@ VERBS: Mapping[str, Verb] = {
         'let a fault happen: the motor coasts until it is acknowledged',
         lambda target, given: target.one.trip(given['code'], cause_present=given['standing']),
         (
-            Argument('code', int, 'InvSt code of the fault, 1 to 23'),
+            Argument('code', int, 'InvSt code of the fault, such as 5'),
             Argument('standing', bool, 'its cause lasts until ack-cause-gone', False),
         ),
     ),
@@ -212,6 +212,10 @@ VERBS: Mapping[str, Verb] = {
             Argument('key', str, 'its name, such as control.accel'),
             Argument('value', _as_is, 'in its own unit, such as 7'),
         ),
+    ),
+    'factory-reset': Verb(
+        'give the parameters their factory values, but those of the line',
+        lambda target, _: target.one.factory_reset(),
     ),
     'load': Verb(
         'change the load of the motor',

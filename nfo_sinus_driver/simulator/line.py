@@ -46,8 +46,9 @@ _TRY_AGAIN = 0.1
 
 @dataclass
 class _Answer:
-    """An answer on its way: what is left of it, and when it began."""
+    """An answer on its way: whose, what is left of it, and when it began."""
 
+    address: int
     reply: Reply
     sent: int = 0
     began: float = 0.0
@@ -171,15 +172,18 @@ class Line:
     def _send(self, address: int, pdu: bytes, asked: float) -> None:
         start = asked + self._pause
         for reply in self.faults.alter(address, self.protocol.wrap(address, pdu)):
-            answer = _Answer(reply)
+            answer = _Answer(address, reply)
             length = len(reply.data)
-            begin = start + reply.delay
+            begin = max(start + reply.delay, self._free(address))
             end = begin + length * self._character
             if self._character:
                 self._schedule(begin + self._character, answer, 1)
             self._schedule(end, answer, length)
-            # a second answer comes as a frame of its own
-            start = end - reply.delay + self.timing.t35
+
+    def _free(self, address: int) -> float:
+        """Return when a drive that has answers on their way may begin the next, a new frame."""
+        ends = (one.at for one in self._deliveries if one.answer.address == address)
+        return max(ends, default=float('-inf')) + self.timing.t35
 
     def _schedule(self, at: float, answer: _Answer, until: int) -> None:
         heapq.heappush(self._deliveries, _Delivery(at, next(self._order), answer, until))

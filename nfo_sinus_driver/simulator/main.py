@@ -31,6 +31,7 @@ from nfo_sinus_driver.simulator.identification import KNOWN
 from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.inject import inject
 from nfo_sinus_driver.simulator.injections import parse_setting
+from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import PROTOCOLS
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -142,13 +143,14 @@ def _simulator(options: argparse.Namespace) -> Simulator:
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     settings: dict[str, Value] = {}
+    machine = machine_of(load_model(model))
     for text in given:
         key, equals, value = text.partition('=')
         if not equals:
             raise ValueError(f'argument --set: {text!r} is not NAME=VALUE')
         if key == 'serial.address':
             raise ValueError('argument --set: give the address with --address')
-        settings[key] = parse_setting(load_model(model), key, value)
+        settings[key] = parse_setting(machine, key, value)
     return settings
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a simulated drive measures and counts: the parameters of group Status [M0 table 4]."""
+"""What a simulated drive measures and counts: the group Status ([M0 table 4], [M1])."""
 
 from __future__ import annotations
 
@@ -62,6 +62,10 @@ def _process(motor: Motor) -> float:
     return 100 * abs(motor.frequency) / motor.plate.frequency
 
 
+def _rpm(motor: Motor) -> float:
+    return 60 * motor.demand / motor.plate.pole_pairs
+
+
 #: In engineering units, by key.
 _MEASURED: Mapping[str, Callable[[Motor, Counters], float]] = {
     'status.u_rms': lambda motor, _: motor.voltage,
@@ -75,6 +79,9 @@ _MEASURED: Mapping[str, Callable[[Motor, Counters], float]] = {
     'status.reg_act': lambda motor, _: _process(motor),
     'status.pt1000': lambda motor, _: 25 + 0.6 * motor.temperature,
     'status.m_temp': lambda motor, _: motor.temperature,
+    # of the Optimal: what it follows, and nothing while the motor is off
+    'status.control_freq': lambda motor, _: motor.demand if motor.driven else 0.0,
+    'status.control_speed': lambda motor, _: _rpm(motor) if motor.driven else 0.0,
     'status.op_time': lambda _, counters: counters.op_time,
     'status.rn_time': lambda _, counters: counters.rn_time,
     'status.br_time': lambda _, counters: counters.br_time,

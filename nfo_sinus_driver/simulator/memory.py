@@ -62,6 +62,7 @@ FACTORY: Mapping[str, Value] = {
     'serial.sio_tot': 0,
     'serial.auto_reset': False,
     'serial.auto_stop': False,
+    'pi_reg.reg_amp': 1,
     'freque.op_mode': 'Terminal',
     'freque.f_fix1': 10,
     'freque.f_fix2': 15,
@@ -87,7 +88,7 @@ class Memory:
     """
     The parameters of one drive, as raw numbers.
 
-    :param model: the drive family.
+    :param model: the drive family, with all that a machine of it keeps.
     :param settings: values other than the factory's, in engineering units, by key.
     :raises ValueError: an unknown key, or a value that the drive would refuse.
     """
@@ -101,6 +102,7 @@ class Memory:
         for key, value in FACTORY.items():
             if key in model:
                 self.set(key, value)
+        self._factory = dict(self._raw)
         for key, value in settings.items():
             self.set(key, value)
 
@@ -111,6 +113,10 @@ class Memory:
     def put(self, key: str, raw: int) -> None:
         """Store a raw number, unchecked."""
         self._raw[key] = raw
+
+    def factory_raw(self, key: str) -> int:
+        """Return the raw number that a parameter leaves the factory with."""
+        return self._factory[key]
 
     def get(self, key: str) -> Value:
         """Return a parameter in engineering units."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Modbus as a simulated drive speaks it, over RTU frames [M0 §6.2.3, §6.2.4]."""
+"""Modbus as a simulated drive speaks it, over RTU frames ([M0 §6.2.3, §6.2.4], [M1])."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ BROADCAST = 0
 BUS_TYPE_RTU = 3
 
 _READ = 3
+_READ_INPUT = 4
 _WRITE_SINGLE = 6
 _WRITE_MULTIPLE = 16
 _REPORT_SLAVE_ID = 17
@@ -64,12 +65,10 @@ def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
     try:
         if treated == REFUSED:
             raise Refused(Reason.FUNCTION, f'function {function} came with a newer firmware')
+        if function not in _FUNCTIONS[drive.model.name]:
+            raise Refused(Reason.FUNCTION, f'function {function} is not supported')
         try:
-            handler = _HANDLERS[function]
-        except KeyError:
-            raise Refused(Reason.FUNCTION, f'function {function} is not supported') from None
-        try:
-            return handler(drive, pdu[1:])
+            return _HANDLERS[function](drive, pdu[1:])
         except ValueError as error:
             raise Refused(Reason.VALUE, str(error)) from error
     except Refused as refused:
@@ -77,10 +76,19 @@ def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
 
 
 def _read(drive: SimulatedDrive, data: bytes) -> bytes:
+    return pymodbus_compat.encode_read(_words(drive, data))
+
+
+def _read_input(drive: SimulatedDrive, data: bytes) -> bytes:
+    # the same registers by another function [M1]
+    return pymodbus_compat.encode_read_input(_words(drive, data))
+
+
+def _words(drive: SimulatedDrive, data: bytes) -> tuple[int, ...]:
     register, count = pymodbus_compat.decode_read(data)
     if not 1 <= count <= _MOST_READ or len(data) != 4:
         raise Refused(Reason.VALUE, f'a request for {count} registers is malformed')
-    return pymodbus_compat.encode_read(drive.read(register, count))
+    return drive.read(register, count)
 
 
 def _write_single(drive: SimulatedDrive, data: bytes) -> bytes:
@@ -141,14 +149,21 @@ def _identify(drive: SimulatedDrive, data: bytes) -> bytes:
 
 _HANDLERS: Mapping[int, Callable[[SimulatedDrive, bytes], bytes]] = {
     _READ: _read,
+    _READ_INPUT: _read_input,
     _WRITE_SINGLE: _write_single,
     _WRITE_MULTIPLE: _write_multiple,
     _REPORT_SLAVE_ID: _report_slave_id,
     _WRITE_AND_READ: _write_and_read,
     _ENCAPSULATED: _identify,
 }
-#: What only the newest family has [C57], so that an older firmware may lack it.
+#: What only the newer firmware of a G2 has.
 _NEWER = frozenset((_REPORT_SLAVE_ID, _WRITE_AND_READ, _ENCAPSULATED))
+#: The functions of each family [C57].
+_BASIC_FUNCTIONS = frozenset((_READ, _WRITE_SINGLE, _WRITE_MULTIPLE))
+_FUNCTIONS: Mapping[str, frozenset[int]] = {
+    'sinus_g2': _BASIC_FUNCTIONS | _NEWER,
+    'sinus_optimal': _BASIC_FUNCTIONS | {_READ_INPUT},
+}
 
 
 class ModbusRtu:

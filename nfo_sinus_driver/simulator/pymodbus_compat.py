@@ -62,6 +62,7 @@ _WRITE = (
 )
 _ReadRequest = _first_of(_READ, 'ReadHoldingRegistersRequest')
 _ReadResponse = _first_of(_READ, 'ReadHoldingRegistersResponse')
+_ReadInputResponse = _first_of(_READ, 'ReadInputRegistersResponse')
 _WriteSingleRequest = _first_of(_WRITE, 'WriteSingleRegisterRequest')
 _WriteSingleResponse = _first_of(_WRITE, 'WriteSingleRegisterResponse')
 _WriteMultipleRequest = _first_of(_WRITE, 'WriteMultipleRegistersRequest')
@@ -88,7 +89,7 @@ def crc(data: bytes) -> bytes:
 
 def decode_read(data: bytes) -> tuple[int, int]:
     """
-    Decode what follows function 03: register and count.
+    Decode what follows function 03 or 04: register and count.
 
     :raises ValueError: malformed, or a count that the standard forbids.
     """
@@ -142,6 +143,11 @@ def decode_device(data: bytes) -> tuple[int, int]:
 def encode_read(words: Sequence[int]) -> bytes:
     """Return the answer PDU of function 03."""
     return _encoded(_ReadResponse(), registers=list(words))
+
+
+def encode_read_input(words: Sequence[int]) -> bytes:
+    """Return the answer PDU of function 04."""
+    return _encoded(_ReadInputResponse(), registers=list(words))
 
 
 def encode_write_single(register: int, word: int) -> bytes:

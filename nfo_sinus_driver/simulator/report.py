@@ -32,17 +32,18 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'serial_number': drive.serial_number,
         'time': drive.time,
         'silent': not drive.listening,
-        'mode': int(runner.source.mode),
+        'mode': int(runner.mode),
         'source': runner.source.value,
         'scmd': int(runner.scmd),
         'run_input': runner.run_input,
         'inv_st': code,
         'inv_st_text': drive.model.inv_st_text(code),
-        'fault': drive.faults.shown,
+        'fault': next(iter(drive.faults.codes), 0),
         'faults': drive.faults.codes,
-        'state': drive.phase.value,
-        'control_word': int(runner.word),
-        'status_word': int(drive.status_word),
+        'alarms': drive.faults.alarms,
+        'state': runner.state,
+        'control_word': int(runner.control_word),
+        'status_word': int(runner.status_word),
         'frequency': motor.frequency,
         'speed': motor.speed,
         'rotor_speed': motor.rotor_speed,
@@ -61,7 +62,7 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'error_log': [[entry.code, entry.op_time] for entry in drive.faults.log],
         'parameters': {
             key: drive.peek(key)
-            for key, parameter in drive.model.items()
+            for key, parameter in drive.memory.model.items()
             if parameter.access in (Access.READ, Access.READ_WRITE)
         },
     }

@@ -37,6 +37,7 @@ from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.injections import VERBS
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.modbus import ModbusRtu
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PortError
@@ -114,10 +115,10 @@ class Simulator:
         data_bits = PROTOCOLS[protocol].data_bits
         if not char_format.startswith(str(data_bits)):
             raise ValueError(f'{protocol} has {data_bits} data bits, {char_format} has not')
-        labels = load_model(model)
+        machine = machine_of(load_model(model))
         serial = {
-            'serial.si_baud': labels['serial.si_baud'].labels[BAUD_CODES[baud]],
-            'serial.si_prot': labels['serial.si_prot'].labels[FORMAT_CODES[char_format]],
+            'serial.si_baud': machine['serial.si_baud'].labels[BAUD_CODES[baud]],
+            'serial.si_prot': machine['serial.si_prot'].labels[FORMAT_CODES[char_format]],
             **(settings or {}),
         }
         if newer_functions not in NEWER_FUNCTIONS:

@@ -1,0 +1,46 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A stop for every drive on a Classic line at once [M0 §6.1.5]."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.link import Address
+
+#: The address that every drive listens to and none answers [M0 §6.1.2].
+_EVERYBODY = 95
+
+
+def can_broadcast(bus: Bus) -> bool:
+    """Tell whether the protocol of a line has a broadcast that stops."""
+    return Protocol(bus.space) is Protocol.CLASSIC
+
+
+async def broadcast_stop(bus: Bus) -> None:
+    """
+    Write MODE = Stop to all drives of a Classic line; nobody confirms it.
+
+    It works even on drives with a serial fault ([M0 §6.1.5], [C9]).
+
+    :raises LinkError: the port is lost.
+    """
+    place = load_model('sinus_g2')['fieldbus.mode'].place(Protocol.CLASSIC)
+    await bus.write(
+        _EVERYBODY, Address(place.addresses, place.words), (Mode.STOP,), Priority.STOP
+    )

@@ -1,0 +1,130 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands for all drives of a bus at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import time
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive.broadcast import broadcast_stop
+from nfo_sinus_driver.drive.broadcast import can_broadcast
+from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.line import Line
+
+#: How long all of them together may take, s. A start delay of a drive may last an hour.
+_LONGEST_ENABLE = 3700.0
+_LONGEST_STOP = 15.0
+
+_Command = Callable[[DriveNode], Future[str]]
+
+
+class AllDrives:
+    """
+    Offers ``~/stop_all``, ``~/enable_all`` and ``~/disable_all`` on the bus node.
+
+    Drives that are only monitored are left alone. The answer has a part for each of the others,
+    those that failed in front.
+    """
+
+    def __init__(self, node: Node, line: Line) -> None:
+        self._node = node
+        self._line = line
+        for name, callback in (
+            ('~/stop_all', self._stop),
+            ('~/disable_all', self._stop),
+            ('~/enable_all', self._enable),
+        ):
+            group = MutuallyExclusiveCallbackGroup()
+            node.create_service(Trigger, name, self._safe(callback), callback_group=group)
+
+    def _safe(
+        self, callback: Callable[[], tuple[list[str], list[str]]]
+    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                failed, done = callback()
+            except Exception as error:
+                # an exception that leaves a service callback would end the executor
+                self._node.get_logger().error(f'error in a service: {error!r}')
+                failed, done = [f'error in the driver: {error}'], []
+            response.success = not failed
+            response.message = '; '.join((*failed, *done)) or 'no drive is controlled here'
+            return response
+
+        return answer
+
+    def _stop(self) -> tuple[list[str], list[str]]:
+        """Stop each drive by its address; call to those that cannot be reached, where allowed."""
+        failed, done = self._command(_stop_one, _LONGEST_STOP)
+        if failed and can_broadcast(self._line.bus):
+            if any(node.settings.control_method == 'monitor' for node in self._line.drives):
+                failed.append('no stop was broadcast, for a drive here is only monitored')
+            else:
+                failed.append(self._broadcast())
+        return failed, done
+
+    def _broadcast(self) -> str:
+        try:
+            self._line.bus.run(broadcast_stop(self._line.bus)).result(_LONGEST_STOP)
+        except Exception as error:
+            return f'a stop for all could not be broadcast: {error}'
+        return 'a stop for all was broadcast, which nobody confirms'
+
+    def _enable(self) -> tuple[list[str], list[str]]:
+        return self._command(_enable_one, _LONGEST_ENABLE)
+
+    def _command(self, command: _Command, timeout: float) -> tuple[list[str], list[str]]:
+        """Give a command to every controlled drive; return what failed, and what was done."""
+        failed: list[str] = []
+        done: list[str] = []
+        futures: list[tuple[str, Future[str]]] = []
+        for node in self._line.drives:
+            if node.settings.control_method == 'monitor':
+                continue
+            try:
+                futures.append((node.get_name(), command(node)))
+            except DriveError as error:
+                failed.append(f'{node.get_name()}: {error}')
+        deadline = time.monotonic() + timeout
+        for name, future in futures:
+            try:
+                answer = future.result(max(0.0, deadline - time.monotonic()))
+            except DriveError as error:
+                failed.append(f'{name}: {error}')
+            except FutureTimeoutError:
+                failed.append(f'{name}: the bus did not get to it in time')
+            else:
+                done.append(f'{name}: {answer}')
+        return failed, done
+
+
+def _stop_one(node: DriveNode) -> Future[str]:
+    if node.drive.identity is None:
+        raise DriveError('it has never answered')
+    return node.drive.stop()
+
+
+def _enable_one(node: DriveNode) -> Future[str]:
+    if node.state != 'active':
+        raise DriveError(node.why_not_active())
+    return node.drive.enable()

@@ -1,0 +1,255 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+How a Sinus Optimal is commanded and what it shows of it [M1].
+
+Its manual has no state machine, only bits and codes; what it leaves open is as a careless driver
+does not expect it:
+
+* MODE = Manual is no stop: a running motor goes on, now as the keypad's.
+* Both control methods at once, which [M1] forbids: what one has started the other does not stop.
+* A run command is taken while a fault stands, and holds when it is acknowledged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from nfo_sinus_driver.catalog.words_optimal import Control
+from nfo_sinus_driver.catalog.words_optimal import Mode
+from nfo_sinus_driver.catalog.words_optimal import Smode
+from nfo_sinus_driver.catalog.words_optimal import Status
+from nfo_sinus_driver.catalog.words_optimal import state_of
+from nfo_sinus_driver.simulator.control_source import TERMINAL_SHARE
+from nfo_sinus_driver.simulator.control_source import Source
+from nfo_sinus_driver.simulator.control_steps import ControlSteps
+from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.measured import Counters
+from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.motor import Motor
+from nfo_sinus_driver.simulator.motor import Regulation
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.runner import Runner
+
+#: Codes of the setting control.mode.
+_FREQUENCY, _SPEED = 0, 3
+#: The largest reference that the manual speaks of: Hz, and nominal speeds [M1, Profinet].
+_MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
+
+
+class OptimalRunner(Runner):
+    """Runs the motor of an Optimal."""
+
+    setpoint_of: ClassVar[Mapping[int, str]] = {
+        _FREQUENCY: 'fieldbus.input_freq_setpoint',
+        _SPEED: 'fieldbus.input_speed_setpoint',
+    }
+    delayed = 54
+
+    def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
+        super().__init__(memory, motor, faults, counters)
+        self.refuses_writes_when_faulted = False  # [M1] knows of no such thing
+        self.scmd = Smode.STOP
+        self._steps = ControlSteps()
+        self._running = False
+        self._sleeping = False
+
+    @property
+    def mode(self) -> int:
+        """What MODE reads [M1]: whatever is neither bus nor terminals is Manual."""
+        if self._bus:
+            return Mode.BUS
+        return Mode.AUTO if self.source is Source.EXT else Mode.MANUAL
+
+    @property
+    def control_word(self) -> Control:
+        """The control word, as it was written."""
+        return self._steps.word
+
+    def restart(self) -> None:
+        """Begin as after power-on."""
+        self._steps = ControlSteps()
+        self._running = self._sleeping = False
+        super().restart()
+
+    def take(self, source: Source) -> None:
+        """Hand control over; a run command that stood is forgotten."""
+        self.source = source
+        self.scmd = Smode.STOP
+        self._delay_left = None
+        if not self._bus:
+            self._steps.give_up()
+
+    def write(self, key: str, raw: int) -> bool:
+        """Carry out MODE, SMODE or Drive Control."""
+        if key == 'fieldbus.mode':
+            self._write_mode(raw)
+        elif key == 'fieldbus.smode':
+            self._write_smode(raw)
+        elif key == 'fieldbus.drive_control':
+            self._write_control(Control(raw))
+        else:
+            return False
+        return True
+
+    def show(self, key: str) -> int | None:
+        """Return the raw number of MODE, Drive Control or Drive Status."""
+        if key == 'fieldbus.mode':
+            return self.mode
+        if key == 'fieldbus.drive_control':
+            return int(self.control_word)
+        if key == 'fieldbus.drive_status':
+            return int(self.status_word)
+        return None
+
+    def _write_mode(self, raw: int) -> None:
+        if raw not in set(Mode):
+            raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
+        self.refuse_when_faulted()
+        if raw == Mode.MANUAL:
+            self.take(Source.KEYPAD if self._running else Source.STOP)
+        else:
+            self.take(Source.EXT if raw == Mode.AUTO else Source.SCMD)
+
+    def _write_smode(self, raw: int) -> None:
+        if raw not in set(Smode):
+            raise Refused(Reason.VALUE, f'SMODE has no code {raw:#x}')
+        self.refuse_when_faulted()
+        if not self._bus:
+            raise Refused(Reason.STATE, 'SMODE needs MODE = Bus')
+        self.scmd = Smode(raw)
+
+    def _write_control(self, word: Control) -> None:
+        shown = self.status_word
+        if word & ~self.control_word & Control.FAULT_ACK:
+            self._faults.acknowledge()
+        self._steps.write(word, shown)
+        if self.source is Source.CONTROL_WORD and not self._steps.has_control:
+            self.take(Source.STOP)
+
+    def wait(self, dt: float) -> None:
+        """Let the start delay run, and the drive respond to Drive Control."""
+        super().wait(dt)
+        self._steps.wait(dt)
+        if self._steps.has_control and not self._bus:
+            self.take(Source.CONTROL_WORD)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a start delay runs or a control word has not had its effect yet."""
+        return self._steps.waiting or super().waiting
+
+    @property
+    def settled(self) -> bool:
+        """Whether it stays as it is as long as nothing new comes."""
+        return not self.stopping
+
+    def settle(self) -> None:
+        """Carry out what stands: run, brake to a stop, sleep, or let the motor go."""
+        self._keep_delay()
+        motor = self._motor
+        working = self.initialised and not self._faults
+        self._running = working and self._wanted() and self._delay_left == 0
+        reference = self.reference()
+        self._sleeping = self._running and self._sleeps(reference)
+        self._ramps()
+        by_speed = self._memory.raw('control.mode') == _SPEED
+        motor.regulation = Regulation.SPEED if by_speed else Regulation.FREQUENCY
+        if self._running and not self._sleeping:
+            motor.energise()
+            motor.demand = reference
+        elif motor.driven and working and not self._sleeping and self._brakes:
+            motor.demand = 0.0
+            if motor.at_zero:
+                motor.release()
+        else:
+            motor.release()
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the motor goes down the ramp to a stop."""
+        return self._motor.driven and not self._running
+
+    @property
+    def inv_st(self) -> int:
+        """The inverter status while no fault stands [M1]."""
+        return 29 if self._sleeping else super().inv_st
+
+    @property
+    def status_word(self) -> Status:
+        """Drive Status [M1]."""
+        motor = self._motor
+        ready = self.initialised and not self._faults
+        alarm = motor.limited or bool(self._faults.alarms)
+        bits = {
+            Status.READY: ready,
+            Status.SWITCHED_ON: motor.driven,
+            Status.ENABLED: ready and self._steps.enabled and not self.stopping,
+            Status.FAULT_ACTIVE: bool(self._faults),
+            Status.ECHO_1: bool(self.control_word & Control.ECHO_1),
+            Status.ECHO_2: bool(self.control_word & Control.ECHO_2),
+            Status.DISABLED: not self.run_input,
+            Status.ALARM_ACTIVE: alarm,
+            Status.CONTROL_FROM_BUS: self._bus,
+            Status.SETPOINT_REACHED: motor.driven and self._running and motor.trend == 0,
+            Status.LIMIT_ACTIVE: motor.limited,
+            Status.SLEEP_ACTIVE: self._sleeping,
+            Status.STOPMODE_BRAKE: self._brakes,
+            Status.REVERSE: motor.speed < -0.5,
+            Status.STOPPING: self.stopping,
+        }
+        return Status(sum(bit for bit, is_set in bits.items() if is_set))
+
+    @property
+    def state(self) -> str:
+        """What the status word amounts to, since the manual has no state machine."""
+        return state_of(self.status_word).name
+
+    def reference(self) -> float:
+        """The reference that is followed in a run, signed (Hz)."""
+        plate = self._motor.plate
+        if self.scmd is not Smode.FIELDBUS:
+            return plate.frequency * TERMINAL_SHARE
+        setpoint = self._memory.number(self.setpoint_key)
+        if self._memory.raw('control.mode') == _FREQUENCY:
+            most, scale = _MOST_FREQUENCY, 1.0
+        else:
+            most, scale = _MOST_SPEEDS * plate.speed, plate.pole_pairs / 60
+        return scale * min(max(setpoint, -most), most)
+
+    def _wanted(self) -> bool:
+        if self.source is Source.KEYPAD:
+            return True
+        if not self.run_input:
+            return False
+        bus = self.scmd is not Smode.STOP or self._steps.run
+        return bus if self._bus else self.source is Source.EXT
+
+    def _sleeps(self, reference: float) -> bool:
+        """Whether so small a reference suspends the output, once the ramp has come down to it."""
+        least = self._memory.number('control.f_sleep')
+        slow = not self._motor.driven or abs(self._motor.ramp) < least
+        return slow and abs(reference) < least
+
+    @property
+    def _brakes(self) -> bool:
+        return bool(self._memory.raw('control.st_mode'))
+
+    @property
+    def _bus(self) -> bool:
+        return self.source in (Source.SCMD, Source.CONTROL_WORD)

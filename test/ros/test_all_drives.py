@@ -1,0 +1,76 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The services of the bus node: all drives stopped or enabled at once."""
+
+from __future__ import annotations
+
+from bench import Bench
+from bench import wait_until
+
+_THREE = """
+nfo_sinus_bus: {ros__parameters: {drives: [left, right, watched]}}
+left: {ros__parameters: {address: 1}}
+right: {ros__parameters: {address: 2}}
+watched: {ros__parameters: {address: 3, control_method: monitor}}
+"""
+
+
+def start(bench: Bench) -> tuple:
+    simulator = bench.simulator('--address', '1', '--address', '2', '--address', '3')
+    parameters = bench.folder / 'three.yaml'
+    parameters.write_text(_THREE)
+    bench.driver('--params-file', str(parameters))
+    for name in ('/left', '/right', '/watched'):
+        bench.client(name).connected()
+    return simulator, bench.client('/nfo_sinus_bus')
+
+
+def running(simulator) -> list[bool]:
+    return [simulator.state(address)['turning'] for address in (1, 2, 3)]
+
+
+def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(bench: Bench) -> None:
+    simulator, everybody = start(bench)
+    answer = everybody.call('enable_all')
+    assert answer.success, answer.message
+    assert 'left: enabled' in answer.message and 'right: enabled' in answer.message
+    assert 'watched' not in answer.message
+    with bench.client('/left').setpoints(20.0), bench.client('/right').setpoints(-20.0):
+        wait_until(lambda: running(simulator) == [True, True, False], 'both turn')
+        answer = everybody.call('stop_all')
+        assert answer.success, answer.message
+        assert 'left: stopping: it ramps down' in answer.message
+        wait_until(lambda: running(simulator) == [False, False, False], 'both stand')
+        # set-points go on arriving, and nobody follows them
+        states = [simulator.state(address) for address in (1, 2)]
+        assert not any(state['turning'] for state in states)
+    assert simulator.state(3)['writes'] == {}
+
+
+def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -> None:
+    simulator, everybody = start(bench)
+    assert everybody.call('enable_all').success
+    with bench.client('/left').setpoints(20.0):
+        wait_until(lambda: simulator.state(1)['turning'], 'it turns')
+        simulator.inject('silence', 3600.0, address=2)
+        answer = everybody.call('disable_all')
+    assert not answer.success
+    assert answer.message.startswith('right: the stop is NOT confirmed'), answer.message
+    assert 'left: stopping' in answer.message
+    wait_until(lambda: not simulator.state(1)['turning'], 'it stands')
+    answer = everybody.call('enable_all')
+    assert not answer.success
+    assert answer.message.startswith('right: '), answer.message
+    assert 'left: enabled' in answer.message

@@ -1,0 +1,112 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A simulated Sinus Optimal, asked by registers and codes copied from its manual [M1] by hand."""
+
+import struct
+
+from nfo_sinus_driver.simulator import modbus
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+
+STATOR_FREQUENCY = 0x0400
+CONTROL_FREQUENCY = 0x0518
+ROTOR_SPEED = 0x0264
+CONTROL_SPEED = 0x0260
+MODE = 0x0294
+SMODE = 0x0298
+INPUT_FREQUENCY = 0x03FC
+INPUT_SPEED = 0x025C
+STATUS_WITH_ACK = 0x02A4
+STATUS = 0x02A5
+DRIVE_CONTROL = 0x0254
+DRIVE_STATUS = 0x0258
+
+MANUAL, AUTO, BUS = 1, 2, 3
+STOP, RUN_TERMINAL, RUN_INPUT = 0, 0x081, 0x101
+
+# bits of Drive Status
+READY = 1 << 0
+SWITCHED_ON = 1 << 1
+ENABLED = 1 << 2
+FAULT = 1 << 3
+DISABLED = 1 << 6
+ALARM = 1 << 7
+FROM_BUS = 1 << 9
+REACHED = 1 << 10
+LIMIT = 1 << 11
+SLEEP = 1 << 12
+BRAKE = 1 << 13
+REVERSE = 1 << 14
+STOPPING = 1 << 15
+
+
+class OptimalBench:
+    """One drive; time passes when told."""
+
+    def __init__(self, **options):
+        self.drive = SimulatedDrive('sinus_optimal', **options)
+
+    def ask(self, pdu):
+        return modbus.answer(self.drive, bytes.fromhex(pdu) if isinstance(pdu, str) else pdu)
+
+    def read(self, register):
+        """Read one register, signed."""
+        pdu = self.ask(struct.pack('>BHH', 3, register, 1))
+        assert pdu[:2] == b'\x03\x02', pdu.hex()
+        return struct.unpack('>h', pdu[2:])[0]
+
+    def write(self, register, value):
+        pdu = struct.pack('>BHH', 6, register, value & 0xFFFF)
+        assert self.ask(pdu) == pdu
+
+    def refusal(self, register, value):
+        """Return the exception code that a write is answered with."""
+        pdu = self.ask(struct.pack('>BHH', 6, register, value & 0xFFFF))
+        assert pdu[0] == 0x86, pdu.hex()
+        return pdu[1]
+
+    @property
+    def bits(self):
+        return self.read(DRIVE_STATUS) & 0xFFFF
+
+    @property
+    def code(self):
+        return self.read(STATUS)
+
+    @property
+    def text(self):
+        return self.drive.model.inv_st_text(self.code)
+
+    @property
+    def running(self):
+        return self.drive.motor.driven
+
+    def run(self, setpoint, seconds=0.0):
+        """Run by SMODE = 101h at Hz."""
+        self.write(MODE, BUS)
+        self.write(INPUT_FREQUENCY, round(10 * setpoint))
+        self.write(SMODE, RUN_INPUT)
+        self.wait(seconds)
+
+    def switch_on(self, seconds=0.0):
+        """Run by Drive Control, as the manual's example does."""
+        for word, bit in ((0x4000, FROM_BUS), (0x4008, ENABLED), (0x4009, SWITCHED_ON)):
+            self.write(DRIVE_CONTROL, word)
+            self.wait(0.1)
+            assert self.bits & bit
+        self.wait(seconds)
+
+    def wait(self, seconds):
+        self.drive.advance(seconds)
