@@ -20,7 +20,6 @@ from nfo_sinus_driver.catalog.error_log import ERROR_LOG
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.inv_st import InvStCode
 from nfo_sinus_driver.catalog.inv_st import Kind
-from nfo_sinus_driver.catalog.model import DRIVABLE
 from nfo_sinus_driver.catalog.model import MODELS
 from nfo_sinus_driver.catalog.model import Model
 from nfo_sinus_driver.catalog.model import load_model
@@ -41,7 +40,6 @@ from nfo_sinus_driver.catalog.words import state_of
 
 __all__ = [
     'DEFAULT_SCALING',
-    'DRIVABLE',
     'ERROR_LOG',
     'MODELS',
     'Access',

@@ -38,8 +38,6 @@ from nfo_sinus_driver.catalog.parameter import RawType
 
 #: The models that there are tables of.
 MODELS = ('sinus_g2', 'sinus_optimal')
-#: Those that the driver drives and the simulator simulates: what their ``model`` takes.
-DRIVABLE = ('sinus_g2',)
 
 _TABLES = Path(__file__).parent
 #: Firmware 4.28 renamed Sio Stby and its like [C3].

@@ -20,19 +20,22 @@ A control method knows what to write, and nothing of when; `motion` decides that
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
+from collections.abc import Callable
 from typing import Protocol
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+
+#: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
+Reached = Callable[[Callable[[InverterStatus], bool]], Awaitable[None]]
 
 
 class ControlMethod(Protocol):
-    """
-    What to write so that a drive does something; coroutines for the bus.
-
-    :ivar coasts: it can release the motor at once.
-    """
+    """What to write so that a drive does something; coroutines for the bus."""
 
     name: str
+    #: It can release the motor at once.
     coasts: bool
 
     async def in_control(self, priority: Priority) -> bool:
@@ -52,8 +55,13 @@ class ControlMethod(Protocol):
         :raises DriveError: the drive keeps another value.
         """
 
-    async def run(self) -> None:
-        """Give the run command; once, for nobody knows what has happened before a second one."""
+    async def run(self, reached: Reached) -> None:
+        """
+        Give the run command; once, for nobody knows what has happened before a second one.
+
+        :param reached: for what takes several steps, each confirmed by the drive's status.
+        :raises DriveError: a step is not confirmed.
+        """
 
     async def stop(self, control_mode: str) -> None:
         """

@@ -33,8 +33,7 @@ from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.mode_scmd import ModeScmd
-from nfo_sinus_driver.drive.mode_scmd import ModeSmode
+from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
@@ -48,8 +47,6 @@ from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 
 _T = TypeVar('_T')
-
-_METHODS = {'sinus_g2': ModeScmd, 'sinus_optimal': ModeSmode}
 
 _MONITOR = 'control_method is monitor: this driver only reads; set control_method to mode_scmd'
 
@@ -80,7 +77,7 @@ class Drive:
         )
         self._motion: Motion | None = None
         if settings.control_method != 'monitor':
-            method = _METHODS[settings.model](self._registers)
+            method = make_control_method(settings, self._registers)
             self._motion = Motion(bus, self._inverter, method, self._setpoint)
         self._watch = Watch(
             bus,
@@ -196,7 +193,13 @@ class Drive:
         Ask for a set-point in the unit of the control mode; it counts only while armed.
 
         :raises ValueError: not finite.
+        :raises DriveError: the drive follows a reference of its own, and no set-points.
         """
+        if not self.settings.follows_setpoints:
+            raise DriveError(
+                f'set-point refused: reference is {self.settings.reference}, so the drive follows '
+                'none; set reference to fieldbus, where its control method has that'
+            )
         self._setpoint.request(value)
 
     # --- on the bus ---------------------------------------------------------------------------
@@ -260,8 +263,9 @@ class Drive:
         identity = await inverter.introduce()
         self._watch.connected()
         inverter.connected = inverter.answering = True
-        name = '' if identity.model else f'{inverter.model.name}, '
-        inverter.tell(Severity.INFO, f'connected: {name}{identity}')
+        name = '' if identity.model else inverter.model.name
+        told = ', '.join(part for part in (name, str(identity)) if part)
+        inverter.tell(Severity.INFO, f'connected: {told}')
         self._warn_of_missing_timeout()
 
     def _warn_of_missing_timeout(self) -> None:

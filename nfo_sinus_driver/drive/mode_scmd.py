@@ -24,6 +24,7 @@ from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.catalog.words_optimal import Mode as OptimalMode
 from nfo_sinus_driver.catalog.words_optimal import Smode
+from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
@@ -31,15 +32,20 @@ from nfo_sinus_driver.link import Refused
 
 
 class ModeScmd:
-    """Control of one Sinus G2 through MODE and SCMD; a control method."""
+    """
+    Control of one Sinus G2 through MODE and SCMD; a control method.
+
+    :param run: the run command, which says where the reference comes from.
+    """
 
     name = 'mode_scmd'
     coasts = True
     #: The parameter that takes the run command; its codes for stop and run are the same on both.
     _command = 'fieldbus.scmd'
 
-    def __init__(self, registers: Registers) -> None:
+    def __init__(self, registers: Registers, run: int = Scmd.FIELDBUS) -> None:
         self._registers = registers
+        self._run = run
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
@@ -65,15 +71,11 @@ class ModeScmd:
 
         :raises DriveError: the drive keeps another value.
         """
-        reference = Reference(self._registers, control_mode)
-        await reference.write_zero(priority, once=False)
-        kept = await reference.read(priority)
-        if kept != 0:
-            raise DriveError(f'the drive keeps a set-point of {kept} where 0 was written')
+        await Reference(self._registers, control_mode).set_to_zero(priority)
 
-    async def run(self) -> None:
+    async def run(self, reached: Reached) -> None:
         """Give the run command; once, for nobody knows what has happened before a second one."""
-        await self._registers.write(self._command, Scmd.FIELDBUS, Priority.SERVICE, once=True)
+        await self._registers.write(self._command, self._run, Priority.SERVICE, once=True)
 
     async def stop(self, control_mode: str) -> None:
         """

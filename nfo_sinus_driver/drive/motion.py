@@ -113,7 +113,9 @@ class Motion:
             raise DriveError(str(error) or repr(error)) from error
         finally:
             self._arming = None
-        return 'enabled; it follows set-points that arrive from now on'
+        if self._inverter.settings.follows_setpoints:
+            return 'enabled; it follows set-points that arrive from now on'
+        return f'enabled; it follows its own reference ({self._inverter.settings.reference})'
 
     async def stop(self, patience: float | None = None) -> str:
         """
@@ -301,18 +303,24 @@ class Motion:
             await self._finish_withdrawal(self._withdrawal, _PATIENCE)
         await self._method.take_control()
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, _PATIENCE)
-        await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.run()
-        await self._await_run()
+        if inverter.settings.follows_setpoints:
+            await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await self._method.run(self._await_start)
+        await self._await_start(lambda now: now.runs)
         self._changed_at = time.monotonic()
         self._setpoint.arm(control_mode)
 
-    async def _await_run(self) -> None:
+    async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
+        """
+        Wait until the drive has made a step on its way to run.
+
+        :raises DriveError: it does not.
+        """
         deadline = time.monotonic() + _PATIENCE
         delayed = False
         while True:
             seen = await self._inverter.look(Priority.SERVICE)
-            if seen.runs:
+            if wanted(seen):
                 return
             if seen.faulted:
                 raise DriveError(f'the drive did not start: {self._inverter.describe()}')

@@ -223,7 +223,8 @@ class Parameters:
             self._unread = 0
         self._keys = tuple(key for key in keys if key in self._words)
         seconds = time.monotonic() - started
-        inverter.tell(Severity.INFO, f'parameters: {self.progress} in {seconds:.1f} s')
+        if keys:
+            inverter.tell(Severity.INFO, f'parameters: {self.progress} in {seconds:.1f} s')
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""

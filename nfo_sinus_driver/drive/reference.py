@@ -80,6 +80,14 @@ class Reference:
         """
         await self._registers.write_at(self.address, self.words(0.0), priority, once=once)
 
-    async def read(self, priority: Priority) -> float:
-        """Read what the drive was given last."""
-        return await self._registers.read_number(self._key, priority)
+    async def set_to_zero(self, priority: Priority) -> None:
+        """
+        Write set-point 0, and read it back.
+
+        :raises DriveError: the drive keeps another value.
+        :raises LinkError: the drive does not answer, or refuses.
+        """
+        await self.write_zero(priority, once=False)
+        kept = await self._registers.read_number(self._key, priority)
+        if kept != 0:
+            raise DriveError(f'the drive keeps a set-point of {kept:g} where 0 was written')

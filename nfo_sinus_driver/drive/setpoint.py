@@ -101,18 +101,24 @@ class Setpoint:
         return time.monotonic() - at if at > self._armed_at else NAN
 
     def arm(self, control_mode: str) -> None:
-        """Follow set-points that come in from now on; 0 stands in the drive."""
+        """
+        Follow set-points that come in from now on; 0 stands in the drive.
+
+        With a reference of the drive's own, none is followed and none is missed.
+        """
         self.control_mode = control_mode
-        self._reference = Reference(self._registers, control_mode)
+        follows = self._inverter.settings.follows_setpoints
+        self._reference = Reference(self._registers, control_mode) if follows else None
         self._armed_at = time.monotonic()
-        self._written = self._reference.words(0.0)
+        self._written = () if self._reference is None else self._reference.words(0.0)
         self._written_at = self._armed_at
-        self.commanded = 0.0
+        self.commanded = NAN if self._reference is None else 0.0
         self.clamped = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
-        self._watch = self._bus.spawn(self._watch_age())
+        if self._reference is not None:
+            self._watch = self._bus.spawn(self._watch_age())
 
     def disarm(self) -> None:
         """Follow nothing any more."""

@@ -19,9 +19,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from nfo_sinus_driver.catalog import DRIVABLE
+from nfo_sinus_driver.catalog import MODELS
 
-CONTROL_METHODS = ('mode_scmd', 'monitor')
+CONTROL_METHODS = ('mode_scmd', 'drive_control', 'monitor')
+#: The fixed references of the drive, forward and reverse.
+_FIXED = tuple(f'fix{number}{way}' for number in range(1, 8) for way in ('', '_reverse'))
+#: Where a running drive takes its reference from.
+REFERENCES = ('fieldbus', 'terminal', 'op_mode', 'analog', 'analog_reverse', *_FIXED)
+#: Those that a model has under a control method; the others have them all.
+_REFERENCES = {
+    ('sinus_g2', 'drive_control'): ('fieldbus', 'terminal'),
+    ('sinus_optimal', 'mode_scmd'): ('fieldbus', 'terminal'),
+    ('sinus_optimal', 'drive_control'): ('terminal',),
+}
 #: The control modes by the names that ``expected_control_mode`` takes.
 CONTROL_MODES = ('Freque', 'PI-Reg', 'Torque', 'Speed')
 
@@ -35,6 +45,8 @@ class DriveSettings:
     How one drive is to be treated; the fields are the parameters of its node.
 
     :ivar address: Modbus 1 to 247 [M0 §6.2.2].
+    :ivar reference: where a running drive takes its reference from; set-points are only followed
+        with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
     :ivar telemetry_rate: Hz; 0 turns telemetry off.
     :ivar setpoint_timeout: s; 0 turns it off.
@@ -47,6 +59,7 @@ class DriveSettings:
     address: int = 1
     model: str = 'sinus_g2'
     control_method: str = 'mode_scmd'
+    reference: str = 'fieldbus'
     poll_rate: float = 0.0
     telemetry_rate: float = 2.0
     setpoint_timeout: float = 2.5
@@ -57,9 +70,21 @@ class DriveSettings:
     allow_communication_changes: bool = False
     retries: int = 2
 
+    @property
+    def follows_setpoints(self) -> bool:
+        """The motor follows set-points from the bus, and no reference of the drive's own."""
+        return self.reference == 'fieldbus'
+
     def __post_init__(self) -> None:
-        _one_of('model', self.model, DRIVABLE)
+        _one_of('model', self.model, MODELS)
         _one_of('control_method', self.control_method, CONTROL_METHODS)
+        _one_of('reference', self.reference, REFERENCES)
+        kind = f'{self.control_method} on {self.model}'
+        allowed = _REFERENCES.get((self.model, self.control_method), REFERENCES)
+        if self.reference not in allowed:
+            raise ValueError(
+                f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
+            )
         _one_of('expected_control_mode', self.expected_control_mode, ('', *CONTROL_MODES))
         if self.address not in _MODBUS_ADDRESSES:
             raise ValueError(f'address {self.address}: a Modbus drive has 1 to 247')

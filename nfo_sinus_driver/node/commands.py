@@ -87,7 +87,11 @@ class Commands:
                 throttle_duration_sec=10.0,
             )
             return
-        node.drive.set_setpoint(message.data)
+        try:
+            node.drive.set_setpoint(message.data)
+        except DriveError as error:
+            node.get_logger().warning(str(error), throttle_duration_sec=10.0)
+            return
         if node.drive.armed:
             self._told_idle_setpoint = False
         elif not self._told_idle_setpoint:

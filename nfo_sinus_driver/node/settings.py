@@ -24,8 +24,10 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
@@ -161,12 +163,19 @@ BUS_SETTINGS = (
 
 DRIVE_SETTINGS = (
     Setting('address', 1, "The drive's address on the bus; Modbus 1 to 247", 1, 247),
-    Setting('model', 'sinus_g2', 'The drive family', constraints='one of sinus_g2'),
+    Setting('model', 'sinus_g2', 'The drive family', constraints=f'one of {", ".join(MODELS)}'),
     Setting(
         'control_method',
         'mode_scmd',
         'How the drive is commanded; monitor: not one write to it',
         constraints=f'one of {", ".join(CONTROL_METHODS)}',
+    ),
+    Setting(
+        'reference',
+        'fieldbus',
+        'Where a running drive takes its reference from; with any but fieldbus it follows no '
+        'set-points',
+        constraints=f'one of {", ".join(REFERENCES)}, as far as model and control_method have it',
     ),
     Setting(
         'autostart',

@@ -20,6 +20,8 @@ from collections.abc import Iterator
 import struct
 from typing import Any
 
+from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Scmd
@@ -36,12 +38,16 @@ _READ_DEVICE = frozenset(
 _ACKNOWLEDGING = 0x02A4
 _MODE = 0x0294
 _SCMD = 0x0298
+_MASK = 0x0250
+_CONTROL = 0x0254
 _SETPOINTS = frozenset((0x03FC, 0x025C, 0x0408, 0x0410))
 
 Frame = dict[str, Any]
 
 
-def violations(frames: list[Frame], frame_gap: float) -> list[str]:
+def violations(
+    frames: list[Frame], frame_gap: float, model: str = 'sinus_g2'
+) -> list[str]:
     """
     Return what breaks the laws of the house in a trace; nothing is as it should be.
 
@@ -53,7 +59,7 @@ def violations(frames: list[Frame], frame_gap: float) -> list[str]:
         if frame['direction'] == 'request'
         for complaint in (
             *_wrong_gap(frame, number, frame_gap),
-            *_wrong_request(frames, number, bytes.fromhex(frame['hex'])),
+            *_wrong_request(frames, number, bytes.fromhex(frame['hex']), model),
         )
     ]
 
@@ -63,7 +69,9 @@ def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:
         yield f'came {1000 * frame["gap"]:.3f} ms after the frame before, t3.5 is not kept'
 
 
-def _wrong_request(frames: list[Frame], number: int, data: bytes) -> Iterator[str]:
+def _wrong_request(
+    frames: list[Frame], number: int, data: bytes, model: str
+) -> Iterator[str]:
     if data[1:-2] == _REPORT_SLAVE_ID or data[1:-2] in _READ_DEVICE:
         return
     unit, function, register = struct.unpack('>BBH', data[:4])
@@ -81,17 +89,34 @@ def _wrong_request(frames: list[Frame], number: int, data: bytes) -> Iterator[st
         return
     if register == _ACKNOWLEDGING:
         yield 'reads the status that acknowledges'
-    if (register, count) not in _PARAMETERS:
+    if (register, count) not in _PARAMETERS[model]:
         yield f'{count} registers at {register:04X}h are not exactly one parameter'
     if words is None:
         return
     if register == _MODE and words[0] == Mode.EXT:
         yield 'MODE = 2 can start the motor'
-    if register == _SCMD and words[0] != Scmd.STOP and not _zero_before(frames, number, unit):
+    if register == _MASK:
+        yield from _wrong_control_word(words[1])
+    if register == _CONTROL and model == 'sinus_g2':
+        yield from _wrong_control_word(words[0])
+    if _runs(register, words[0], model) and not _zero_before(frames, number, unit, model):
         yield 'a run command without set-point 0 before it'
 
 
-def _zero_before(frames: list[Frame], number: int, unit: int) -> bool:
+def _wrong_control_word(word: int) -> Iterator[str]:
+    if word & Control.ENABLE_OP and word & Control.ENABLE_REV_OP:
+        yield 'both directions at once are no direction'
+
+
+def _runs(register: int, word: int, model: str) -> bool:
+    """Tell whether a write makes the motor follow the set-point of the bus."""
+    if register == _CONTROL and model == 'sinus_g2':
+        wanted = Control.SWITCH_ON | Control.ENABLE_OP | Control.NET_REF
+        return word & wanted == wanted
+    return register == _SCMD and word == Scmd.FIELDBUS
+
+
+def _zero_before(frames: list[Frame], number: int, unit: int, model: str) -> bool:
     """Tell whether the last set-point written to a unit was 0, since the last run command."""
     for frame in reversed(frames[:number]):
         data = bytes.fromhex(frame['hex'])
@@ -100,16 +125,16 @@ def _zero_before(frames: list[Frame], number: int, unit: int) -> bool:
         register, value = struct.unpack('>HH', data[2:6])
         if register in _SETPOINTS:
             return value == 0
-        if register == _SCMD and value != Scmd.STOP:
+        if _runs(register, value, model):
             return False
     return False
 
 
-def _parameters() -> Iterator[tuple[int, int]]:
-    for parameter in load_model('sinus_g2').values():
+def _parameters(model: str) -> Iterator[tuple[int, int]]:
+    for parameter in load_model(model).values():
         if Protocol.MODBUS in parameter.places:
             place = parameter.place(Protocol.MODBUS)
             yield place.address, place.words
 
 
-_PARAMETERS = frozenset(_parameters())
+_PARAMETERS = {model: frozenset(_parameters(model)) for model in MODELS}

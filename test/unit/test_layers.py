@@ -43,7 +43,7 @@ MAY_IMPORT = {
     'cli': {'bus', 'catalog', 'drive', 'link', 'statistics'},
 }
 #: What else they may import beside the standard library; node may import anything.
-MAY_USE = {'link': {'serial'}, 'simulator': {'pymodbus'}}
+MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'}}
 #: Rooms in which serial ports are opened.
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
@@ -155,7 +155,8 @@ def test_file_keeps_the_rules_of_the_house(path: str) -> None:
 
 def test_every_room_is_looked_at() -> None:
     rooms = {room_of(path) for path in package_files()}
-    assert {'bus', 'catalog', 'drive', 'link', 'node', 'simulator'} <= rooms <= set(MAY_IMPORT)
+    known = {'bus', 'catalog', 'cli', 'drive', 'link', 'node', 'simulator'}
+    assert known <= rooms <= set(MAY_IMPORT)
 
 
 @pytest.mark.parametrize('path', sorted(LONGER))
@@ -225,6 +226,9 @@ for module in {modules!r}:
         ('drive/drive.py', 'from nfo_sinus_driver.simulator import drive', 'drive imports'),
         ('catalog/model.py', 'from nfo_sinus_driver.link import Address', 'catalog imports'),
         ('node/main.py', 'from nfo_sinus_driver.simulator import main', 'node imports'),
+        ('cli/main.py', 'import rclpy', 'cli imports rclpy'),
+        ('cli/scan.py', 'from nfo_sinus_driver.simulator import drive', 'cli imports'),
+        ('drive/drive.py', 'from nfo_sinus_driver.cli import main', 'drive imports'),
         ('__init__.py', 'from nfo_sinus_driver import bus', 'the package imports'),
         ('drive/drive.py', 'import numpy', 'drive imports numpy'),
         ('drive/drive.py', 'import serial', 'drive opens ports with serial'),

@@ -132,7 +132,11 @@ class Rig:
         self._trace = trace
         options.setdefault('boot_time', 0.2)
         self.simulator = Simulator(
-            baud=BAUD, trace=str(trace), settings={**QUICK, **parameters}, **options
+            baud=BAUD,
+            trace=str(trace),
+            settings={**QUICK, **parameters},
+            model=settings.model,
+            **options,
         )
         self.line = LineSettings(baud_rate=BAUD, response_timeout=response_timeout)
         self._link = open_link('modbus_rtu', self.simulator.port, self.line)
@@ -159,7 +163,8 @@ class Rig:
 
     def check_laws(self) -> None:
         """Judge everything that was on the line, but for its times: the machine may be slow."""
-        found = trace_laws.violations(self.trace(), -math.inf)
+        model = self.drive.settings.model
+        found = trace_laws.violations(self.trace(), -math.inf, model)
         acknowledged = [complaint for complaint in found if ACKNOWLEDGES in complaint]
         others = [complaint for complaint in found if ACKNOWLEDGES not in complaint]
         assert not others, others

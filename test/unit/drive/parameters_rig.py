@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import Any
 
 from drive_rig import PATIENCE
 from drive_rig import Rig
@@ -25,6 +27,7 @@ import pytest
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import parameters as parameters_module
+from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -32,6 +35,12 @@ from nfo_sinus_driver.simulator.refusal import Refused
 #: What stands at the far end of a quick rig, s; see ``QUICK``.
 ACCEL = 0.2
 SILENCE = 3600
+#: Read registers, and who are you.
+_ONLY_READ = {3, 17, 43}
+
+#: What is written together, and what was there before.
+THREE = {'control.accel': 7.0, 'control.retard': 7.0, 'freque.f_fix1': 7.0}
+THREE_BEFORE = [ACCEL, ACCEL, 10.0]
 
 #: Called with a key and a raw number in place of what the drive does; and what it does.
 Store = Callable[[str, int], None]
@@ -91,19 +100,6 @@ def on_read(rig: Rig, monkeypatch: pytest.MonkeyPatch, work: Callable[[str], Non
         monkeypatch.setattr(rig.far, 'read_raw', read_raw)
 
 
-def refuse_write(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, key: str, reason: Reason = Reason.STATE
-) -> None:
-    """Let the drive refuse every write to a parameter."""
-
-    def work(write: Store, written: str, raw: int) -> None:
-        if written == key:
-            raise Refused(reason, 'as the test wants it')
-        write(written, raw)
-
-    on_write(rig, monkeypatch, work)
-
-
 def bound_magn_by_limt(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the drive refuse whatever would make I-magn greater than I-limt [C34]."""
 
@@ -133,3 +129,15 @@ def written(rig: Rig) -> Mapping[str, int]:
 def news(rig: Rig) -> list[str]:
     """What was told of changes by somebody else."""
     return [text for _, text in rig.notes.events if text.startswith('changed at the drive')]
+
+
+def only_read(rig: Rig) -> bool:
+    """Whether nothing was ever written, not even a command."""
+    requests = [frame for frame in rig.trace() if frame['direction'] == 'request']
+    return {bytes.fromhex(frame['hex'])[1] for frame in requests} <= _ONLY_READ
+
+
+def error_of(future: Future[Any]) -> ParameterError:
+    with pytest.raises(ParameterError) as error:
+        future.result(PATIENCE)
+    return error.value

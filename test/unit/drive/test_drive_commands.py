@@ -299,7 +299,7 @@ def test_drive_that_keeps_its_set_point(rig: Rig, monkeypatch: pytest.MonkeyPatc
         rig.far.memory.put('status.frq_set', 300)
         monkeypatch.setattr(rig.far, '_store', lambda key, raw: None)
     message = rig.refused(rig.drive.enable())
-    assert message == 'the drive keeps a set-point of 30.0 where 0 was written'
+    assert message == 'the drive keeps a set-point of 30 where 0 was written'
     assert RUN not in rig.writes(SCMD)
 
 
@@ -671,7 +671,11 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
         ({'address': 0}, 'a Modbus drive has 1 to 247'),
         ({'address': 248}, 'a Modbus drive has 1 to 247'),
         ({'model': 'sinus_h'}, "choose one of 'sinus_g2'"),
-        ({'control_method': 'drive_control'}, "choose one of 'mode_scmd', 'monitor'"),
+        ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'monitor'"),
+        (
+            {'reference': 'analog', 'control_method': 'drive_control'},
+            'with drive_control on sinus_g2 it must be fieldbus or terminal',
+        ),
         ({'expected_control_mode': 'Frequency'}, "'Freque', 'PI-Reg', 'Torque', 'Speed'"),
         ({'poll_rate': -1.0}, 'allowed are 0 to 1000 Hz'),
         ({'poll_rate': math.nan}, 'allowed are'),

@@ -1,0 +1,160 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verbs that read one drive: ``info``, ``list`` and ``get``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from collections.abc import Mapping
+import json
+
+from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.cli.progress import progress
+from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.session import Remote
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.table import columns
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.values import measured
+from nfo_sinus_driver.cli.values import readable
+from nfo_sinus_driver.cli.values import require_names
+from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.link import Refused
+
+_NAMEPLATE = ('motor.p_nom', 'motor.u_nom', 'motor.f_nom', 'motor.n_nom', 'motor.i_nom')
+_COUNTERS = {'status.op_time': 'operating time', 'status.rn_time': 'running time'}
+
+
+def info(options: argparse.Namespace) -> int:
+    """Show who the drive is and how it is doing."""
+    with Session(options) as session:
+        drive = session.drive()
+        identity = drive.identify()
+        seen = drive.look()
+        mode = _measure(drive, filter(drive.registers.reaches, ['control.mode']))
+        nameplate = _measure(drive, filter(drive.registers.reaches, _NAMEPLATE))
+        hours = _measure(drive, filter(drive.registers.reaches, _COUNTERS))
+        facts = {
+            'address': str(drive.address),
+            'port': options.port,
+            'model': drive.model.name,
+            'product': identity.model,
+            'vendor': identity.vendor,
+            'firmware': identity.versions,
+            'serial number': identity.serial,
+            'status': f'{drive.inverter.describe()} ({drive.model.inv_st(seen.code).description})',
+            'state': seen.state.name.lower().replace('_', ' '),
+            'control mode': str(mode.get('control.mode', '')),
+            'motor': ', '.join(shown(nameplate[key], drive.model[key].unit) for key in nameplate),
+            **{_COUNTERS[key]: shown(hours[key], drive.model[key].unit) for key in hours},
+        }
+    if options.json:
+        put(json.dumps(facts, ensure_ascii=False, indent=2))
+    else:
+        for line in columns([(name, fact or '-') for name, fact in facts.items()]):
+            put(line)
+    return 0
+
+
+def list_(options: argparse.Namespace) -> int:
+    """Show all settings of the drive, or one group."""
+    with Session(options) as session:
+        drive = session.drive()
+        if options.group is None:
+            wanted = {parameter.key: parameter for parameter in drive.model.settings}
+        else:
+            wanted = _of_group(drive, options.group)
+        values = _read(drive, wanted)
+    wanted = {key: parameter for key, parameter in wanted.items() if key in values}
+    if options.json:
+        put(as_json(wanted, values))
+        return 0
+    rows = [
+        (f'  {key}', shown(values[key], parameter.unit), parameter.description)
+        for key, parameter in wanted.items()
+    ]
+    group = ''
+    for line, parameter in zip(columns(rows) if rows else (), wanted.values(), strict=True):
+        if parameter.group != group:
+            put(f'{chr(10) if group else ""}{parameter.group}')
+            group = parameter.group
+        put(line)
+    return 0
+
+
+def get(options: argparse.Namespace) -> int:
+    """Show some parameters."""
+    with Session(options) as session:
+        drive = session.drive()
+        known = readable(drive.model)
+        require_names(options.names, known, drive.model.name)
+        wanted = {name: known[name] for name in options.names}
+        values = _read(drive, wanted)
+    require_names(options.names, values, str(drive))
+    if options.json:
+        put(as_json(wanted, values))
+        return 0
+    for line in columns([(key, shown(values[key], wanted[key].unit)) for key in wanted]):
+        put(line)
+    return 0
+
+
+def as_json(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> str:
+    """Return parameters with their units, for a script."""
+    shown_ = {key: {'value': values[key], 'unit': wanted[key].unit} for key in wanted}
+    return json.dumps(shown_, ensure_ascii=False, indent=2)
+
+
+
+
+def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
+    every = (*drive.model.settings, *measured(drive.model))
+    found = {
+        parameter.key: parameter
+        for parameter in every
+        if name.lower() in (parameter.group.lower(), parameter.key.partition('.')[0])
+    }
+    if not found:
+        groups = dict.fromkeys(parameter.group for parameter in every)
+        raise Trouble(f'there is no group {name!r}: choose one of {", ".join(groups)}')
+    return found
+
+
+def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]:
+    """Return the values of settings and measured values, without those that the drive lacks."""
+    drive.identify(thoroughly=False)
+    settings = [key for key, parameter in wanted.items() if parameter.is_setting]
+    values = dict(drive.read(settings)) if settings or not wanted else {}
+    others = [key for key in wanted if key not in settings and drive.inverter.has(key)]
+    values.update(_measure(drive, others))
+    return values
+
+
+def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
+    keys = list(keys)
+    found = {}
+    with progress(f'reading {drive}', len(keys)) as step:
+        for key in keys:
+            try:
+                found[key] = drive.measure(key)
+            except DriveError as error:
+                # what the drive refuses to show is not there
+                if not isinstance(error.__cause__, Refused):
+                    raise
+            step()
+    return found

@@ -1,0 +1,101 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command ``nfo-sinus``: looks after drives from the command line; needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import os
+import signal
+import sys
+import threading
+
+from nfo_sinus_driver.cli.change import set_
+from nfo_sinus_driver.cli.compare import diff
+from nfo_sinus_driver.cli.look import get
+from nfo_sinus_driver.cli.look import info
+from nfo_sinus_driver.cli.look import list_
+from nfo_sinus_driver.cli.options import parse
+from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.scan import scan
+from nfo_sinus_driver.cli.transfer import dump
+from nfo_sinus_driver.cli.transfer import load
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.cli.watch import monitor
+from nfo_sinus_driver.drive import DriveError
+
+VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
+    'scan': scan,
+    'info': info,
+    'list': list_,
+    'get': get,
+    'set': set_,
+    'dump': dump,
+    'load': load,
+    'diff': diff,
+    'monitor': monitor,
+}
+
+_FAILED = 1
+_USAGE = 2
+#: Of diff, whose 1 means that there are differences.
+_DIFF_FAILED = 2
+_INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run the command and return its exit status: 0 only when the drive did it.
+
+    :param argv: the arguments, without the program's name; by default the process's own.
+    """
+    options = parse(sys.argv[1:] if argv is None else argv)
+    failed = _DIFF_FAILED if options.verb == 'diff' else _FAILED
+    try:
+        with _signals_that_interrupt():
+            return VERBS[options.verb](options)
+    except UsageError as error:
+        remark(str(error))
+        return _USAGE
+    except (Trouble, DriveError) as error:
+        remark(str(error))
+        return failed
+    except BrokenPipeError:
+        # who read the output has gone, and Python would complain of it once more at the end
+        with open(os.devnull, 'w', encoding='utf-8') as nowhere:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        return failed
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+@contextlib.contextmanager
+def _signals_that_interrupt() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,221 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What may be typed after ``nfo-sinus``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import shlex
+
+from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.link.open import PROTOCOLS
+from nfo_sinus_driver.link.settings import BAUD_RATES
+
+#: Where the line and the drive are, unless it is said: as the parameters of the nodes.
+DEFAULTS = {
+    'port': '/dev/ttyUSB0',
+    'protocol': 'modbus_rtu',
+    'address': 1,
+    'model': 'sinus_g2',
+    'baud_rate': 0,
+    'char_format': '',
+    'response_timeout': 0.2,
+    'retries': 2,
+}
+#: Nobody waits long for each of 247 addresses.
+SCAN_TIMEOUT = 0.1
+ADDRESSES = range(1, 248)
+
+_ALLOW = '--allow-communication-changes'
+_EPILOG = """
+Options may stand before and after the verb; "nfo-sinus VERB --help" lists those of a verb.
+Reading never changes anything in a drive, and a motor that runs runs on.
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return what was typed, complete with defaults; leave the program if it makes no sense."""
+    options = _parser().parse_args(arguments)
+    defaults = dict(DEFAULTS)
+    if options.verb == 'scan':
+        defaults['response_timeout'] = SCAN_TIMEOUT
+    for name, default in defaults.items():
+        if not hasattr(options, name):
+            setattr(options, name, default)
+    return options
+
+
+def command_line(options: argparse.Namespace, *words: str) -> str:
+    """Return how to call this tool for the same drive, as it can be typed."""
+    given = [
+        text
+        for name, default in DEFAULTS.items()
+        if getattr(options, name) != default
+        for text in (f'--{name.replace("_", "-")}', str(getattr(options, name)))
+    ]
+    return shlex.join(('nfo-sinus', *given, *words))
+
+
+def _common() -> argparse.ArgumentParser:
+    """Return the options that stand before or after the verb."""
+    # without a default the one behind the verb does not overrule the one in front of it
+    parser = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
+    group = parser.add_argument_group('line and drive, as the parameters of the driver')
+    add = group.add_argument
+    add(
+        '--port',
+        help='a device path, or a URL such as socket://host:port (default: /dev/ttyUSB0)',
+    )
+    add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu')
+    add('--address', type=_address, metavar='N', help='of the drive, 1 to 247 (default: 1)')
+    add('--model', choices=MODELS, help='default: sinus_g2')
+    add(
+        '--baud-rate',
+        type=int,
+        choices=(0, *BAUD_RATES),
+        metavar='RATE',
+        help=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)} '
+        '(default: 0, which is 19200)',
+    )
+    add('--char-format', metavar='FORMAT', help='such as 8E1, 8O1, 8N2 (default: 8E1)')
+    add(
+        '--response-timeout',
+        type=_seconds,
+        metavar='SECONDS',
+        help=f'how long a drive may take to begin its answer (default: 0.2; scan: {SCAN_TIMEOUT})',
+    )
+    add(
+        '--retries',
+        type=int,
+        choices=range(11),
+        metavar='TIMES',
+        help='how often a request that nobody answers is repeated (default: 2)',
+    )
+    return parser
+
+
+def _parser() -> argparse.ArgumentParser:
+    common = _common()
+    parser = argparse.ArgumentParser(
+        prog='nfo-sinus',
+        description='Looks after NFO Sinus drives on a serial line.',
+        epilog=_EPILOG,
+        parents=[common],
+    )
+    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')
+
+    def verb(name: str, help_text: str, *, json: bool = False) -> argparse.ArgumentParser:
+        description = f'{help_text[0].upper()}{help_text[1:]}.'
+        made = verbs.add_parser(name, help=help_text, description=description, parents=[common])
+        if json:
+            made.add_argument('--json', action='store_true', help='print JSON, for a script')
+        return made
+
+    scan = verb('scan', 'find out who answers on the line', json=True)
+    scan.add_argument(
+        '--addresses',
+        type=_addresses,
+        default=tuple(ADDRESSES),
+        metavar='LIST',
+        help='such as 1-10,20 (default: 1-247)',
+    )
+    scan.add_argument(
+        '--all-settings',
+        action='store_true',
+        help='try every baud rate and parity; takes long',
+    )
+    verb('info', 'show who the drive is and how it is doing', json=True)
+    list_ = verb('list', 'show all settings of the drive', json=True)
+    list_.add_argument(
+        '--group',
+        metavar='GROUP',
+        help='only this one, such as Motor; Status are the measured values',
+    )
+    get = verb('get', 'show some parameters', json=True)
+    get.add_argument('names', nargs='+', metavar='NAME', help='such as control.accel')
+    set_ = verb('set', 'change parameters, all of them or none', json=True)
+    set_.add_argument(
+        'changes', nargs='+', type=_change, metavar='NAME=VALUE', help='such as control.accel=5'
+    )
+    set_.add_argument(_ALLOW, action='store_true', help='let parameters serial.* be changed')
+    dump = verb('dump', 'save all settings of the drive')
+    dump.add_argument(
+        'file', nargs='?', default='-', metavar='FILE', help='default: standard output'
+    )
+    _add_load(verb('load', 'put saved settings into the drive; only what differs is written'))
+    diff = verb('diff', 'compare a drive with a file, two files, or two drives', json=True)
+    diff.add_argument('files', nargs='*', metavar='FILE', help='with the drive, or two of them')
+    diff.add_argument(
+        '--against', type=_address, metavar='N', help='compare with the drive at this address'
+    )
+    monitor = verb('monitor', 'show what the drive does, until Ctrl-C', json=True)
+    monitor.add_argument(
+        '--period',
+        type=_seconds,
+        default=0.5,
+        metavar='SECONDS',
+        help='from one line to the next (default: 0.5)',
+    )
+    monitor.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+    return parser
+
+
+def _add_load(load: argparse.ArgumentParser) -> None:
+    load.add_argument('file', metavar='FILE', help='- is the standard input')
+    load.add_argument(
+        '--dry-run', action='store_true', help='only show what would change; write nothing'
+    )
+    load.add_argument(_ALLOW, action='store_true', help='let parameters serial.* be changed')
+    after = load.add_mutually_exclusive_group()
+    after.add_argument(
+        '--put-back',
+        action='store_true',
+        help='if it fails half-way, put back what was written without asking',
+    )
+    after.add_argument(
+        '--keep', action='store_true', help='if it fails half-way, leave what was written'
+    )
+
+
+def _address(text: str) -> int:
+    address = int(text, 10)
+    if address not in ADDRESSES:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 1 to 247')
+    return address
+
+
+def _addresses(text: str) -> tuple[int, ...]:
+    found: set[int] = set()
+    for part in text.split(','):
+        first, _, last = part.partition('-')
+        found.update(range(_address(first), _address(last or first) + 1))
+    if not found:
+        raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
+    return tuple(sorted(found))
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.01 <= seconds <= 3600:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 0.01 s at least')
+    return seconds
+
+
+def _change(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition('=')
+    if not (name and equals and value):
+        raise argparse.ArgumentTypeError(f'{text!r} is not NAME=VALUE')
+    return name.strip(), value.strip()

@@ -1,0 +1,227 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Parameter files: what ``dump`` writes and ``load`` and ``diff`` read.
+
+They are ROS parameter files at the same time. In front stands a header in comments, which tells
+whose parameters these are; a file without one, such as ``ros2 param dump`` writes, is read too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from dataclasses import field
+from decimal import Decimal
+from pathlib import Path
+import re
+import sys
+from typing import Any
+
+import yaml
+
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import listed
+
+#: What the header says, in this order.
+HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')
+
+_PARAMETERS = 'ros__parameters'
+_STANDARD = '-'
+#: What ROS itself gives to nodes, below names with dots.
+_ROS_OWN = ('qos_overrides.',)
+_TITLE = '# Parameters of an NFO Sinus drive; also a ROS parameter file.'
+_HEADER_LINE = re.compile(rf'# ({"|".join(HEADER)}): (.*)')
+
+
+@dataclass(frozen=True)
+class ParameterFile:
+    """
+    The parameters in a file.
+
+    :ivar name: of the file.
+    :ivar header: what its header says, as text; empty without one.
+    :ivar values: the parameters of the drive, by name.
+    :ivar skipped: names that belong to the driver's node and not to the drive.
+    """
+
+    name: str
+    values: Mapping[str, Value]
+    header: Mapping[str, str] = field(default_factory=dict)
+    skipped: tuple[str, ...] = ()
+
+
+def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: Model) -> str:
+    """Return the text of a parameter file, with units in comments."""
+    lines = [_TITLE, '#']
+    said = {what: _one_line(header.get(what, '')) for what in HEADER}
+    lines += [f'# {what}: {text}' for what, text in said.items() if text]
+    lines += ['/**:', f'  {_PARAMETERS}:']
+    for group in dict.fromkeys(key.partition('.')[0] for key in values):
+        lines.append(f'    {group}:')
+        for key, value in values.items():
+            if key.partition('.')[0] == group:
+                remark = f'  # {model[key].unit}' if key in model and model[key].unit else ''
+                lines.append(f'      {key.partition(".")[2]}: {_scalar(value)}{remark}')
+    return '\n'.join(lines) + '\n'
+
+
+def write_file(name: str, text: str) -> None:
+    """
+    Write a parameter file; ``-`` is the standard output.
+
+    :raises Trouble: it cannot be written.
+    """
+    if name == _STANDARD:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
+    path = Path(name)
+    partial = path.with_name(f'{path.name}.part')
+    try:
+        if not path.exists() or path.is_file():
+            # an older file is replaced by a whole one, or not at all
+            partial.write_text(text, encoding='utf-8')
+            partial.replace(path)
+        else:
+            path.write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise Trouble(f'{name} cannot be written: {error.strerror}') from error
+
+
+def read_file(name: str) -> ParameterFile:
+    """
+    Read a parameter file; ``-`` is the standard input.
+
+    :raises Trouble: it cannot be read, or is none.
+    """
+    try:
+        text = sys.stdin.read() if name == _STANDARD else Path(name).read_text(encoding='utf-8')
+    except OSError as error:
+        raise Trouble(f'{name} cannot be read: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise Trouble(f'{name} is no text in UTF-8: is it a parameter file?') from error
+    return parse_file(text, 'the standard input' if name == _STANDARD else name)
+
+
+def parse_file(text: str, name: str) -> ParameterFile:
+    """
+    Return what a parameter file says.
+
+    :raises Trouble: it is none, or not clear.
+    """
+    try:
+        tree = yaml.load(text, _Loader)
+    except (yaml.YAMLError, ValueError) as error:
+        raise Trouble(f'{name} is no parameter file: {_one_line(str(error))}') from error
+    header = dict(_header(text))
+    found = {}
+    skipped: dict[str, None] = {}
+    for section, parameters in _sections(tree):
+        drive, own = _split(_flatten(parameters, name))
+        skipped.update(dict.fromkeys(own))
+        if drive:
+            found[section] = drive
+    if len(found) > 1:
+        raise Trouble(
+            f'{name} has parameters of several drives ({", ".join(found)}): leave one of them in it'
+        )
+    if not found:
+        raise Trouble(f'{name} has no parameters of a drive, below {_PARAMETERS} of a node')
+    return ParameterFile(name, next(iter(found.values())), header, tuple(skipped))
+
+
+class _Loader(yaml.SafeLoader):
+    """Like the safe loader, but a name that stands twice is no riddle with two answers."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return a mapping whose names are unique."""
+        names = [key.value for key, _ in node.value]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f'{name} stands twice in it')
+        return super().construct_mapping(node, deep)
+
+
+def _header(text: str) -> Iterator[tuple[str, str]]:
+    for line in text.splitlines():
+        if line and not line.startswith('#'):
+            return
+        match = _HEADER_LINE.fullmatch(line)
+        if match:
+            yield match[1], match[2].strip()
+
+
+def _sections(tree: Any, prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Return the nodes of a parameter file and what stands below each."""
+    if not isinstance(tree, dict):
+        return
+    for key, value in tree.items():
+        name = f'{prefix}/{key}'.replace('//', '/') if prefix else str(key)
+        if isinstance(value, dict) and _PARAMETERS in value:
+            yield name, value[_PARAMETERS]
+        else:
+            yield from _sections(value, name)
+
+
+def _flatten(tree: Any, file: str) -> dict[str, Any]:
+    """
+    Return parameters by their full names.
+
+    :raises Trouble: one stands twice, once with its group and once below it.
+    """
+    found: dict[str, Any] = {}
+    for key, value in tree.items() if isinstance(tree, dict) else ():
+        below = _flatten(value, file) if isinstance(value, dict) else {'': value}
+        for name, item in below.items():
+            full = f'{key}.{name}' if name else str(key)
+            if full in found:
+                raise Trouble(f'{file} is no parameter file: {full} stands twice in it')
+            found[full] = item
+    return found
+
+
+def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Value], list[str]]:
+    """
+    Tell the parameters of the drive from those of the node; the latter have no group.
+
+    :raises Trouble: some have no value that a parameter can have; all of those are listed.
+    """
+    own = [name for name in parameters if '.' not in name or name.startswith(_ROS_OWN)]
+    drive = {name: value for name, value in parameters.items() if name not in own}
+    strange = [name for name, value in drive.items() if not isinstance(value, Value)]
+    if strange:
+        raise Trouble(listed('these have no value that a parameter can have:', strange))
+    return drive, own
+
+
+def _scalar(value: Value) -> str:
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        # neither an exponent nor a missing point: YAML and ROS do not take either for a double
+        text = f'{Decimal(repr(value)):f}'
+        return text if '.' in text else f'{text}.0'
+    if isinstance(value, str):
+        return "'" + value.replace("'", "''") + "'"
+    return str(value)
+
+
+def _one_line(text: str) -> str:
+    """Return a text of which nothing can be taken for more than a line of a comment."""
+    return ' '.join(''.join(c if c.isprintable() else ' ' for c in text).split())

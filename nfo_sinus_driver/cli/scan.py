@@ -1,0 +1,130 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verb ``scan``: who answers on the line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+import copy
+import json
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.cli.progress import progress
+from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.session import BAUD_RATE
+from nfo_sinus_driver.cli.session import CHAR_FORMAT
+from nfo_sinus_driver.cli.session import Remote
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link.settings import BAUD_RATES
+
+#: Those of Modbus RTU [M0 §6.2.2], the likeliest first.
+_FORMATS = ('8E1', '8O1', '8N2')
+_LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
+#: The columns and their widths.
+_COLUMNS = (
+    ('address', 7),
+    ('line', 10),
+    ('product', 20),
+    ('firmware', 11),
+    ('serial number', 0),
+)
+_ADVICE = (
+    'nobody answers: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
+    'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
+    'A and B of the wires'
+)
+
+
+def scan(options: argparse.Namespace) -> int:
+    """Find out who answers on the line."""
+    assert set(_LIKELIEST) == set(BAUD_RATES)
+    lines = _lines(options)
+    found: dict[int, dict[str, str]] = {}
+    with progress('scanning', len(lines) * len(options.addresses)) as step:
+        for baud_rate, char_format in lines:
+            line = copy.copy(options)
+            line.baud_rate, line.char_format = baud_rate, char_format
+            asked = [address for address in options.addresses if address not in found]
+            for _ in range(len(options.addresses) - len(asked)):
+                step()
+            for address, facts in _who_answers(line, asked, step):
+                facts['line'] = f'{baud_rate} {char_format}'
+                if not found and not options.json:
+                    put(_row({name: name for name, _ in _COLUMNS}))
+                found[address] = facts
+                if not options.json:
+                    put(_row({'address': f'{address:>7}', **facts}))
+    if options.json:
+        drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
+        put(json.dumps(drives, ensure_ascii=False, indent=2))
+    if not found:
+        raise Trouble(_ADVICE)
+    return 0
+
+
+def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
+    if options.all_settings:
+        return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in _FORMATS]
+    return [(options.baud_rate or BAUD_RATE, options.char_format or CHAR_FORMAT)]
+
+
+def _who_answers(
+    options: argparse.Namespace, addresses: Sequence[int], step: Callable[[], None]
+) -> Iterator[tuple[int, dict[str, str]]]:
+    """Ask one address after the other, as one line is set."""
+    with Session(options) as session:
+        for address in addresses:
+            facts = _ask(session.drive(address))
+            step()
+            if facts is not None:
+                yield address, facts
+
+
+def _ask(drive: Remote) -> dict[str, str] | None:
+    """
+    Return who answers at an address.
+
+    :raises DriveError: the port cannot be used.
+    """
+    try:
+        drive.do(lambda: drive.registers.read_words('fieldbus.inv_st', Priority.POLL, once=True))
+        identity = drive.identify()
+    except DriveError as error:
+        cause = error.__cause__
+        if isinstance(cause, PortError):
+            raise
+        if isinstance(cause, Refused):
+            return {'product': f'no {drive.model.name}?', 'firmware': '', 'serial number': ''}
+        if not isinstance(cause, NoAnswer):
+            remark(str(error))
+        return None
+    return {
+        'product': identity.model or drive.model.name,
+        'firmware': identity.versions,
+        'serial number': identity.serial,
+    }
+
+
+def _row(facts: dict[str, str]) -> str:
+    return '  '.join(f'{facts[name]:<{width}}' for name, width in _COLUMNS).rstrip()

@@ -1,0 +1,195 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One line, open, and the drives on it: read by this tool, and written only when told to."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Coroutine
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.cli.progress import progress
+from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Identity
+from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.link import LineSettings
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import open_link
+
+_T = TypeVar('_T')
+#: The factory settings of a Modbus line [M0 §6.2.2].
+BAUD_RATE = 19200
+CHAR_FORMAT = '8E1'
+
+
+class Remote:
+    """
+    One drive at the other end of the line.
+
+    It is never connected to as the driver does, which takes a run command back: a drive that runs
+    runs on. What takes time raises :class:`DriveError` when it fails.
+    """
+
+    def __init__(self, bus: Bus, settings: DriveSettings) -> None:
+        self._bus = bus
+        self.address = settings.address
+        self.model: Model = load_model(settings.model)
+        self.registers = Registers(bus, settings.address, self.model, settings.retries)
+        self.inverter = Inverter(self.model, self.registers, self, settings)
+        self.parameters = Parameters(bus, self.inverter, self.registers, self._run, self._count)
+        self._step: Callable[[], None] = lambda: None
+
+    def __str__(self) -> str:
+        return f'the drive at address {self.address}'
+
+    def do(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
+        """Run a coroutine on the bus and return its result."""
+        return self._run(command).result()
+
+    def identify(self, *, thoroughly: bool = True) -> Identity:
+        """
+        Find out who answers.
+
+        :param thoroughly: also ask for model and serial number.
+        """
+
+        async def ask() -> Identity:
+            identity = await self.inverter.identify()
+            return await self.inverter.introduce() if thoroughly else identity
+
+        try:
+            return self.do(ask)
+        except DriveError as error:
+            if not isinstance(error.__cause__, Refused):
+                raise
+            raise DriveError(
+                f'{self} answers, but not as a {self.model.name} does ({error}): is --model right?'
+            ) from error.__cause__
+
+    def look(self) -> InverterStatus:
+        """Read the status, without acknowledging anything."""
+        return self.do(lambda: self.inverter.look(Priority.SERVICE))
+
+    def read(self, only: Collection[str] | None = None) -> Mapping[str, Value]:
+        """Read the settings of the drive, or some of them, and return those that it has."""
+        keys = self.parameters.available(only)
+        if not self.model.settings:
+            raise Trouble(f'of a {self.model.name} no settings are known')
+        with progress(f'reading {self}', len(keys)) as self._step:
+            self.parameters.read(only).result()
+        return self.parameters.values
+
+    def measure(self, key: str) -> Value:
+        """Read one value."""
+        return self.do(lambda: self.registers.read(key, Priority.SERVICE))
+
+    def _run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
+        return self._bus.run(self._explained(command))
+
+    async def _explained(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
+        known = self.inverter.identity is not None
+        try:
+            return await command()
+        except LinkError as error:
+            raise DriveError(explain(error, self.address, known=known)) from error
+        except Cancelled:
+            raise DriveError('the line was closed') from None
+
+    def _count(self, keys: Collection[str]) -> None:
+        for _ in keys:
+            self._step()
+
+    # --- what the layers below have to tell ---------------------------------------------------
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        """Pass on what a person has to know."""
+        if severity is not Severity.INFO:
+            remark(text)
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        """Nothing: nobody polls."""
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Nothing: nobody polls."""
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        """Nothing: the values are looked at when all are read."""
+
+
+class Session:
+    """
+    The line that the options name, open while the ``with`` block lasts.
+
+    :param writes: whether drives on it may be written to; without it they are only read.
+    :raises UsageError: an option that can never work.
+    """
+
+    def __init__(self, options: argparse.Namespace, *, writes: bool = False) -> None:
+        self._options = options
+        self._writes = writes
+        try:
+            line = LineSettings(
+                baud_rate=options.baud_rate or BAUD_RATE,
+                char_format=options.char_format or CHAR_FORMAT,
+                response_timeout=options.response_timeout,
+            )
+            self._bus = Bus(open_link(options.protocol, options.port, line))
+            self._settings(options.address)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+
+    def __enter__(self) -> Session:
+        self._bus.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bus.close()
+
+    def drive(self, address: int | None = None) -> Remote:
+        """Return the drive at an address, or at the one that the options name; nothing is sent."""
+        return Remote(self._bus, self._settings(address or self._options.address))
+
+    def _settings(self, address: int) -> DriveSettings:
+        options = self._options
+        return DriveSettings(
+            address=address,
+            model=options.model,
+            control_method='mode_scmd' if self._writes else 'monitor',
+            retries=options.retries,
+            allow_communication_changes=getattr(options, 'allow_communication_changes', False),
+        )

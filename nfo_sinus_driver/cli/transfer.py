@@ -1,0 +1,186 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verbs ``dump`` and ``load``: from a drive into a file, and from a file into a drive."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from datetime import datetime
+from importlib import metadata
+
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.cli.loading import Loading
+from nfo_sinus_driver.cli.parameter_file import ParameterFile
+from nfo_sinus_driver.cli.parameter_file import format_file
+from nfo_sinus_driver.cli.parameter_file import read_file
+from nfo_sinus_driver.cli.parameter_file import write_file
+from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.session import Remote
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import listed
+from nfo_sinus_driver.cli.values import is_barred
+from nfo_sinus_driver.cli.values import require_names
+from nfo_sinus_driver.cli.values import same
+from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.drive import Identity
+from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.link import Words
+
+_NOTHING = ', nothing was written'
+
+
+def dump(options: argparse.Namespace) -> int:
+    """Save all settings of the drive."""
+    with Session(options) as session:
+        drive = session.drive()
+        identity = drive.identify()
+        values = drive.read()
+        lost = [key for key in drive.parameters.words if key not in values]
+    write_file(options.file, format_file(_header(drive, identity), values, drive.model))
+    where = '' if options.file == '-' else f' saved in {options.file}'
+    remark(f'{len(values)} parameters of {drive}, {identity}{where}')
+    if lost:
+        remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
+    return int(bool(lost))
+
+
+def load(options: argparse.Namespace) -> int:
+    """Put saved settings into the drive; only what differs is written."""
+    file = read_file(options.file)
+    # what another model has is refused before anything is asked of the drive
+    settings = {parameter.key for parameter in load_model(options.model).settings}
+    require_names(file.values, settings, options.model, _NOTHING)
+    with Session(options, writes=not options.dry_run) as session:
+        drive = session.drive()
+        identity = drive.identify()
+        for note in _notes(file, drive, identity):
+            remark(note)
+        values = drive.read(file.values)
+        require_names(file.values, drive.parameters.words, str(drive), _NOTHING)
+        words = _differing(file, drive, options)
+        for key in words:
+            new = drive.registers.value(key, words[key])
+            put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
+        count = 'one parameter' if len(words) == 1 else f'{len(words)} parameters'
+        if not words:
+            remark(f'nothing to write: {drive} has all of it already')
+            return 0
+        _require_standstill(drive, words)
+        if options.dry_run:
+            remark(f'a dry run: {count} would be written, nothing was')
+            return 0
+        Loading(drive, words, options).run()
+    remark(f'{count} written and read back')
+    return 0
+
+
+def _header(drive: Remote, identity: Identity) -> dict[str, str]:
+    try:
+        version = metadata.version('nfo_sinus_driver')
+    except metadata.PackageNotFoundError:
+        version = ''
+    return {
+        'model': drive.model.name,
+        'product': identity.model,
+        'firmware': identity.versions,
+        'serial number': identity.serial,
+        'address': str(drive.address),
+        'date': f'{datetime.now().astimezone():%Y-%m-%d %H:%M:%S %z}',
+        'written by': f'nfo-sinus {version}'.strip(),
+    }
+
+
+def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
+    """Return what a person should know before a file goes into a drive."""
+    notes = []
+    if file.skipped:
+        notes.append(f'left out, for the drive has none such: {", ".join(file.skipped)}')
+    saved = file.header
+    if saved.get('model', drive.model.name) != drive.model.name:
+        notes.append(f'{file.name} is of a {saved["model"]}, this is a {drive.model.name}')
+    serial = saved.get('serial number', '')
+    if serial and identity.serial and serial != identity.serial:
+        notes.append(f'cloning from serial number {serial} to {identity.serial}')
+    product = saved.get('product', '')
+    if product and identity.model and product != identity.model:
+        notes.append(f'{file.name} is of a {product}, this is a {identity.model}')
+    if saved.get('firmware', identity.versions) != identity.versions:
+        notes.append(f'saved with firmware {saved["firmware"]}, this one has {identity.versions}')
+    return notes
+
+
+def _differing(
+    file: ParameterFile, drive: Remote, options: argparse.Namespace
+) -> dict[str, Words]:
+    """
+    Return what has to be written.
+
+    :raises Trouble: the drive cannot have some of it, or it may not be changed; all is listed.
+    """
+    found: dict[str, Words] = {}
+    wrong, kept = [], []
+    for key, value in file.values.items():
+        if same(value, drive.parameters.values.get(key)):
+            continue
+        try:
+            words = drive.registers.words(key, value)
+            if words == drive.parameters.words[key]:
+                continue
+            if is_barred(key, options):
+                kept.append(key)
+                continue
+            if not options.dry_run:
+                drive.parameters.admit(key, value)
+        except (ParameterError, ValueError) as error:
+            wrong.append(str(error))
+        else:
+            found[key] = words
+    if wrong:
+        raise Trouble(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
+    if kept:
+        remark(_left_as_it_is(file, drive, kept))
+    return found
+
+
+def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
+    lines = [
+        f'{key}: {shown(drive.parameters.values.get(key), "")}, not {shown(file.values[key], "")}'
+        for key in keys
+    ]
+    head = 'settings of the line stay as they are without --allow-communication-changes:'
+    return listed(head, lines)
+
+
+def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
+    """Return what the drive has, as words where they mean nothing."""
+    words = ' '.join(f'{word:04X}h' for word in drive.parameters.words[key])
+    return values.get(key, words)
+
+
+def _require_standstill(drive: Remote, words: Mapping[str, Words]) -> None:
+    """
+    See to it that what only a standing motor allows is not tried while it runs.
+
+    :raises Trouble: it runs.
+    """
+    keys = [key for key in words if drive.model[key].stopped]
+    if keys and drive.look().driven:
+        head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
+        raise Trouble(listed(head, keys))

@@ -1,0 +1,137 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verb ``monitor``: what the drive does, again and again; it only reads."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from datetime import datetime
+import itertools
+import json
+import math
+import shutil
+import sys
+import time
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.session import Remote
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+
+#: What is measured: its name, as in the messages of the driver, its width and its decimals.
+_VALUES = {
+    'status.frq_act': ('frequency', 6, 1),
+    'status.spd_act': ('speed', 5, 0),
+    'status.i_rms': ('output_current', 6, 2),
+    'status.u_rms': ('output_voltage', 4, 0),
+    'status.p_out': ('output_power', 5, 0),
+    'status.trq_act': ('torque', 4, 0),
+    'status.dc_link': ('dc_link_voltage', 4, 0),
+}
+_CLEAR_LINE = '\r\x1b[K'
+
+
+def monitor(options: argparse.Namespace) -> int:
+    """Show what the drive does until somebody ends it."""
+    live = sys.stdout.isatty() and not options.json
+    answered = False
+    with Session(options) as session:
+        drive = session.drive()
+        drive.identify(thoroughly=False)
+        try:
+            for turn in itertools.count(1):
+                started = time.monotonic()
+                answered = _show(drive, live=live, as_json=options.json)
+                if turn == options.count:
+                    break
+                time.sleep(max(0.0, started + options.period - time.monotonic()))
+        except KeyboardInterrupt:
+            # this is how one ends it
+            answered = True
+        finally:
+            if live:
+                print()
+    return int(not answered)
+
+
+def _show(drive: Remote, *, live: bool, as_json: bool) -> bool:
+    """Print one line; return whether the drive answered."""
+    now = datetime.now().astimezone()
+    try:
+        seen, values = drive.do(lambda: _measure(drive))
+    except DriveError as error:
+        if isinstance(error.__cause__, PortError):
+            raise
+        facts: dict[str, object] = {'connected': False}
+        text = str(error)
+        answered = False
+    else:
+        facts = _facts(drive, seen, values)
+        text = _line(drive, values)
+        answered = True
+    if as_json:
+        put(json.dumps({'time': now.isoformat(), **facts}, ensure_ascii=False))
+        return answered
+    text = f'{now:%H:%M:%S}  {text}'
+    if live:
+        width = shutil.get_terminal_size().columns - 1
+        print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)
+    else:
+        put(text)
+    return answered
+
+
+async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[str, float]]:
+    seen = await drive.inverter.look(Priority.POLL, once=True)
+    values = dict.fromkeys(_VALUES, math.nan)
+    for key in filter(drive.registers.reaches, _VALUES):
+        try:
+            values[key] = await drive.registers.read_number(key, Priority.POLL, once=True)
+        except Refused:
+            # it has none
+            continue
+    return seen, values
+
+
+def _facts(
+    drive: Remote, seen: InverterStatus, values: Mapping[str, float]
+) -> dict[str, object]:
+    measured = {
+        name: None if math.isnan(values[key]) else values[key]
+        for key, (name, _, _) in _VALUES.items()
+    }
+    return {
+        'connected': True,
+        'code': seen.code,
+        'text': drive.inverter.text,
+        'kind': drive.inverter.kind.value,
+        'state': seen.state.name,
+        **measured,
+    }
+
+
+def _line(drive: Remote, values: Mapping[str, float]) -> str:
+    cells = [f'{drive.inverter.describe():<18}']
+    for key, (_, width, decimals) in _VALUES.items():
+        value = values[key]
+        number = '-' if math.isnan(value) else f'{value:.{decimals}f}'
+        unit = drive.model[key].unit if key in drive.model else ''
+        cells.append(f'{number:>{width}} {unit}')
+    return '  '.join(cells)

@@ -1,0 +1,170 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A simulated line, and what was said on it; the command as a process of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+import os
+from pathlib import Path
+import pty
+import re
+import select
+import subprocess
+import sys
+import time
+from typing import Any
+from typing import NamedTuple
+
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.simulator import Simulator
+
+ROOT = Path(__file__).resolve().parents[3]
+#: No honest wait takes this long, on any machine, s.
+PATIENCE = 60.0
+#: The functions that write [M0 §6.2.3].
+WRITES = {6, 16, 23}
+_COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+
+
+class Done(NamedTuple):
+    """How the command ended and what it said."""
+
+    status: int
+    out: str
+    err: str
+
+
+class Bench:
+    """Simulated drives at addresses 1 and 2, with a trace of all that is said."""
+
+    def __init__(self, trace: Path, **options: Any) -> None:
+        self._trace = trace
+        options.setdefault('serial_numbers', ['NFO1001', 'NFO1002'])
+        self.simulator = Simulator([1, 2], trace=str(trace), boot_time=0.1, **options)
+        self.options = ('--port', self.simulator.port, '--response-timeout', '2.0')
+
+    def __enter__(self) -> Bench:
+        self.simulator.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.simulator.__exit__(*error)
+
+    def drive(self, address: int = 1) -> SimulatedDrive:
+        return self.simulator.drives[address]
+
+    def value(self, key: str, address: int = 1) -> object:
+        """What a drive has."""
+        with self.simulator.lock:
+            return self.drive(address).peek(key)
+
+    def set(self, key: str, value: object, address: int = 1) -> None:
+        """Change a parameter at the keypad."""
+        self.simulator.inject('set', key, value, address=address)
+
+    def writes(self) -> list[bytes]:
+        """Every request so far that writes."""
+        lines = self._trace.read_text(encoding='utf-8').splitlines(keepends=True)
+        frames = [json.loads(line) for line in lines if line.endswith('\n')]
+        requests = [bytes.fromhex(f['hex']) for f in frames if f['direction'] == 'request']
+        assert requests
+        return [request for request in requests if request[1] in WRITES]
+
+    def on_write(self, key: str, act: Callable[[], None], address: int = 1) -> None:
+        """Let something happen just before the bus writes a parameter, every time."""
+        drive = self.drive(address)
+        write_raw = drive.write_raw
+
+        def write(written: str, raw: int) -> None:
+            if written == key:
+                act()
+            write_raw(written, raw)
+
+        drive.write_raw = write  # type: ignore[method-assign]
+
+    def on_read(self, key: str, act: Callable[[], None], address: int = 1) -> None:
+        """Let something happen just before the bus reads a parameter, every time."""
+        drive = self.drive(address)
+        read_raw = drive.read_raw
+
+        def read(asked: str) -> int:
+            if asked == key:
+                act()
+            return read_raw(asked)
+
+        drive.read_raw = read  # type: ignore[method-assign]
+
+    def refuse(self, key: str, reason: Reason = Reason.VALUE) -> None:
+        """Let a drive refuse a parameter whatever its value."""
+
+        def act() -> None:
+            raise Refused(reason, 'refused by the test')
+
+        self.on_write(key, act)
+
+    def run(self, *arguments: object, text: str | None = None) -> Done:
+        """Run the command as a process of its own."""
+        done = subprocess.run(
+            [*_COMMAND, *self.options, *map(str, arguments)],
+            cwd=ROOT,
+            input=text,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    def begin(self, *arguments: object) -> subprocess.Popen[str]:
+        """Begin to run it."""
+        return subprocess.Popen(
+            [*_COMMAND, *self.options, *map(str, arguments)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def on_terminal(self, *arguments: object, ask: str = '', answer: str = '') -> Done:
+        """Run it on a terminal, and answer what it asks."""
+        process, terminal = pty.fork()
+        if not process:
+            os.chdir(ROOT)
+            os.environ['TERM'] = 'xterm'
+            command = [*_COMMAND, *self.options, *map(str, arguments)]
+            os.execv(command[0], command)
+        said = ''
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            wait = deadline - time.monotonic()
+            assert wait > 0 and select.select([terminal], [], [], wait)[0], said
+            try:
+                data = os.read(terminal, 4096)
+            except OSError:
+                # how a terminal of Linux ends
+                data = b''
+            if not data:
+                break
+            said += data.decode(errors='replace')
+            if ask and ask in said:
+                os.write(terminal, answer.encode())
+                ask = ''
+        os.close(terminal)
+        status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        return Done(status, re.sub(r'[^\n]*\r(?!\n)', '', said.replace('\r\n', '\n')), said)

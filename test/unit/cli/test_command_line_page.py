@@ -1,0 +1,66 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page on the command line says everything that may be typed."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+import pytest
+
+from nfo_sinus_driver.cli import options
+from nfo_sinus_driver.cli.main import VERBS
+
+PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'command_line.md'
+
+
+def rows() -> Iterator[tuple[str, str]]:
+    """What stands as code in the first column of a table, and the row."""
+    for line in PAGE.read_text(encoding='utf-8').splitlines():
+        if line.startswith('| `'):
+            for span in re.findall(r'`([^`]+)`', line.split('|')[1]):
+                yield span, line
+
+
+def verb_parsers() -> dict[str, argparse.ArgumentParser]:
+    """The parsers of the verbs, by name."""
+    for action in options._parser()._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return dict(action.choices)
+    raise AssertionError('there are no verbs')
+
+
+def test_every_verb_can_be_typed_and_stands_in_the_page() -> None:
+    assert set(verb_parsers()) == set(VERBS)
+    assert set(VERBS) <= {span.split()[0] for span, _ in rows()}
+
+
+@pytest.mark.parametrize('verb', VERBS)
+def test_every_option_stands_in_the_page(verb: str) -> None:
+    written = {word.strip('[]') for span, _ in rows() for word in span.split()}
+    for action in verb_parsers()[verb]._actions:
+        assert action.help
+        for option in action.option_strings:
+            assert option in ('-h', '--help') or option in written
+
+
+@pytest.mark.parametrize(('name', 'default'), options.DEFAULTS.items())
+def test_every_default_stands_in_the_page(name: str, default: object) -> None:
+    option = f'--{name.replace("_", "-")}'
+    row = next(line for span, line in rows() if span.split()[0] == option)
+    assert row.split('|')[2].strip().strip('`').startswith(str(default))

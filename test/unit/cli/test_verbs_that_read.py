@@ -1,0 +1,283 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``info``, ``list``, ``get``, ``scan``, ``monitor``: what they print, and that they only read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+import signal
+
+from cli_bench import Bench
+from cli_bench import Done
+import pytest
+
+from nfo_sinus_driver.catalog import load_model
+
+Nfo = Callable[..., Done]
+G2 = load_model('sinus_g2')
+REACHED = [parameter for parameter in G2.settings if len(parameter.places) == 2]
+
+
+def test_info(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('info')
+    assert done.status == 0 and done.err == ''
+    words = dict(line.split(maxsplit=1) for line in done.out.splitlines())
+    assert words['product'] == 'NFO Sinus 1.50/400'
+    assert words['firmware'] == '4.38 / 4018'
+    assert words['motor'] == '1.5 kW, 400 V, 50 Hz, 1440 rpm, 3.4 A'
+    assert 'NFO1001' in done.out
+    assert json.loads(nfo('info', '--address', 2, '--json').out)['serial number'] == 'NFO1002'
+    assert bench.writes() == []
+
+
+def test_list_shows_every_setting(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('list')
+    assert done.status == 0 and done.err == ''
+    lines = [line for line in done.out.splitlines() if line.startswith('  ')]
+    assert [line.split()[0] for line in lines] == [parameter.key for parameter in REACHED]
+    assert '\nControl\n' in done.out
+    table = json.loads(nfo('list', '--json').out)
+    assert table['motor.p_nom'] == {'value': 1.5, 'unit': 'kW'}
+    assert table['control.auto_start'] == {'value': False, 'unit': ''}
+    assert len(table) == len(REACHED)
+    assert bench.writes() == []
+
+
+@pytest.mark.parametrize('name', ['PI Reg', 'pi_reg'])
+def test_list_shows_one_group(nfo: Nfo, name: str) -> None:
+    keys = [parameter.key for parameter in REACHED if parameter.group == 'PI Reg']
+    assert list(json.loads(nfo('list', '--group', name, '--json').out)) == keys
+
+
+def test_list_shows_measured_values(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('list', '--group', 'status')
+    assert done.status == 0
+    assert 'status.dc_link' in done.out and '565 V' in done.out
+    assert bench.writes() == []
+
+
+def test_no_such_group(nfo: Nfo) -> None:
+    done = nfo('list', '--group', 'moter')
+    assert done.status == 1
+    assert "no group 'moter'" in done.err and 'Motor' in done.err
+
+
+def test_get(nfo: Nfo, bench: Bench) -> None:
+    bench.set('control.accel', 7.5)
+    done = nfo('get', 'control.accel', 'control.mode', 'status.dc_link')
+    assert done.status == 0
+    assert [line.split() for line in done.out.splitlines()] == [
+        ['control.accel', '7.5', 's'],
+        ['control.mode', 'Freque'],
+        ['status.dc_link', '565', 'V'],
+    ]
+    assert json.loads(nfo('get', 'control.accel', '--json').out) == {
+        'control.accel': {'value': 7.5, 'unit': 's'}
+    }
+    assert bench.writes() == []
+
+
+def test_get_names_what_is_not_there(nfo: Nfo) -> None:
+    done = nfo('get', 'accel', 'control.retard', 'fieldbus.inv_st_with_ack')
+    assert done.status == 1 and done.out == ''
+    assert 'accel (did you mean control.accel?)' in done.err
+    # reading it would acknowledge a fault
+    assert 'fieldbus.inv_st_with_ack' in done.err
+    assert 'control.retard' not in done.err.split('did you mean')[0]
+
+
+def test_options_stand_before_and_behind_the_verb(nfo: Nfo, bench: Bench) -> None:
+    bench.set('control.accel', 7.5, address=2)
+    assert '7.5' in nfo('--address', 2, 'get', 'control.accel').out
+    assert '7.5' in nfo('get', 'control.accel', '--address', 2).out
+    assert '7.5' in nfo('--address', 1, 'get', 'control.accel', '--address', 2).out
+    assert '7.5' not in nfo('get', 'control.accel').out
+
+
+def test_nobody_answers(nfo: Nfo) -> None:
+    done = nfo('info', '--address', 9, '--response-timeout', 0.1, '--retries', 0)
+    assert done.status == 1 and done.out == ''
+    assert 'nobody answers at address 9' in done.err
+
+
+def test_there_is_no_such_port(nfo: Nfo) -> None:
+    done = nfo('info', '--port', '/dev/no-such-port')
+    assert done.status == 1
+    assert '/dev/no-such-port does not exist' in done.err
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'text'),
+    [
+        (['scream'], 'invalid choice'),
+        ([], 'VERB'),
+        (['get'], 'NAME'),
+        (['info', '--address', '248'], '1 to 247'),
+        (['info', '--baud-rate', '300'], 'invalid choice'),
+        (['info', '--char-format', '8X1'], '8E1'),
+        (['info', '--port', '192.0.2.1:4001'], 'socket://192.0.2.1:4001'),
+        (['set', 'control.accel'], 'NAME=VALUE'),
+        (['set', 'control.accel=1', 'control.accel=2'], 'given twice'),
+        (['diff'], 'one file, or two, or --against'),
+        (['diff', 'a', '--against', '2'], 'one file, or two, or --against'),
+        (['diff', '--against', '1'], 'the same drive'),
+        (['scan', '--addresses', '5-3'], 'list of addresses'),
+        (['load', 'a', '--put-back', '--keep'], 'not allowed with'),
+    ],
+)
+def test_what_makes_no_sense_is_a_matter_of_usage(
+    nfo: Nfo, arguments: list[str], text: str
+) -> None:
+    done = nfo(*arguments)
+    assert done.status == 2 and done.out == ''
+    assert text in done.err
+
+
+# --- scan -----------------------------------------------------------------------------------------
+
+
+def test_scan_finds_who_answers(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('scan', '--addresses', '2-4,1', '--response-timeout', 0.5)
+    assert done.status == 0
+    rows = [line.split() for line in done.out.splitlines()]
+    assert rows[0][0] == 'address'
+    assert [row[0] for row in rows[1:]] == ['1', '2']
+    assert ' '.join(rows[1]) == '1 19200 8E1 NFO Sinus 1.50/400 4.38 / 4018 NFO1001'
+    assert bench.writes() == []
+
+
+def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
+    done = nfo(
+        'scan', '--addresses', '1-2', '--all-settings', '--json', '--response-timeout', 0.5
+    )
+    assert done.status == 0
+    found = json.loads(done.out)
+    # a pseudo-terminal has no baud rate, so that the first setting finds them
+    assert [(drive['address'], drive['line']) for drive in found] == [
+        (1, '19200 8E1'),
+        (2, '19200 8E1'),
+    ]
+
+
+def test_scan_finds_nobody(nfo: Nfo) -> None:
+    done = nfo('scan', '--addresses', '3-4', '--all-settings', '--response-timeout', 0.02)
+    assert done.status == 1 and done.out == ''
+    assert 'nobody answers' in done.err
+
+
+def test_scan_by_default_asks_all(nfo: Nfo) -> None:
+    done = nfo('scan', '--response-timeout', 0.01, '--json')
+    # some may have been too slow for it
+    assert all(drive['address'] in (1, 2) for drive in json.loads(done.out))
+
+
+# --- monitor --------------------------------------------------------------------------------------
+
+
+def test_monitor(nfo: Nfo, bench: Bench) -> None:
+    bench.simulator.inject('keypad', 'start', address=1)
+    done = nfo('monitor', '--count', 3, '--period', 0.05)
+    assert done.status == 0
+    lines = done.out.splitlines()
+    assert len(lines) == 3
+    assert all('31 ' in line and ' Hz ' in line for line in lines)
+    assert bench.writes() == []
+    assert bench.drive().ack_reads == 0
+    assert bench.drive().motor.driven
+
+
+def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    done = nfo('monitor', '--count', 1, '--json')
+    facts = json.loads(done.out)
+    assert facts['connected'] and facts['code'] == 5 and facts['kind'] == 'fault'
+    assert facts['frequency'] == 0.0
+    assert bench.writes() == []
+    assert bench.drive().inv_st == 5
+
+
+def test_monitor_tells_of_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> None:
+    bench.on_read('status.dc_link', lambda: bench.simulator.inject('silence', 60, address=1))
+    done = nfo('monitor', '--count', 3, '--period', 0.01, '--response-timeout', 0.3, '--json')
+    assert done.status == 1
+    assert [json.loads(line)['connected'] for line in done.out.splitlines()][-1] is False
+
+
+def test_monitor_ends_with_ctrl_c(bench: Bench) -> None:
+    process = bench.begin('monitor', '--period', 0.05)
+    assert process.stdout is not None
+    assert 'Hz' in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert said == ''
+    assert process.returncode == 0
+
+
+def test_monitor_is_one_line_on_a_terminal(bench: Bench) -> None:
+    done = bench.on_terminal('monitor', '--count', 3, '--period', 0.05)
+    assert done.status == 0
+    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 1
+
+
+# --- the port -------------------------------------------------------------------------------------
+
+
+def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
+    holder = bench.begin('monitor', '--period', 0.05)
+    assert holder.stdout is not None
+    assert 'Hz' in holder.stdout.readline()
+    try:
+        for arguments in (['info'], ['scan'], ['diff', '--against', 2], ['set', 'control.accel=7']):
+            done = nfo(*arguments)
+            assert done.status == (2 if arguments[0] == 'diff' else 1)
+            assert 'in use by' in done.err and f'(pid {holder.pid})' in done.err
+            assert done.out == ''
+    finally:
+        holder.kill()
+        holder.communicate()
+
+
+def test_output_that_nobody_reads(bench: Bench) -> None:
+    process = bench.begin('monitor', '--period', 0.05)
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.wait(60) == 1
+    assert process.stderr.read() == ''
+    process.stderr.close()
+
+
+# --- another family -------------------------------------------------------------------------------
+
+
+def test_an_optimal(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(model='sinus_optimal', serial_numbers=[])
+    optimal = ('--model', 'sinus_optimal')
+    facts = json.loads(bench.run('info', '--json', *optimal).out)
+    assert facts['model'] == 'sinus_optimal' and facts['state'] == 'ready to switch on'
+    assert bench.run('list', '--group', 'status', *optimal).status == 0
+    done = bench.run('monitor', '--count', 1, '--json', *optimal)
+    assert json.loads(done.out)['frequency'] == 0.0 and json.loads(done.out)['torque'] is None
+    for verb in ('list', 'dump'):
+        done = bench.run(verb, *optimal)
+        assert done.status == 1 and done.out == ''
+        assert 'of a sinus_optimal no settings are known' in done.err
+    done = bench.run('info')
+    assert done.status == 1
+    assert 'not as a sinus_g2 does' in done.err and '--model' in done.err
+    done = bench.run('scan', '--addresses', '1')
+    assert done.status == 0 and 'no sinus_g2?' in done.out
+    assert bench.writes() == []

@@ -1,0 +1,147 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every way of control does the same, on each model: run, stop, release, acknowledge."""
+
+from __future__ import annotations
+
+from drive_rig import PATIENCE
+from drive_rig import MakeRig
+from drive_rig import Rig
+from drive_rig import wait_until
+import pytest
+
+from nfo_sinus_driver.drive import DriveError
+
+OVERLOAD = 5
+
+#: Model, control method, and where the reference comes from.
+WAYS = [
+    ('sinus_g2', 'mode_scmd', 'fieldbus'),
+    ('sinus_g2', 'mode_scmd', 'terminal'),
+    ('sinus_g2', 'mode_scmd', 'fix3'),
+    ('sinus_g2', 'mode_scmd', 'fix3_reverse'),
+    ('sinus_g2', 'drive_control', 'fieldbus'),
+    ('sinus_g2', 'drive_control', 'terminal'),
+    ('sinus_optimal', 'mode_scmd', 'fieldbus'),
+    ('sinus_optimal', 'mode_scmd', 'terminal'),
+    ('sinus_optimal', 'drive_control', 'terminal'),
+]
+pytestmark = pytest.mark.usefixtures('hasty')
+
+
+@pytest.fixture(params=WAYS, ids=' '.join)
+def rig(request: pytest.FixtureRequest, make_rig: MakeRig) -> Rig:
+    model, method, reference = request.param
+    return make_rig(model=model, control_method=method, reference=reference)
+
+
+def turn(rig: Rig) -> None:
+    """Enable and let it turn, by set-points where they count."""
+    rig.connect()
+    assert rig.enable().startswith('enabled')
+    if rig.drive.settings.follows_setpoints:
+        rig.publish(20.0)
+    wait_until(lambda: abs(rig.far.motor.frequency) > 10.0)
+
+
+def test_it_turns_and_stops(rig: Rig) -> None:
+    turn(rig)
+    reverse = rig.drive.settings.reference.endswith('reverse')
+    assert (rig.far.motor.frequency < 0) is reverse
+    assert rig.drive.stop().result(PATIENCE).startswith('stopping: it ramps down')
+    rig.wait_until_still()
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven
+    assert rig.enable().startswith('enabled')
+    wait_until(lambda: rig.far.motor.driven)
+
+
+def test_quick_stop(rig: Rig) -> None:
+    turn(rig)
+    answer = rig.drive.quick_stop().result(PATIENCE)
+    if rig.drive.settings.model == 'sinus_optimal':
+        assert 'no quick stop' in answer
+    else:
+        assert answer == 'released: the motor coasts'
+    rig.wait_until_still()
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven and not rig.drive.armed
+    wait_until(lambda: rig.far.motor.at_zero)
+    assert rig.enable().startswith('enabled')
+
+
+def test_fault_stops_and_nothing_starts_by_itself(rig: Rig) -> None:
+    turn(rig)
+    rig.simulator.inject('fault', OVERLOAD)
+    wait_until(lambda: not rig.drive.armed)
+    assert rig.notes.told('fault 5 Overload')
+    rig.acknowledged = 1
+    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    wait_until(lambda: not rig.far.faults)
+    # a run command that it did not let go of while the fault stood is taken back now
+    rig.wait_until_still()
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven
+    assert rig.enable().startswith('enabled')
+    wait_until(lambda: rig.far.motor.driven)
+
+
+def test_run_input_lost_and_back(rig: Rig) -> None:
+    turn(rig)
+    rig.simulator.inject('run', False)
+    wait_until(lambda: not rig.drive.armed)
+    assert rig.notes.told('RUN input')
+    rig.wait_until_still()
+    rig.simulator.inject('run', True)
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven
+    assert rig.enable().startswith('enabled')
+
+
+def test_without_the_run_input_it_is_not_enabled(rig: Rig) -> None:
+    rig.connect()
+    rig.simulator.inject('run', False)
+    assert 'RUN input' in rig.refused(rig.drive.enable())
+    rig.simulator.inject('run', True)
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven
+
+
+def test_release_gives_control_back_and_starts_nothing(rig: Rig) -> None:
+    turn(rig)
+    answer = rig.drive.disconnect(PATIENCE).result(PATIENCE)
+    assert answer.startswith('stop')
+    wait_until(lambda: rig.far.motor.at_zero)
+    assert not rig.far.motor.driven
+
+
+def test_drive_that_restarts_stays_still(rig: Rig) -> None:
+    turn(rig)
+    rig.simulator.inject('power-cycle', 0.3)
+    wait_until(lambda: not rig.drive.armed)
+    wait_until(lambda: rig.drive.snapshot.connected)
+    rig.next_snapshots(5)
+    assert not rig.far.motor.driven
+    assert rig.enable().startswith('enabled')
+
+
+def test_set_points_are_refused_where_they_do_not_count(rig: Rig) -> None:
+    if rig.drive.settings.follows_setpoints:
+        pytest.skip('they do here')
+    turn(rig)
+    with pytest.raises(DriveError, match=f'reference is {rig.drive.settings.reference}'):
+        rig.drive.set_setpoint(1.0)
+    # nobody misses them either
+    assert rig.drive.armed
