@@ -28,7 +28,6 @@ from collections import deque
 from collections.abc import Callable
 from collections.abc import Coroutine
 from concurrent.futures import Future
-import ctypes
 import functools
 import logging
 import math
@@ -55,6 +54,7 @@ from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
+from nfo_sinus_driver.timers import tighten_timers
 from nfo_sinus_driver.turns import Turns
 from nfo_sinus_driver.turns import Waiting
 
@@ -66,7 +66,6 @@ _T = TypeVar('_T')
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
 
-_PR_SET_TIMERSLACK = 29
 _NOWHERE = Address((), 0)
 
 
@@ -263,7 +262,7 @@ class Bus:
             self._take_in()
 
     def _work(self) -> None:
-        _tighten_timers()
+        tighten_timers()
         while not self._stopping:
             try:
                 self._work_once()
@@ -442,12 +441,3 @@ def _log_unexpected(future: Future[Any]) -> None:
     error = future.exception()
     if error is not None and not isinstance(error, (Cancelled, LinkError)):
         _log.error('a job on the bus failed', exc_info=error)
-
-
-def _tighten_timers() -> None:
-    """Have this thread woken when it asked to be, not 50 microseconds later."""
-    try:
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    except (OSError, AttributeError):
-        # only a little precision is lost
-        return

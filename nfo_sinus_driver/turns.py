@@ -60,9 +60,9 @@ class Turns:
 
     A stop goes first and a set-point in a slot next, so either waits for the transaction on the
     line and no other. The background, TELEMETRY and REFRESH, goes ahead of all else as long as it
-    is owed its share of the time; who is owed more goes first. Set-points may come faster than the line can
-    carry them, and who then no longer polls does not see the fault that should stop the motor: so
-    after each of them something else has a turn, the background's share included.
+    is owed its share of the time; who is owed more goes first. Set-points may come faster than the
+    line can carry them, and who then no longer polls does not see the fault that should stop the
+    motor: so after each of them something else has a turn, the background's share included.
     """
 
     def __init__(self) -> None:

@@ -39,9 +39,9 @@ from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
-from nfo_sinus_driver.drive.parameter_writer import describe_drift
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.wanted_state import WantedState
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
@@ -89,7 +89,7 @@ class Parameters:
         self._keys: tuple[str, ...] = ()
         self._words: dict[str, Words] = {}
         self._values: dict[str, Value] = {}
-        self._wanted: dict[str, Value] = {}
+        self._wanted = WantedState(self, inverter)
         self._turn = Lock(bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()
@@ -118,12 +118,12 @@ class Parameters:
     @property
     def drift(self) -> tuple[Change, ...]:
         """What the drive has otherwise than it was wanted, as wanted -> what it has."""
-        words, values = self._words, self._values
-        return tuple(
-            Change(key, wanted, self._writer.value(key, words[key]), self._inverter.model[key].unit)
-            for key, wanted in self._wanted.items()
-            if key in words and values.get(key) != wanted
-        )
+        return self._wanted.drift
+
+    def describe(self, key: str, before: Value, words: Words) -> Change:
+        """Return the difference between a value and what words mean."""
+        unit = self._inverter.model[key].unit
+        return Change(key, before, self._writer.value(key, words), unit)
 
     def exact(self, key: str, value: Value) -> Value:
         """
@@ -198,7 +198,7 @@ class Parameters:
 
         :param write: false to report only.
         """
-        return self._run(lambda: self._apply(wanted, write))
+        return self._run(lambda: self._wanted.apply_now(wanted, write=write))
 
     # --- on the bus ---------------------------------------------------------------------------
 
@@ -309,7 +309,7 @@ class Parameters:
                 if not hint:
                     raise
                 raise ParameterError(f'{error}; {hint}', error.left) from error
-            self._wanted.update((key, exact[key]) for key in exact if key in self._wanted)
+            self._wanted.follow(exact)
             written = {change.key for change in changes}
             for key in words:
                 self._learn(key, words[key], quiet=key in written)
@@ -371,35 +371,6 @@ class Parameters:
         changed = [key for key in keys if before.get(key) != self._values.get(key)]
         return f'{len(keys)} parameters read, changed: {", ".join(changed) or "none"}'
 
-    async def _apply(self, wanted: Mapping[str, Value], write: bool) -> None:
-        inverter = self._inverter
-        here = {key: value for key, value in wanted.items() if key in self._words}
-        self._wanted = {key: self.exact(key, value) for key, value in here.items()}
-        missing = [key for key in wanted if key not in here]
-        if missing:
-            inverter.tell(
-                Severity.WARNING, f'this drive has no {", ".join(missing)}: not applied'
-            )
-        drifts = self.drift
-        while drifts:
-            refused: list[ParameterError] = []
-            for drift in drifts:
-                if not write:
-                    inverter.tell(Severity.WARNING, describe_drift(drift))
-                    continue
-                try:
-                    await self.change_now(
-                        {drift.key: drift.old}, because=', as the parameter file says'
-                    )
-                except ParameterError as error:
-                    refused.append(error)
-            if len(refused) == len(drifts):
-                for refusal in refused:
-                    text = f'not applied from the parameter file: {refusal}'
-                    inverter.tell(Severity.ERROR, text)
-            # values that bound each other may stand in any order
-            drifts = self.drift if write and len(refused) < len(drifts) else ()
-
     async def _read(
         self, key: str, *, once: bool, priority: Priority = Priority.REFRESH
     ) -> None:
@@ -435,8 +406,5 @@ class Parameters:
 
     def _tell_news(self, change: Change) -> None:
         """Say that somebody else changed a parameter."""
-        drift = [drift for drift in self.drift if drift.key == change.key]
-        if drift:
-            self._inverter.tell(Severity.WARNING, describe_drift(drift[0]))
-        else:
+        if not self._wanted.tell_drift(change.key):
             self._inverter.tell(Severity.INFO, f'changed at the drive: {change}')

@@ -166,7 +166,8 @@ class DriveParameters:
             return drive.parameters.change(wanted).result(_LONGEST_CHANGE)
         except FutureTimeoutError:
             raise DriveError(
-                f'{", ".join(wanted)}: the bus did not get to it within {_LONGEST_CHANGE:g} s'
+                f'{", ".join(wanted)}: the bus did not get to it within {_LONGEST_CHANGE:g} s, but '
+                'may do it yet'
             ) from None
 
 

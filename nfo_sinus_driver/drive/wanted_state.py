@@ -1,0 +1,98 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The state that a drive is wanted in, as a parameter file says, and how it differs from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.parameter_writer import describe_drift
+from nfo_sinus_driver.drive.snapshot import Severity
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.drive.parameters import Parameters
+
+
+class WantedState:
+    """What the settings of one drive shall be; used on the bus, readable from anywhere."""
+
+    def __init__(self, parameters: Parameters, inverter: Inverter) -> None:
+        self._parameters = parameters
+        self._inverter = inverter
+        self._values: dict[str, Value] = {}
+
+    @property
+    def drift(self) -> tuple[Change, ...]:
+        """What the drive has otherwise than it was wanted, as wanted -> what it has."""
+        words, values = self._parameters.words, self._parameters.values
+        return tuple(
+            self._parameters.describe(key, wanted, words[key])
+            for key, wanted in self._values.items()
+            if key in words and values.get(key) != wanted
+        )
+
+    def follow(self, changed: Mapping[str, Value]) -> None:
+        """Want what a person has set since, where a state is wanted at all."""
+        self._values.update((key, changed[key]) for key in changed if key in self._values)
+
+    def tell_drift(self, key: str) -> bool:
+        """Say that a parameter is not as wanted; false if it is."""
+        for drift in self.drift:
+            if drift.key == key:
+                self._inverter.tell(Severity.WARNING, describe_drift(drift))
+                return True
+        return False
+
+    async def apply_now(self, wanted: Mapping[str, Value], *, write: bool) -> None:
+        """
+        Take a state as the wanted one and bring the drive into it.
+
+        What cannot be written is logged, and stays reported as drift.
+
+        :param write: false to report only.
+        :raises ParameterError: the drive cannot have a value, whatever its state.
+        """
+        inverter = self._inverter
+        here = {key: value for key, value in wanted.items() if key in self._parameters.words}
+        self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
+        missing = [key for key in wanted if key not in here]
+        if missing:
+            inverter.tell(
+                Severity.WARNING, f'this drive has no {", ".join(missing)}: not applied'
+            )
+        drifts = self.drift
+        while drifts:
+            refused: list[ParameterError] = []
+            for drift in drifts:
+                if not write:
+                    inverter.tell(Severity.WARNING, describe_drift(drift))
+                    continue
+                try:
+                    await self._parameters.change_now(
+                        {drift.key: drift.old}, because=', as the parameter file says'
+                    )
+                except ParameterError as error:
+                    refused.append(error)
+            if len(refused) == len(drifts):
+                for refusal in refused:
+                    text = f'not applied from the parameter file: {refusal}'
+                    inverter.tell(Severity.ERROR, text)
+            # values that bound each other may stand in any order
+            drifts = self.drift if write and len(refused) < len(drifts) else ()
