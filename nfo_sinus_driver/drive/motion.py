@@ -31,28 +31,15 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
-from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.drive.withdrawal import Withdrawal
 from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
-
-#: How long a drive may take to do what it was told, its start delay not counted, s.
-_PATIENCE = 2.0
-#: How often the status is looked at while something is awaited, s.
-_LOOK_PERIOD = 0.02
-#: How often a stop that does not get through is tried again, s.
-_RETRY_PERIOD = 0.2
-#: The same while the drive does not answer, for its neighbours' sake, s.
-_LOST_RETRY_PERIOD = 1.0
-#: How often it is said that a stop is not confirmed, s.
-_COMPLAINT_PERIOD = 5.0
-#: Each time it is said after a longer while, up to this, s.
-_LONGEST_COMPLAINT_PERIOD = 60.0
 
 _NO_RUN = (
     'the drive stays in standby: its RUN input is not active '
@@ -71,13 +58,12 @@ class Motion:
         self._method = method
         self._setpoint = setpoint
         self._arming: Task | None = None
-        #: What takes the run command back, while there may be one that nobody wants any more.
-        self._withdrawal: Task | None = None
-        self._again = False
-        self._held_by_fault = False
-        self._unconfirmed = ''
+        self._withdrawal = Withdrawal(bus, inverter, method, self._note_change)
         #: When the run command was last given or taken back: an older status says nothing.
         self._changed_at = 0.0
+
+    def _note_change(self) -> None:
+        self._changed_at = time.monotonic()
 
     @property
     def armed(self) -> bool:
@@ -87,7 +73,7 @@ class Motion:
     @property
     def stopping(self) -> bool:
         """A stop is not confirmed yet."""
-        return self._withdrawal is not None
+        return self._withdrawal.going_on
 
     # --- what a person asks for ---------------------------------------------------------------
 
@@ -109,7 +95,7 @@ class Motion:
             raise DriveError('it was stopped while it was being enabled') from None
         except Exception as error:
             # whatever went wrong, a run command may stand by now
-            self._withdraw()
+            self._withdrawal.begin()
             raise DriveError(str(error) or repr(error)) from error
         finally:
             self._arming = None
@@ -126,10 +112,11 @@ class Motion:
         :raises DriveError: the drive does not confirm the stop; it is tried on and on.
         """
         self.disarm()
-        await self._finish_withdrawal(self._withdraw(), patience or _PATIENCE)
+        self._withdrawal.begin()
+        await self._withdrawal.finish(patience or None)
         seen = self._inverter.seen
         text = self._inverter.describe()
-        if self._held_by_fault:
+        if self._withdrawal.held_by_fault:
             return f'stopped by fault {text}; the drive takes no command until it is acknowledged'
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
@@ -154,11 +141,13 @@ class Motion:
             if not ours and not await self._method.in_control(Priority.STOP):
                 return self._no_control(await self._inverter.look(Priority.STOP))
             await self._method.quick_stop(self._inverter.control_mode)
-            await self._await_status(lambda seen: not seen.driven, Priority.STOP, _PATIENCE)
+            await self._await_status(
+                lambda seen: not seen.driven, Priority.STOP, withdrawal.PATIENCE
+            )
         except (DriveError, LinkError) as error:
-            self._withdraw()
+            self._withdrawal.begin()
             raise DriveError(f'the quick stop is NOT confirmed: {error}; stopping') from error
-        self._withdraw()
+        self._withdrawal.begin()
         return 'released: the motor coasts'
 
     async def acknowledge(self) -> str:
@@ -181,7 +170,7 @@ class Motion:
         finally:
             # even if no answer came, the drive may be free to run now
             if ours:
-                self._withdraw()
+                self._withdrawal.begin()
         try:
             await self._await_status(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
@@ -207,7 +196,7 @@ class Motion:
         if not await self._method.in_control(Priority.SERVICE):
             return stopped or 'control is not ours'
         stopped = stopped or await self.stop()
-        if self._held_by_fault:
+        if self._withdrawal.held_by_fault:
             raise DriveError(
                 f'fault {self._inverter.describe()} stands and the drive takes no command: '
                 'a run command may still stand in it when the fault is acknowledged'
@@ -241,33 +230,33 @@ class Motion:
                     f'the motor runs under bus control from before '
                     f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
                 )
-            self._withdraw()
+            self._withdrawal.begin()
 
     def lost(self) -> None:
         """Take note that the drive does not answer any more."""
         ours = self.armed or self._arming is not None
         self.disarm()
         if ours:
-            self._withdraw()
+            self._withdrawal.begin()
 
     def watch(self, seen: InverterStatus) -> None:
         """Judge what the drive says about itself."""
         self._setpoint.answered()
-        if self._withdrawal is not None and self._held_by_fault and not seen.faulted:
-            self._bus.wake(self._withdrawal)
+        if self._withdrawal.held_by_fault and not seen.faulted:
+            self._withdrawal.wake()
         if seen.at < self._changed_at:
             return
         if self.armed:
             reason = self._why_disarmed(seen)
             if reason:
                 self.secure(reason)
-        elif self._arming is None and self._withdrawal is None and seen.runs_by_bus:
+        elif self._arming is None and not self.stopping and seen.runs_by_bus:
             self.secure('it runs under bus control although nobody enabled it')
 
     def secure(self, reason: str) -> None:
         """Disarm and stop for a reason that a person should know."""
         self.disarm()
-        self._withdraw()
+        self._withdrawal.begin()
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
             remedy = 'call ~/fault_ack, then ~/enable to go on'
@@ -299,15 +288,14 @@ class Motion:
                 f'the drive is in control mode {control_mode}, expected is {expected}: '
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
-        if self._withdrawal is not None:
-            await self._finish_withdrawal(self._withdrawal, _PATIENCE)
+        await self._withdrawal.finish()
         await self._method.take_control()
-        await self._await_status(lambda now: now.from_bus, Priority.SERVICE, _PATIENCE)
+        await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.run(self._await_start)
         await self._await_start(lambda now: now.runs)
-        self._changed_at = time.monotonic()
+        self._note_change()
         self._setpoint.arm(control_mode)
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
@@ -316,7 +304,7 @@ class Motion:
 
         :raises DriveError: it does not.
         """
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + withdrawal.PATIENCE
         delayed = False
         while True:
             seen = await self._inverter.look(Priority.SERVICE)
@@ -335,86 +323,7 @@ class Motion:
                     if seen.standby
                     else f'the drive does not start: {self._inverter.describe()}'
                 )
-            await self._bus.sleep(_LOOK_PERIOD)
-
-    def _withdraw(self) -> Task:
-        """Take the run command back, again and again until the drive says that it stops."""
-        if self._withdrawal is None:
-            self._unconfirmed = 'no answer yet'
-            self._withdrawal = self._bus.spawn(self._keep_withdrawing())
-        else:
-            # what was written may be overtaken by now
-            self._again = True
-            self._bus.wake(self._withdrawal)
-        return self._withdrawal
-
-    async def _finish_withdrawal(self, withdrawal: Task, patience: float) -> None:
-        """Wait until the drive has confirmed that it stops, or stands because of a fault."""
-        deadline = time.monotonic() + patience
-        while not await self._bus.join(withdrawal, _LOOK_PERIOD):
-            if self._held_by_fault:
-                return
-            if time.monotonic() > deadline:
-                raise DriveError(
-                    f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
-                )
-
-    async def _keep_withdrawing(self) -> None:
-        complain_at = time.monotonic() + _PATIENCE
-        pause = 0.0
-        while not await self._tried_withdrawing():
-            if self._held_by_fault:
-                complain_at = time.monotonic() + _PATIENCE
-                await self._fault_gone()
-                continue
-            if time.monotonic() >= complain_at:
-                pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
-                complain_at = time.monotonic() + pause
-                self._tell(
-                    Severity.ERROR,
-                    f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
-                    'Use the RUN input or the emergency stop if it turns',
-                )
-            if not self._again:
-                connected = self._inverter.connected
-                await self._bus.sleep(_RETRY_PERIOD if connected else _LOST_RETRY_PERIOD)
-        self._withdrawal = None
-        self._held_by_fault = False
-        self._changed_at = time.monotonic()
-        if pause:
-            self._tell(Severity.INFO, f'the stop is confirmed now: {self._inverter.describe()}')
-
-    async def _fault_gone(self) -> None:
-        """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
-        while not self._again and self._inverter.connected:
-            await self._bus.sleep(_RETRY_PERIOD)
-            seen = self._inverter.seen
-            if seen is not None and not seen.faulted:
-                return
-
-    async def _tried_withdrawing(self) -> bool:
-        try:
-            return await self._withdrawn()
-        except Exception as error:
-            # even a mistake of ours must not end the trying
-            self._held_by_fault = False
-            self._unconfirmed = str(error) or repr(error)
-            return False
-
-    async def _withdrawn(self) -> bool:
-        """Try once; true when the drive took it and says that it stops."""
-        self._again = False
-        refusal = ''
-        try:
-            await self._method.stop(self._inverter.control_mode)
-        except (Refused, DamagedAnswer) as error:
-            # among late answers a refusal is not believed, until an answer to something else came
-            refusal = str(error)
-        seen = await self._inverter.look(Priority.STOP, once=True)
-        # a drive with a fault may refuse everything; it stands, but would go on afterwards
-        self._held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
-        self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
-        return not refusal and not seen.runs_by_bus and not self._again
+            await self._bus.sleep(withdrawal.LOOK_PERIOD)
 
     async def _await_status(
         self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float
@@ -423,7 +332,7 @@ class Motion:
         while not wanted(await self._inverter.look(priority)):
             if time.monotonic() > deadline:
                 raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
-            await self._bus.sleep(_LOOK_PERIOD)
+            await self._bus.sleep(withdrawal.LOOK_PERIOD)
 
     def _why_disarmed(self, seen: InverterStatus) -> str:
         control_mode = self._inverter.control_mode

@@ -122,7 +122,7 @@ MUTANTS = (
         2,
         'a refused enable leaves its run command standing',
         _MOTION,
-        'a run command may stand by now\n            self._withdraw()',
+        'a run command may stand by now\n            self._withdrawal.begin()',
         'a run command may stand by now',
         (_NO_RESTART, '-k', 'without_run_input'),
     ),

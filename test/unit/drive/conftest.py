@@ -28,8 +28,8 @@ import pytest
 
 from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import motion
 from nfo_sinus_driver.drive import watch as watch_module
+from nfo_sinus_driver.drive import withdrawal
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver try again soon, where it is not tested how long it waits."""
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.05)
     monkeypatch.setattr(watch_module, '_RECONNECT_PERIOD', 0.1)
-    monkeypatch.setattr(motion, '_LOST_RETRY_PERIOD', 0.1)
+    monkeypatch.setattr(withdrawal, '_LOST_RETRY_PERIOD', 0.1)
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import motion
+from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -45,7 +45,7 @@ ONLY_READ = {3, 17, 43}
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(motion, '_PATIENCE', 0.2)
+    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.2)
 
 
 # --- connecting -----------------------------------------------------------------------------------

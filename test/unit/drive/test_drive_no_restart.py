@@ -34,8 +34,8 @@ from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import motion
 from nfo_sinus_driver.drive import watch as watch_module
+from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -414,7 +414,7 @@ def test_stop_during_the_start_delay(make_rig: MakeRig) -> None:
 def test_stop_when_nobody_answers_is_tried_on_and_on(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(motion, '_PATIENCE', 0.5)
+    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.5)
     rig = make_rig(retries=1)
     rig.turn()
     rig.set_response_timeout(0.1)
@@ -451,7 +451,7 @@ def test_exit_while_the_drive_restarts(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the same, and nobody polls any more whose answers would tell
-    monkeypatch.setattr(motion, '_PATIENCE', 0.2)
+    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.2)
     rig = make_rig(retries=0)
     rig.turn()
     rig.set_response_timeout(0.2)
@@ -466,7 +466,7 @@ def test_exit_while_the_drive_restarts(
 def test_stop_that_is_refused_is_tried_on_and_on(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(motion, '_PATIENCE', 0.3)
+    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.3)
     rig.turn()
     write = rig.far.write_raw
 

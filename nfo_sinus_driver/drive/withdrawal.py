@@ -1,0 +1,163 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Taking the run command back, until the drive says that it stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.drive.control_method import ControlMethod
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Refused
+
+#: How long a drive may take to do what it was told, its start delay not counted, s.
+PATIENCE = 2.0
+#: How often the status is looked at while something is awaited, s.
+LOOK_PERIOD = 0.02
+#: How often a stop that does not get through is tried again, s.
+_RETRY_PERIOD = 0.2
+#: The same while the drive does not answer, for its neighbours' sake, s.
+_LOST_RETRY_PERIOD = 1.0
+#: How often it is said that a stop is not confirmed, s.
+_COMPLAINT_PERIOD = 5.0
+#: Each time it is said after a longer while, up to this, s.
+_LONGEST_COMPLAINT_PERIOD = 60.0
+
+
+class Withdrawal:
+    """
+    Takes the run command of one drive back; there is one for a drive, whoever asks.
+
+    :param done: called when the drive has confirmed that it stops.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        inverter: Inverter,
+        method: ControlMethod,
+        done: Callable[[], None],
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._method = method
+        self._done = done
+        #: What takes the run command back, while there may be one that nobody wants any more.
+        self._task: Task | None = None
+        self._again = False
+        #: The drive stands by a fault, and refuses the stop until it is acknowledged.
+        self.held_by_fault = False
+        self._unconfirmed = ''
+
+    @property
+    def going_on(self) -> bool:
+        """A stop is not confirmed yet."""
+        return self._task is not None
+
+    def wake(self) -> None:
+        """Try again now."""
+        if self._task is not None:
+            self._bus.wake(self._task)
+
+    def begin(self) -> None:
+        """Take the run command back, again and again until the drive says that it stops."""
+        if self._task is None:
+            self._unconfirmed = 'no answer yet'
+            self._task = self._bus.spawn(self._keep_trying())
+        else:
+            # what was written may be overtaken by now
+            self._again = True
+            self._bus.wake(self._task)
+
+    async def finish(self, patience: float | None = None) -> None:
+        """
+        Wait until the drive has confirmed that it stops, or stands because of a fault.
+
+        :raises DriveError: it does not in time; the withdrawal goes on.
+        """
+        task = self._task
+        deadline = time.monotonic() + (PATIENCE if patience is None else patience)
+        while task is not None and not await self._bus.join(task, LOOK_PERIOD):
+            if self.held_by_fault:
+                return
+            if time.monotonic() > deadline:
+                raise DriveError(
+                    f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
+                )
+
+    async def _keep_trying(self) -> None:
+        complain_at = time.monotonic() + PATIENCE
+        pause = 0.0
+        while not await self._tried():
+            if self.held_by_fault:
+                complain_at = time.monotonic() + PATIENCE
+                await self._fault_gone()
+                continue
+            if time.monotonic() >= complain_at:
+                pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
+                complain_at = time.monotonic() + pause
+                self._inverter.tell(
+                    Severity.ERROR,
+                    f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
+                    'Use the RUN input or the emergency stop if it turns',
+                )
+            if not self._again:
+                connected = self._inverter.connected
+                await self._bus.sleep(_RETRY_PERIOD if connected else _LOST_RETRY_PERIOD)
+        self._task = None
+        self.held_by_fault = False
+        self._done()
+        if pause:
+            text = f'the stop is confirmed now: {self._inverter.describe()}'
+            self._inverter.tell(Severity.INFO, text)
+
+    async def _fault_gone(self) -> None:
+        """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
+        while not self._again and self._inverter.connected:
+            await self._bus.sleep(_RETRY_PERIOD)
+            seen = self._inverter.seen
+            if seen is not None and not seen.faulted:
+                return
+
+    async def _tried(self) -> bool:
+        try:
+            return await self._withdrawn()
+        except Exception as error:
+            # even a mistake of ours must not end the trying
+            self.held_by_fault = False
+            self._unconfirmed = str(error) or repr(error)
+            return False
+
+    async def _withdrawn(self) -> bool:
+        """Try once; true when the drive took it and says that it stops."""
+        self._again = False
+        refusal = ''
+        try:
+            await self._method.stop(self._inverter.control_mode)
+        except (Refused, DamagedAnswer) as error:
+            # among late answers a refusal is not believed, until an answer to something else came
+            refusal = str(error)
+        seen = await self._inverter.look(Priority.STOP, once=True)
+        # a drive with a fault may refuse everything; it stands, but would go on afterwards
+        self.held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
+        self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
+        return not refusal and not seen.runs_by_bus and not self._again
