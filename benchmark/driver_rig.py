@@ -107,9 +107,13 @@ class DriverRig(Rig):
                 '--ros-args',
                 *(word for argument in arguments for word in ('-p', argument)),
             )
+            self._while_starting()
             self.wait_for(lambda: self.listener.measured >= set(self.names), self.driver)
             time.sleep(_SETTLE)
             failing.pop_all()
+
+    def _while_starting(self) -> None:
+        """Do what has to be done while the driver starts."""
 
     def _start_listener(self) -> Listener:
         context = Context()

@@ -77,7 +77,8 @@ def _common() -> argparse.ArgumentParser:
     add = group.add_argument
     add(
         '--port',
-        help='a device path, or a URL such as socket://host:port (default: /dev/ttyUSB0)',
+        help='a device path, or a URL such as socket://host:port; for modbus_tcp host:port of the '
+        'gateway (default: /dev/ttyUSB0)',
     )
     add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu')
     add('--address', type=_address, metavar='N', help='of the drive, 1 to 247 (default: 1)')
@@ -90,7 +91,11 @@ def _common() -> argparse.ArgumentParser:
         help=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)} '
         '(default: 0, which is 19200)',
     )
-    add('--char-format', metavar='FORMAT', help='such as 8E1, 8O1, 8N2 (default: 8E1)')
+    add(
+        '--char-format',
+        metavar='FORMAT',
+        help='such as 8E1, 8O1, 8N2 (default: 8E1; modbus_ascii: 7E1)',
+    )
     add(
         '--response-timeout',
         type=_seconds,

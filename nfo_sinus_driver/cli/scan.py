@@ -27,8 +27,6 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.progress import remark
-from nfo_sinus_driver.cli.session import BAUD_RATE
-from nfo_sinus_driver.cli.session import CHAR_FORMAT
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.trouble import Trouble
@@ -36,10 +34,11 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
-#: Those of Modbus RTU [M0 §6.2.2], the likeliest first.
-_FORMATS = ('8E1', '8O1', '8N2')
+#: Parity and stop bits of Modbus [M0 §6.2.2], the likeliest first.
+_PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
 _COLUMNS = (
@@ -69,7 +68,7 @@ def scan(options: argparse.Namespace) -> int:
             for _ in range(len(options.addresses) - len(asked)):
                 step()
             for address, facts in _who_answers(line, asked, step):
-                facts['line'] = f'{baud_rate} {char_format}'
+                facts['line'] = f'{baud_rate} {char_format}' if baud_rate else 'gateway'
                 if not found and not options.json:
                     put(_row({name: name for name, _ in _COLUMNS}))
                 found[address] = facts
@@ -84,9 +83,16 @@ def scan(options: argparse.Namespace) -> int:
 
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
+    factory = PROTOCOLS[options.protocol]
+    if factory.data_bits is None:
+        # the line is that of the gateway
+        return [(0, '')]
     if options.all_settings:
-        return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in _FORMATS]
-    return [(options.baud_rate or BAUD_RATE, options.char_format or CHAR_FORMAT)]
+        formats = [f'{factory.data_bits}{parity}' for parity in _PARITIES]
+        return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in formats]
+    return [
+        (options.baud_rate or factory.baud_rate, options.char_format or factory.char_format)
+    ]
 
 
 def _who_answers(

@@ -46,15 +46,12 @@ from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 
 _T = TypeVar('_T')
-#: The factory settings of a Modbus line [M0 §6.2.2].
-BAUD_RATE = 19200
-CHAR_FORMAT = '8E1'
 
 
 class Remote:
@@ -163,9 +160,10 @@ class Session:
         self._options = options
         self._writes = writes
         try:
-            line = LineSettings(
-                baud_rate=options.baud_rate or BAUD_RATE,
-                char_format=options.char_format or CHAR_FORMAT,
+            line = line_settings(
+                options.protocol,
+                baud_rate=options.baud_rate,
+                char_format=options.char_format,
                 response_timeout=options.response_timeout,
             )
             self._bus = Bus(open_link(options.protocol, options.port, line))

@@ -16,8 +16,10 @@
 
 from __future__ import annotations
 
+from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
@@ -33,7 +35,7 @@ def explain(error: LinkError, address: int, *, known: bool) -> str:
 
     :param known: the drive has answered before, so that its settings are right [C93].
     """
-    if isinstance(error, (PortError, Refused)):
+    if isinstance(error, (PortError, Refused, GatewaySilent, NoPath)):
         return str(error)
     if known:
         return f'{error}: check the cable and that the drive has power'

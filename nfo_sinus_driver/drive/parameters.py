@@ -50,7 +50,7 @@ _log = logging.getLogger(__name__)
 
 #: How long one round of reading every parameter again takes at least, s: a change at the keypad
 #: is seen within 10 s, and a fast line is not kept busy for nothing.
-_ROUND = 8.0
+_ROUND = 9.2
 #: How often it is looked whether there is something to read, s.
 _WAIT = 0.5
 #: How often progress is logged while the parameters are read for the first time, s.

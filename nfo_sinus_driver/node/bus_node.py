@@ -27,7 +27,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.link import LineSettings
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
@@ -38,9 +38,6 @@ from nfo_sinus_driver.node.outbox import Outbox
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 
-#: The factory settings of the drive for Modbus RTU [M0 §6.2.2].
-_FACTORY_BAUD_RATE = 19200
-_FACTORY_FORMAT = '8E1'
 _PERIOD = 1.0
 
 NAME = 'nfo_sinus_bus'
@@ -57,9 +54,10 @@ class BusNode(Node):
     def __init__(self, overrides: Sequence[Parameter] = ()) -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
         values = declare(self, BUS_SETTINGS)
-        settings = LineSettings(
-            baud_rate=values['baud_rate'] or _FACTORY_BAUD_RATE,
-            char_format=values['char_format'] or _FACTORY_FORMAT,
+        settings = line_settings(
+            values['protocol'],
+            baud_rate=values['baud_rate'],
+            char_format=values['char_format'],
             response_timeout=values['response_timeout'],
             rs485=values['rs485'],
         )

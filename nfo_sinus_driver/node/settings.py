@@ -109,7 +109,8 @@ BUS_SETTINGS = (
     Setting(
         'port',
         '/dev/ttyUSB0',
-        'Serial port: a device path, or a pyserial URL such as socket://host:port',
+        'Serial port: a device path, or a pyserial URL such as socket://host:port; '
+        'for modbus_tcp host:port of the gateway',
         fixed=True,
     ),
     Setting(
@@ -131,7 +132,7 @@ BUS_SETTINGS = (
         '',
         'Data bits, parity and stop bits, as SiProt in the drive says; '
         "'': the factory default of the protocol",
-        constraints='such as 8E1, 8O1, 8N2',
+        constraints='such as 8E1, 8O1, 8N2; with 7 for modbus_ascii',
         fixed=True,
     ),
     Setting(

@@ -1,0 +1,184 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the tests of the drives' parameters share: services, and what arrives at the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+from typing import NamedTuple
+from typing import TypeAlias
+
+from bench import BAUD_RATE
+from bench import Bench
+from bench import Client
+from bench import Process
+from bench import wait_until
+from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.parameter import parameter_value_to_python
+from support.parameter_ends import ENDS
+
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.simulator import Simulator
+
+Value: TypeAlias = float | int | str | bool
+
+#: Every setting that has a register, by the name of its ROS parameter.
+SETTINGS = {ends.name: ends for ends in ENDS if ends.register is not None}
+#: Little else is on the line, so that it is quick.
+QUIET = ('-p', 'poll_rate:=10', '-p', 'telemetry_rate:=0')
+
+#: There are very many calls, so each is looked after more often than usual, s.
+_PERIOD = 0.001
+_READING = (3, 17, 43)
+_WRITE_ONE = 6
+_WRITE_SEVERAL = 16
+
+
+class Write(NamedTuple):
+    """A request to write that arrived at a drive; its words as on the line, the low one first."""
+
+    unit: int
+    register: int
+    words: tuple[int, ...]
+
+
+class Wire:
+    """Reads what a trace has of requests to write, by hand and without the catalog."""
+
+    def __init__(self, trace: Path) -> None:
+        self._trace = trace
+        self._read = 0
+
+    def writes(self) -> list[Write]:
+        """Return what arrived since the last call."""
+        with self._trace.open('rb') as stream:
+            stream.seek(self._read)
+            text = stream.read()
+        # the last line may not be complete yet
+        text = text[: text.rfind(b'\n') + 1]
+        self._read += len(text)
+        frames = (json.loads(line) for line in text.splitlines() if b'"request"' in line)
+        writes = (_written(bytes.fromhex(frame['hex'])) for frame in frames)
+        return [write for write in writes if write is not None]
+
+
+def _written(data: bytes) -> Write | None:
+    unit, function = data[:2]
+    if function in _READING:
+        return None
+    register = data[2] << 8 | data[3]
+    if function == _WRITE_ONE:
+        payload = data[4:6]
+    else:
+        assert function == _WRITE_SEVERAL, data.hex()
+        payload = data[7 : 7 + data[6]]
+        assert len(payload) == data[6] == 2 * (data[4] << 8 | data[5]), data.hex()
+    words = (payload[at] << 8 | payload[at + 1] for at in range(0, len(payload), 2))
+    return Write(unit, register, tuple(words))
+
+
+def written(name: str, words: tuple[int, ...], unit: int = 1) -> Write:
+    """Return the request that writes words to a setting."""
+    register = SETTINGS[name].register
+    assert register is not None
+    return Write(unit, register, words)
+
+
+def set_each(client: Client, *settings: tuple[str, Value | None]) -> list[Any]:
+    """Set parameters one by one, as ``ros2 param set`` and ``load`` do; return the results."""
+    future = set_each_async(client, *settings)
+    wait_until(future.done, 'set_parameters answers', period=_PERIOD)
+    results: list[Any] = future.result().results
+    assert len(results) == len(settings)
+    return results
+
+
+def set_each_async(client: Client, *settings: tuple[str, Value | None]) -> Any:
+    """Begin to set parameters one by one; return the future."""
+    messages = [Parameter(name, value=value).to_parameter_msg() for name, value in settings]
+    return client.call_async('set_parameters', SetParameters, parameters=messages)
+
+
+def set_one(client: Client, name: str, value: Value | None) -> Any:
+    """Set one parameter; return the result."""
+    return set_each(client, (name, value))[0]
+
+
+def values(client: Client, *names: str) -> dict[str, Any]:
+    """Return the values of parameters, which must be declared."""
+    future = client.call_async('get_parameters', GetParameters, names=names)
+    wait_until(future.done, 'get_parameters answers', period=_PERIOD)
+    answer = future.result().values
+    assert len(answer) == len(names), f'some of {names} are not declared'
+    return {
+        name: parameter_value_to_python(value)
+        for name, value in zip(names, answer, strict=True)
+    }
+
+
+def says_once(driver: Process, text: str) -> None:
+    """Wait until a driver has logged something, and see that it is there once."""
+    wait_until(lambda: text in driver.text, f'{text!r} in the log')
+    assert driver.text.count(text) == 1
+
+
+def refused(result: Any, *parts: str) -> None:
+    """See that a parameter was not set, and that the reason says all of it."""
+    assert not result.successful
+    missing = [part for part in parts if part not in result.reason]
+    assert not missing, f'{missing} not in: {result.reason}'
+
+
+class Stubborn(contextlib.ExitStack):
+    """A simulated drive in this process, so that a test can make it behave as no manual says."""
+
+    def __init__(self, bench: Bench, **settings: Value) -> None:
+        super().__init__()
+        self.simulator = Simulator(
+            link=bench.port, baud=BAUD_RATE, trace=str(bench.trace), settings=settings
+        )
+        self.drive: SimulatedDrive = self.simulator.drives[1]
+
+    def __enter__(self) -> Stubborn:
+        self.enter_context(self.simulator)
+        return self
+
+    def before_requests(self, happens: Callable[[str, str], None]) -> None:
+        """Have a function called with 'read' or 'write' and the name; it may raise `Refused`."""
+        read, write = self.drive.read_raw, self.drive.write_raw
+
+        def read_raw(key: str) -> int:
+            happens('read', key)
+            return read(key)
+
+        def write_raw(key: str, raw: int) -> None:
+            happens('write', key)
+            write(key, raw)
+
+        with self.simulator.lock:
+            self.drive.read_raw = read_raw  # type: ignore[method-assign]
+            self.drive.write_raw = write_raw  # type: ignore[method-assign]
+
+    def parameters(self) -> dict[str, Value]:
+        """Return what the drive has."""
+        shown: dict[str, Value] = self.simulator.state()['parameters']
+        return {name: shown[name] for name in SETTINGS}

@@ -1,0 +1,96 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Set-points do not wait for the executor, and yet come to the node like any other message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from bench import Bench
+from bench import wait_until
+import pytest
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Float32
+
+from nfo_sinus_driver.node.line import NEWEST
+from nfo_sinus_driver.node.listener import Listener
+
+
+@pytest.fixture
+def node(bench: Bench) -> Iterator[Node]:
+    """A node in the default context, as the driver has it."""
+    rclpy.init(domain_id=bench.domain, signal_handler_options=SignalHandlerOptions.NO)
+    node = Node('test_listener')
+    yield node
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def test_a_remapped_topic_in_a_namespace_belongs_to_the_drive_node(bench: Bench) -> None:
+    drive = bench.simulator()
+    bench.driver('-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
+    client = bench.client('/plant/nfo_sinus').connected()
+
+    def owners() -> list[tuple[str, str]]:
+        found = client.node.get_subscriptions_info_by_topic('/hand/speed')
+        return [(info.node_namespace, info.node_name) for info in found]
+
+    wait_until(lambda: owners() == [('/plant', 'nfo_sinus')], 'it is said whose topic it is')
+    assert client.enable().success
+    publisher = client.node.create_publisher(Float32, '/hand/speed', 1)
+
+    def arrives() -> bool:
+        publisher.publish(Float32(data=12.0))
+        return drive.state()['setpoint'] == pytest.approx(12.0, abs=0.1)
+
+    wait_until(arrives, 'the set-point is in the drive', period=0.05)
+
+
+def test_a_callback_that_raises_keeps_no_later_message_out(
+    node: Node, caplog: pytest.LogCaptureFixture
+) -> None:
+    heard = {'/one': 0, '/two': 0}
+
+    def raises(topic: str) -> None:
+        heard[topic] += 1
+        raise ValueError('oops')
+
+    listener = Listener()
+    publishers = {topic: node.create_publisher(Float32, topic, 1) for topic in heard}
+    for topic in heard:
+        listener.listen(node, Float32, topic, lambda _, topic=topic: raises(topic), NEWEST)
+    listener.start()
+    for topic, publisher in publishers.items():
+
+        def twice(topic: str = topic, publisher: rclpy.publisher.Publisher = publisher) -> bool:
+            publisher.publish(Float32())
+            return heard[topic] >= 2
+
+        wait_until(twice, f'{topic} is heard twice')
+    assert listener.alive
+    assert 'oops' in caplog.text
+    listener.close()
+    assert not listener.alive
+
+
+def test_it_ends_though_nobody_ever_spoke(node: Node) -> None:
+    listener = Listener()
+    listener.listen(node, Float32, '/one', lambda _: None, NEWEST)
+    listener.start()
+    assert listener.alive
+    listener.close()
+    assert not listener.alive

@@ -1,0 +1,158 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What changes at the drive shows in ROS: at the keypad, by a reset, beyond what a manual says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bench import A_WHILE
+from bench import Bench
+from bench import Client
+from bench import holds_for
+from bench import wait_until
+from parameter_bench import QUIET
+from parameter_bench import SETTINGS
+from parameter_bench import Stubborn
+from parameter_bench import Wire
+from parameter_bench import refused
+from parameter_bench import says_once
+from parameter_bench import set_one
+from parameter_bench import values
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.parameter import parameter_value_to_python
+
+
+def _listening(bench: Bench, name: str = '/nfo_sinus') -> Client:
+    client = bench.client(name)
+    client.listen('events', ParameterEvent, '/parameter_events', 1000)
+    return client.connected()
+
+
+def _changes(client: Client, name: str) -> list[Any]:
+    """Return what the events said of a parameter."""
+    return [
+        parameter_value_to_python(parameter.value)
+        for event in list(client.messages['events'])
+        if event.node == '/nfo_sinus'
+        for parameter in event.changed_parameters
+        if parameter.name == name
+    ]
+
+
+def test_a_change_at_the_keypad_shows_and_is_told_once(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    driver = bench.driver(*QUIET)
+    client = _listening(bench)
+    wire = Wire(bench.trace)
+    drive.inject('set', 'control.retard', 7.5)
+    drive.inject('set', 'error.cur_low_mode', 'Alarm')
+    wait_until(
+        lambda: client.parameter('control.retard') == 7.5
+        and client.parameter('error.cur_low_mode') == 'Alarm',
+        'both changes show',
+    )
+    wait_until(lambda: _changes(client, 'error.cur_low_mode'), 'an event')
+    holds_for(A_WHILE, lambda: len(_changes(client, 'control.retard')) <= 1, 'one event')
+    assert _changes(client, 'control.retard') == [7.5]
+    assert _changes(client, 'error.cur_low_mode') == ['Alarm']
+    says_once(driver, 'changed at the drive: control.retard: 5 -> 7.5 s')
+    says_once(driver, 'changed at the drive: error.cur_low_mode: Disable -> Alarm')
+    assert driver.text.count('changed at the drive') == 2
+    assert wire.writes() == [], 'to follow is no reason to write'
+
+
+def test_refresh_answers_what_has_changed(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    bench.driver(*QUIET)
+    client = _listening(bench)
+    wire = Wire(bench.trace)
+    unchanged = client.call('refresh_parameters')
+    assert unchanged.success
+    assert unchanged.message == '119 parameters read, changed: none'
+    drive.inject('set', 'freque.f_fix7', 44.5)
+    drive.inject('set', 'control.auto_start', True)
+    answer = client.call('refresh_parameters')
+    assert answer.success
+    # unless the watch came first: it reads one of 119 every 70 ms
+    told = set(answer.message.partition('changed: ')[2].split(', ')) - {'none'}
+    assert told <= {'freque.f_fix7', 'control.auto_start'}
+    wait_until(
+        lambda: values(client, 'freque.f_fix7', 'control.auto_start')
+        == {'freque.f_fix7': 44.5, 'control.auto_start': True},
+        'both show',
+        timeout=1.0,
+    )
+    drive.inject('factory-reset')
+    assert client.call('refresh_parameters').success
+    wait_until(lambda: client.parameter('freque.f_fix7') == 50.0, 'the factory value', timeout=1.0)
+    assert wire.writes() == []
+
+
+def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
+    stubborn = bench.enter_context(Stubborn(bench))
+    memory = stubborn.drive.memory
+    # 200 Hz, 0 s, and a code that has no label
+    memory.put('freque.f_fix1', 2000)
+    memory.put('control.accel', 0)
+    memory.put('speed.op_mode', 193)
+    driver = bench.driver(*QUIET)
+    client = _listening(bench)
+    wire = Wire(bench.trace)
+    shown = values(client, 'freque.f_fix1', 'control.accel', 'speed.op_mode')
+    assert shown == {
+        'freque.f_fix1': 200.0, 'control.accel': 0.0, 'speed.op_mode': '193'
+    }
+    memory.put('freque.f_fix2', 0xFFFF)
+    memory.put('control.run_dly', 65535)
+    memory.put('freque.op_mode', 193)
+    assert client.call('refresh_parameters').success
+    wanted = {'freque.f_fix2': 6553.5, 'control.run_dly': 65535, 'freque.op_mode': '193'}
+    wait_until(lambda: values(client, *wanted) == wanted, 'the new ones show', timeout=2.0)
+    span = client.descriptor('freque.f_fix2').floating_point_range[0]
+    assert (span.from_value, span.to_value) == (0.0, 6553.5), 'the range takes it in'
+    assert wire.writes() == []
+    # what the drive has may be given, so that a dump loads; anything else has to be allowed
+    for name, value in {**shown, **wanted}.items():
+        result = set_one(client, name, value)
+        assert result.successful, result.reason
+    refused(set_one(client, 'freque.f_fix2', 6553.4), 'freque.f_fix2', '0 to 150')
+    assert wire.writes() == []
+    assert set_one(client, 'freque.f_fix2', 150.0).successful
+    assert set_one(client, 'freque.op_mode', 'Fix-1 F').successful
+    memory.put('freque.f_fix2', 100)
+    assert client.call('refresh_parameters').success
+    wait_until(lambda: client.parameter('freque.f_fix2') == 10.0, 'in range', timeout=2.0)
+    span = client.descriptor('freque.f_fix2').floating_point_range[0]
+    assert (span.from_value, span.to_value) == (0.0, 150.0), 'the range is that of the manual'
+    says_once(driver, 'changed at the drive: freque.f_fix2: 15 -> 6553.5 Hz')
+
+
+def test_a_code_without_any_meaning_is_told_and_does_no_harm(bench: Bench) -> None:
+    stubborn = bench.enter_context(Stubborn(bench))
+    stubborn.drive.memory.put('control.auto_start', 7)
+    driver = bench.driver(*QUIET)
+    client = _listening(bench)
+    has = client.parameter_names() & set(SETTINGS)
+    assert has == set(SETTINGS) - {'control.auto_start'}
+    says_once(driver, 'control.auto_start: the drive has code 7')
+    stubborn.drive.memory.put('pi_reg.reg_amp', 3)
+    assert client.call('refresh_parameters').success
+    text = 'pi_reg.reg_amp: the drive has code 3'
+    wait_until(lambda: text in driver.text, 'it is told')
+    assert client.parameter('pi_reg.reg_amp') == 1
+    assert set_one(client, 'pi_reg.reg_amp', -1).successful
+    assert stubborn.drive.memory.raw('pi_reg.reg_amp') == -1

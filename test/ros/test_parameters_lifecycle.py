@@ -1,0 +1,194 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Parameters of drives through the life of a node: monitor, clean-up, dump and load, two drives."""
+
+from __future__ import annotations
+
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from lifecycle_msgs.msg import Transition
+from parameter_bench import QUIET
+from parameter_bench import SETTINGS
+from parameter_bench import Wire
+from parameter_bench import refused
+from parameter_bench import set_each
+from parameter_bench import set_one
+from parameter_bench import values
+from parameter_bench import written
+
+
+def test_monitor_writes_nothing_whatever_is_asked(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    driver = bench.driver(
+        *QUIET,
+        '-p', 'control_method:=monitor',
+        '-p', 'allow_communication_changes:=true',
+        '-p', 'control.accel:=6.0',
+        '-p', 'serial.sio_tot:=3.0',
+        '-p', 'drive_timeout:=3.0',
+    )
+    client = bench.client().connected()
+    assert set(SETTINGS) <= client.parameter_names()
+    assert client.parameter('control.accel') == 5.0
+    wait_until(lambda: 'control_method is monitor' in driver.text, 'it says why not')
+    for name, ends in SETTINGS.items():
+        other = ends.high if client.parameter(name) == ends.low else ends.low
+        refused(set_one(client, name, other), name, 'monitor')
+    has = values(client, *SETTINGS)
+    assert all(result.successful for result in set_each(client, *has.items()))
+    refused(client.set_parameters(**{'control.accel': 6.0, 'poll_rate': 5.0}), 'monitor')
+    assert not client.set_parameters(drive_timeout=4.0).successful
+    drive.inject('set', 'control.retard', 7.0)
+    assert client.call('refresh_parameters').success
+    wait_until(lambda: client.parameter('control.retard') == 7.0, 'it follows')
+    for transition in (
+        Transition.TRANSITION_DEACTIVATE,
+        Transition.TRANSITION_CLEANUP,
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+    ):
+        assert client.change_state(transition)
+    assert client.parameter('control.retard') == 7.0
+    assert Wire(bench.trace).writes() == []
+
+
+def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    settings = client.parameter_names() - set(SETTINGS)
+    assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+    assert set(SETTINGS) <= client.parameter_names(), 'inactive, the drive is still there'
+    assert set_one(client, 'control.accel', 6.0).successful
+    assert client.change_state(Transition.TRANSITION_CLEANUP)
+    assert client.parameter_names() == settings
+    wire = Wire(bench.trace)
+    wire.writes()
+    refused(set_one(client, 'control.accel', 7.0), 'control.accel', 'configured')
+    drive.inject('set', 'control.retard', 8.0)
+    assert client.change_state(Transition.TRANSITION_CONFIGURE)
+    assert client.parameter_names() == settings | set(SETTINGS)
+    assert values(client, 'control.accel', 'control.retard') == {
+        'control.accel': 6.0, 'control.retard': 8.0
+    }
+    assert wire.writes() == []
+
+
+def _dump(client: Client) -> dict[str, object]:
+    """Return all parameters of the node, as ``ros2 param dump`` does."""
+    # that one is rclpy's own, and no node at all takes it back
+    return values(client, *sorted(client.parameter_names() - {'start_type_description_service'}))
+
+
+def _load(client: Client, dump: dict[str, object]) -> None:
+    """Set all of a dump one by one, as ``ros2 param load`` does; each has to be taken."""
+    results = set_each(client, *dump.items())
+    failed = [
+        f'{name}: {result.reason}'
+        for name, result in zip(dump, results, strict=True)
+        if not result.successful
+    ]
+    assert failed == []
+
+
+def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    driver = bench.driver(*QUIET)
+    client = bench.client().connected()
+    changed = {
+        'control.accel': 6.5, 'control.mode': 'Speed', 'control.auto_start': False,
+        'freque.op_mode': 'Fix-3 R', 'pi_reg.reg_amp': -1, 'motor.p_nom': 2.2,
+        'error.overload_s_temp': -20, 'pi_reg.setmin': -12.5, 'poll_rate': 12.0,
+        'drive_timeout': 12.5,
+    }
+    result = client.set_parameters(**changed)
+    assert result.successful, result.reason
+    wait_until(lambda: client.parameter('serial.sio_tot') == 12.5, 'what drive_timeout set')
+    dump = _dump(client)
+    assert set(SETTINGS) < set(dump)
+    assert {'autostart', 'address', 'control_method', 'apply_parameters'} < set(dump)
+    wire = Wire(bench.trace)
+    wire.writes()
+    _load(client, dump)
+    assert wire.writes() == [], 'all of it is there'
+
+    drive.inject('power-cycle')
+    client.wait_for('status', lambda status: not status.connected, 'it is off')
+    client.connected()
+    _load(client, dump)
+    assert _dump(client) == dump
+
+    drive.inject('factory-reset')
+    assert client.call('refresh_parameters').success
+    wait_until(lambda: client.parameter('control.accel') == 5.0, 'the factory value')
+    # communication settings need their permission, on the way back too
+    assert set_one(client, 'allow_communication_changes', True).successful
+    _load(client, {**dump, 'allow_communication_changes': True})
+    assert _dump(client) == {**dump, 'allow_communication_changes': True}
+    assert drive.state()['parameters']['motor.p_nom'] == 2.2
+
+    driver.end()
+    drive.inject('set', 'control.accel', 9.0)
+    bench.driver(*QUIET)
+    other = bench.client().connected()
+    wire.writes()
+    _load(other, dump)
+    assert wire.writes() == [written('control.accel', (6500, 0))]
+    assert _dump(other) == dump
+
+
+def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
+    left = bench.simulator('--address', '1', '--address', '2', paced=False)
+    path = bench.folder / 'two.yaml'
+    path.write_text(
+        '/**/nfo_sinus_bus:\n  ros__parameters:\n    drives: [left, right]\n'
+        '/**:\n  ros__parameters:\n    control.retard: 7\n'
+        '/**/left:\n  ros__parameters:\n    address: 1\n    control.accel: 6\n'
+        '/**/right:\n  ros__parameters:\n    address: 2\n    freque.f_fix1: 60\n'
+    )
+    driver = bench.driver(*QUIET, '--params-file', str(path))
+    clients = bench.client('/left').connected(), bench.client('/right').connected()
+    wire = Wire(bench.trace)
+    assert sorted(wire.writes()) == sorted([
+        written('control.retard', (7000, 0), unit=1),
+        written('control.accel', (6000, 0), unit=1),
+        written('control.retard', (7000, 0), unit=2),
+        written('freque.f_fix1', (600,), unit=2),
+    ])
+    # what both have or one of them: nobody is warned
+    assert 'there is none of that name' not in driver.text
+    assert 'which has none such' not in driver.text
+    assert set_one(clients[0], 'control.st_mode', 'Release').successful
+    assert wire.writes() == [written('control.st_mode', (0,), unit=1)]
+    left.inject('set', 'control.run_dly', 3, address=2)
+    assert clients[1].call('refresh_parameters').success
+    names = [
+        'control.accel', 'freque.f_fix1', 'control.retard', 'control.st_mode', 'control.run_dly'
+    ]
+    wait_until(lambda: clients[1].parameter('control.run_dly') == 3, 'the change at the right one')
+    assert [tuple(values(client, *names).values()) for client in clients] == [
+        (6.0, 10.0, 7.0, 'Release', 0),
+        (5.0, 60.0, 7.0, 'Brake', 3),
+    ]
+    for client in clients:
+        assert set(SETTINGS) <= client.parameter_names()
+    # one that is silent keeps the other from nothing
+    left.inject('silence', 3600.0, address=2)
+    clients[1].wait_for('status', lambda status: not status.connected, 'it is lost')
+    assert set_one(clients[0], 'control.accel', 8.0).successful
+    refused(set_one(clients[1], 'control.accel', 8.0), 'control.accel', 'check the cable')
+    left.inject('silence', 0.0, address=2)

@@ -1,0 +1,130 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The settings of a drive as ROS parameters: which there are, of which type, and how described."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from bench import Bench
+from bench import Client
+from parameter_bench import QUIET
+from parameter_bench import SETTINGS
+from parameter_bench import Wire
+from parameter_bench import says_once
+from parameter_bench import values
+import pytest
+from rcl_interfaces.srv import DescribeParameters
+from support.parameter_ends import Ends
+from unit.catalog import setting_names
+
+ROWS = [line.split(',') for line in setting_names.SETTINGS.splitlines() if line]
+#: The name in the manual, by the name of the ROS parameter.
+MANUAL = {ros: name for _, name, ros, _ in ROWS}
+#: The type of the ROS parameter.
+TYPES = {
+    ros: {'bool': bool, 'integer': int, 'double': float, 'string': str}[type_]
+    for _, _, ros, type_ in ROWS
+}
+GROUPS = {name.partition('.')[0] for name in MANUAL}
+
+#: Some in full, copied from the manual [M0 table 2].
+IN_FULL = {
+    'motor.p_nom': 'P-Nom: Nominal motor output (RMS) [kW]',
+    'control.accel': 'Accel: Acceleration time from 0 to f-Nom [s]',
+    'control.st_mode': 'StMode: Stop mode',
+    'freque.f_fix1': 'F-fix1: Fixed frequency 1 [Hz]',
+    'error.overload_s_temp': 'OverLoad/S-Temp: Power monitor / Surround temperature [°C]',
+    'serial.sio_tot': 'SioTot: Serial interface timeout [s]',
+}
+
+
+def _listed(client: Client) -> set[str]:
+    """Return the names of the drive's parameters among those of its node."""
+    names = client.parameter_names()
+    return {name for name in names if name.partition('.')[0] in GROUPS and '.' in name}
+
+
+def test_every_setting_that_modbus_reaches_is_there_and_described(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    wire = Wire(bench.trace)
+    assert len(MANUAL) == 120
+    assert len(SETTINGS) == 119
+    assert _listed(client) == set(SETTINGS) == set(MANUAL) - {'control.any_bus'}
+    wrong = {name: value for name, value in values(client, *SETTINGS).items()
+             if type(value) is not TYPES[name]}
+    assert wrong == {}
+    described = client.call('describe_parameters', DescribeParameters, names=list(SETTINGS))
+    complaints = [
+        f'{ends.name}: {complaint}'
+        for shown, ends in zip(described.descriptors, SETTINGS.values(), strict=True)
+        for complaint in _complaints(shown, ends)
+    ]
+    assert complaints == []
+    assert wire.writes() == [], 'listing them is no reason to write'
+
+
+def test_any_bus_has_no_register_and_is_not_there(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    driver = bench.driver(*QUIET, '-p', 'control.any_bus:=PPO3')
+    client = bench.client().connected()
+    assert 'control.any_bus' not in _listed(client)
+    says_once(driver, 'this drive has no control.any_bus: not applied')
+    assert Wire(bench.trace).writes() == []
+
+
+def _complaints(shown: Any, ends: Ends) -> Iterator[str]:
+    """Return what is wrong with a descriptor."""
+    text = shown.description
+    if shown.name != ends.name:
+        yield f'named {shown.name}'
+    if not text.startswith(f'{MANUAL[ends.name]}: ') or text.endswith(': '):
+        yield f'not the name of the manual and a description: {text}'
+    if text != IN_FULL.get(ends.name, text):
+        yield f'not as in the manual: {text}'
+    unit = ends.unit.replace('Unit', '')
+    if ('[' in text or unit) and not text.endswith(f' [{unit}]'):
+        yield f'the unit is not {unit!r}: {text}'
+    if ends.unit == 'Unit' and 'pi_reg.unit' not in text:
+        yield f'does not say whose unit it has: {text}'
+    constraints = shown.additional_constraints
+    if ('the motor must be stopped' in constraints) != ends.stopped:
+        yield f'when it can be set: {constraints}'
+    if ('allow_communication_changes' in constraints) != ends.name.startswith('serial.'):
+        yield f'what it needs: {constraints}'
+    labels = ', '.join(label for label, _ in ends.codes)
+    if ends.codes and not constraints.startswith(f'one of {labels}'):
+        yield f'the labels are not {labels}: {constraints}'
+    if shown.read_only or shown.dynamic_typing:
+        yield 'the type is fixed, the value is not'
+    yield from _wrong_range(shown, ends)
+
+
+def _wrong_range(shown: Any, ends: Ends) -> Iterator[str]:
+    numbers = type(ends.low) in (int, float)
+    spans = [*shown.integer_range, *shown.floating_point_range]
+    if len(spans) != numbers or bool(shown.integer_range) != (type(ends.low) is int):
+        yield f'a range of the wrong kind: {spans}'
+        return
+    for span in spans:
+        if (span.from_value, span.to_value) != (ends.low, ends.high):
+            yield f'the range is not {ends.low} to {ends.high}: {span}'
+        step = 1 if ends.neighbours is None else ends.neighbours[1] - ends.neighbours[0]
+        if span.step != pytest.approx(step, rel=1e-6):
+            yield f'the step is not {step:g}: {span.step}'
