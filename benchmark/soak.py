@@ -25,6 +25,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+import signal
 import sys
 import tempfile
 import threading
@@ -35,6 +36,7 @@ from nfo_sinus_msgs.msg import Telemetry
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 
@@ -91,12 +93,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, default=60.0)
     minutes = parser.parse_args().minutes
+    # end what was started, however this ends
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.setdefault('ROS_DOMAIN_ID', '101')
     with tempfile.TemporaryFile() as log, Bench(log) as bench:
         bench.start_simulator()
         driver = bench.start_driver()
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         rider = Rider()
         executor = SingleThreadedExecutor()
         executor.add_node(rider)

@@ -200,6 +200,11 @@ class Parameter:
         """Whether the drive keeps it for people to read and write: a ROS parameter."""
         return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS
 
+    @property
+    def older(self) -> bool:
+        """Firmware that [M2] describes has it too; asking such a drive for others is a fault."""
+        return 'M2' in self.source
+
     def place(self, protocol: Protocol) -> Place:
         """
         Return where it stands on ``protocol``.

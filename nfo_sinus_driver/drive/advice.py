@@ -24,8 +24,8 @@ from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
 _SILENCE_ADVICE = (
-    'check in this order: BusType in the drive (MbusRtu; NFO is the factory setting), '
-    'jumper S5 (RS232 or RS485), the address, baud rate and parity'
+    'check in this order: BusType in the drive (NFO, which is classic, is the factory setting; '
+    'MbusRtu or MbusAsc for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
 )
 
 

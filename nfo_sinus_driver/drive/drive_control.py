@@ -186,7 +186,7 @@ class OptimalDriveControl:
         """Enable, then switch on, when the drive shows that it is enabled."""
         enabled = _OPTIMAL_READY | words_optimal.Control.ENABLE
         await self._registers.write(_WORD, enabled, Priority.SERVICE)
-        await reached(lambda seen: bool(seen.word & words_optimal.Status.ENABLED))
+        await reached(lambda seen: bool((seen.word or 0) & words_optimal.Status.ENABLED))
         await self._registers.write(_WORD, enabled | _OPTIMAL_RUN, Priority.SERVICE, once=True)
 
     async def stop(self, control_mode: str) -> None:

@@ -26,14 +26,18 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import Refused
 
 _log = logging.getLogger(__name__)
 
+#: Firmware from which on [M0] describes the Classic protocol [C3].
+_FIRST_OF_V2_03 = 4.28
 #: As long as RunDly of the G2 can be, s.
 _LONGEST_START_DELAY = 3600.0
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
@@ -89,6 +93,8 @@ class Inverter:
         self.speed = math.nan
         self.control_mode = ''
         self.unit = ''
+        #: Its firmware is of those that do not know every parameter ([M2], [C21]).
+        self._older = False
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
@@ -101,6 +107,8 @@ class Inverter:
         :param once: do not repeat a request when nobody answers.
         :raises LinkError: the drive does not answer.
         """
+        if not self.has('fieldbus.drive_status'):
+            return await self._look_at_code(priority, once)
         word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
         code = await self._registers.read_number('fieldbus.inv_st', priority, once=once)
         assert isinstance(word, int)
@@ -111,6 +119,15 @@ class Inverter:
             word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
             assert isinstance(word, int)
             seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
+        return self._saw(seen)
+
+    async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
+        """Do with the inverter status alone: older firmware has no status word [C21]."""
+        code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
+        assert isinstance(code, int)
+        return self._saw(InverterStatus(at, None, code, self.model))
+
+    def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
         if self.seen is None or seen.at >= self.seen.at:
             self.seen = seen
@@ -136,14 +153,24 @@ class Inverter:
 
         :raises LinkError: nobody does.
         """
-        if not self._registers.reaches('fieldbus.sw_ver'):
-            # it does not tell its firmware, so anything will do that every drive answers
-            await self._registers.read('fieldbus.inv_st', Priority.SERVICE)
+        # anything will do that every drive answers
+        await self._registers.read('fieldbus.inv_st', Priority.SERVICE)
+        classic = self._registers.protocol is Protocol.CLASSIC
+        self._older = classic and self.settings.classic_dialect == 'v5.0'
+        if self._older or not self._registers.reaches('fieldbus.sw_ver'):
             self.identity = Identity()
             return self.identity
-        firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
-        motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
-        self.identity = Identity(firmware, int(motor))
+        try:
+            firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
+            motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
+        except Refused:
+            if not classic or self.settings.classic_dialect:
+                raise
+            self._older = True
+            self.identity = Identity()
+        else:
+            self._older = classic and firmware < _FIRST_OF_V2_03
+            self.identity = Identity(firmware, int(motor))
         return self.identity
 
     async def introduce(self) -> Identity:
@@ -222,7 +249,7 @@ class Inverter:
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
-        if not self._registers.reaches(key):
+        if not self._registers.reaches(key) or (self._older and not self.model[key].older):
             return False
         since = self.model[key].since
         firmware = self.identity.firmware if self.identity else math.nan

@@ -22,7 +22,7 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.inverter import Inverter
 
 #: The driver's own setting that goes with each setting of the line.
-_FOLLOWERS = {
+FOLLOWERS = {
     'serial.bus_type': 'protocol',
     'serial.address': 'address',
     'serial.si_baud': 'baud_rate',
@@ -56,7 +56,7 @@ def why_not(key: str, inverter: Inverter) -> str:
 
 def after_change(changed: Mapping[str, Value]) -> str:
     """Return how to follow a drive to new settings of the line, ``''`` if none was changed."""
-    follow = [f'{_FOLLOWERS[key]} ({value})' for key, value in changed.items() if key in _FOLLOWERS]
+    follow = [f'{FOLLOWERS[key]} ({value})' for key, value in changed.items() if key in FOLLOWERS]
     if not follow:
         return ''
     return (

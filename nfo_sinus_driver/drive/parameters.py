@@ -33,6 +33,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
+from nfo_sinus_driver.drive.parameter_guard import FOLLOWERS
 from nfo_sinus_driver.drive.parameter_guard import after_change
 from nfo_sinus_driver.drive.parameter_guard import why_not
 from nfo_sinus_driver.drive.parameter_writer import Change
@@ -50,7 +51,7 @@ _log = logging.getLogger(__name__)
 
 #: How long one round of reading every parameter again takes at least, s: a change at the keypad
 #: is seen within 10 s, and a fast line is not kept busy for nothing.
-_ROUND = 9.2
+_ROUND = 9.4
 #: How often it is looked whether there is something to read, s.
 _WAIT = 0.5
 #: How often progress is logged while the parameters are read for the first time, s.
@@ -93,6 +94,7 @@ class Parameters:
         self._turn = Lock(bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()
+        self._rounds = 0
         #: How many are still to be read, and of how many, before the drive is known.
         self._unread = self._total = 0
 
@@ -259,7 +261,11 @@ class Parameters:
     async def _watch_round(self) -> None:
         inverter = self._inverter
         keys = self._keys
-        due = [key for key in keys if not self._cannot_change(key)]
+        # without these the drive could hardly be read any more, so one of them in a round will do
+        rare = [key for key in keys if key in FOLLOWERS]
+        self._rounds += 1
+        skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
+        due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
         for key in due:
             # many drives on a line take their time, lest nothing but that goes on
             earliest = time.monotonic() + _ROUND * self._bus.refreshing / len(due)

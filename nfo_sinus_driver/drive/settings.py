@@ -21,6 +21,7 @@ import math
 
 from nfo_sinus_driver.catalog import MODELS
 
+CLASSIC_DIALECTS = ('', 'v2.03', 'v5.0')
 CONTROL_METHODS = ('mode_scmd', 'drive_control', 'monitor')
 #: The fixed references of the drive, forward and reverse.
 _FIXED = tuple(f'fix{number}{way}' for number in range(1, 8) for way in ('', '_reverse'))
@@ -52,6 +53,8 @@ class DriveSettings:
     :ivar setpoint_timeout: s; 0 turns it off.
     :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
     :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are.
+    :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
+        older ``v5.0``; '' asks it for its firmware.
     :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
     :raises ValueError: a field that makes no sense; the message says what would.
     """
@@ -68,6 +71,7 @@ class DriveSettings:
     drive_timeout: float = 0.0
     shutdown_timeout: float = 4.0
     allow_communication_changes: bool = False
+    classic_dialect: str = ''
     retries: int = 2
 
     @property
@@ -85,6 +89,7 @@ class DriveSettings:
             raise ValueError(
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
             )
+        _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *CONTROL_MODES))
         if self.address not in _MODBUS_ADDRESSES:
             raise ValueError(f'address {self.address}: a Modbus drive has 1 to 247')

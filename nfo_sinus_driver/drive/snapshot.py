@@ -51,13 +51,13 @@ class InverterStatus:
     What the drive's status word and its inverter status say at one moment.
 
     :ivar at: when the answer arrived, s of ``time.monotonic``.
-    :ivar word: DriveStatus, the low 16 bits [C24].
+    :ivar word: DriveStatus, the low 16 bits [C24]; ``None`` if the drive has none [C21].
     :ivar code: the inverter status code, read without acknowledging.
     :ivar model: whose words these are.
     """
 
     at: float
-    word: int
+    word: int | None
     code: int
     model: Model
 
@@ -73,18 +73,34 @@ class InverterStatus:
 
     @property
     def facts(self) -> Fact:
-        """What the drive says of itself; only the facts in ``model.dialect.valid`` count."""
-        return self.model.dialect.facts(self.word, self.listed.kind)
+        """What the drive says of itself; only those in :attr:`valid` count."""
+        if self.word is not None:
+            return self.model.dialect.facts(self.word, self.listed.kind)
+        facts = Fact.OPERATION_ENABLED if self.code in self.codes.bus_running else Fact(0)
+        if self.code in self.codes.bus_running | self.codes.bus_standby:
+            facts |= Fact.NETWORK_CONTROL
+        if self.kind is Kind.ALARM:
+            facts |= Fact.ALARM
+        return facts | Fact.FAULT if self.kind is Kind.FAULT else facts
+
+    @property
+    def valid(self) -> Fact:
+        """What the drive can say of itself at all."""
+        if self.word is not None:
+            return self.model.dialect.valid
+        return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
 
     @property
     def kind(self) -> Kind:
         """How grave the code is; the bits have the last word ([C50], [C95])."""
+        if self.word is None:
+            return self.listed.kind
         return self.model.dialect.kind(self.word, self.listed.kind)
 
     @property
     def state(self) -> State:
         """The state of the generic state machine."""
-        return self.model.dialect.state(self.word)
+        return State.UNKNOWN if self.word is None else self.model.dialect.state(self.word)
 
     @property
     def faulted(self) -> bool:

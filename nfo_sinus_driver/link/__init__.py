@@ -15,8 +15,10 @@
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import GatewaySilent
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NoPath
 from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
@@ -27,12 +29,14 @@ from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.keeper import Keeper
+from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.open import open_link
 from nfo_sinus_driver.link.settings import LineSettings
 
 __all__ = [
     'Address',
     'DamagedAnswer',
+    'GatewaySilent',
     'Identification',
     'Inquiry',
     'Keeper',
@@ -40,10 +44,12 @@ __all__ = [
     'Link',
     'LinkError',
     'NoAnswer',
+    'NoPath',
     'NotReady',
     'PortError',
     'Refused',
     'Reply',
     'Words',
+    'line_settings',
     'open_link',
 ]

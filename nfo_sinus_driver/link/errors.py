@@ -37,6 +37,14 @@ class NoAnswer(LinkError):
     maybe_done = True
 
 
+class GatewaySilent(NoAnswer):
+    """The gateway itself said nothing in time, not even that the drive is silent."""
+
+
+class NoPath(LinkError):
+    """A gateway does not know where the drive is; the message says what to do."""
+
+
 class DamagedAnswer(LinkError):
     """Something came, but no answer to this request: noise, a collision or wrong line settings."""
 
@@ -47,18 +55,22 @@ class Refused(LinkError):
     """
     The drive answered that it will not.
 
-    :ivar code: the Modbus exception code.
+    :ivar code: the Modbus exception code, or on other protocols the one that means the same.
+    :ivar inv_st: the inverter status that it told as the reason, where it did.
     """
 
     ILLEGAL_FUNCTION = 1
     ILLEGAL_ADDRESS = 2
     ILLEGAL_VALUE = 3
     DEVICE_FAILURE = 4
+    NO_PATH = 10
+    NO_ANSWER = 11
 
-    def __init__(self, code: int) -> None:
+    def __init__(self, code: int, reason: str = '', inv_st: int | None = None) -> None:
         self.code = code
+        self.inv_st = inv_st
         text = _REFUSALS.get(code, 'the drive refused')
-        super().__init__(f'{text} (exception {code})')
+        super().__init__(reason or f'{text} (exception {code})')
 
 
 _REFUSALS = {
@@ -69,8 +81,8 @@ _REFUSALS = {
     5: 'the drive needs more time',
     6: 'the drive is busy',
     8: 'the drive found a memory error',
-    10: 'the gateway has no path to the drive',
-    11: 'the gateway got no answer from the drive',
+    Refused.NO_PATH: 'the gateway has no path to the drive',
+    Refused.NO_ANSWER: 'the gateway got no answer from the drive',
 }
 
 

@@ -56,7 +56,7 @@ _AUTOSTART_LONGEST_REST = 4.0
 #: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 #: What identifies a drive or how it is commanded cannot change under way.
-_ONLY_UNCONFIGURED = ('address', 'model', 'control_method', 'reference')
+_ONLY_UNCONFIGURED = ('address', 'model', 'control_method', 'reference', 'classic_dialect')
 
 _Transition = Callable[['DriveNode', LifecycleState], TransitionCallbackReturn]
 

@@ -90,8 +90,8 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
 def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
     facts = seen.facts
     message.state = _STATES[seen.state]
-    message.status_word = seen.word
-    message.valid = seen.model.dialect.valid.value
+    message.status_word = seen.word or 0
+    message.valid = seen.valid.value
     # the facts have the names and the bits that the message has
     for fact in Fact:
         setattr(message, str(fact.name).lower(), fact in facts)

@@ -244,6 +244,13 @@ DRIVE_SETTINGS = (
         False,
         'Let the parameters serial.* be changed: the driver may lose the drive by that',
     ),
+    Setting(
+        'classic_dialect',
+        '',
+        'Which manual of the Classic protocol the drive follows: v2.03, or v5.0 for firmware '
+        "before 4.28; '': ask the drive, which older ones take for a fault",
+        constraints="'', v2.03 or v5.0",
+    ),
     Setting('frame_id', '', 'frame_id of the headers'),
 )
 

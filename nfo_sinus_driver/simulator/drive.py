@@ -26,8 +26,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from collections.abc import Sequence
+from fractions import Fraction
 
 from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
@@ -35,14 +37,19 @@ from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.simulator import identification
 from nfo_sinus_driver.simulator.control_source import Source
+from nfo_sinus_driver.simulator.faults import REFUSALS
 from nfo_sinus_driver.simulator.faults import SERIAL
 from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.faults import SioErr
+from nfo_sinus_driver.simulator.firmware import firmware_of
+from nfo_sinus_driver.simulator.firmware import version
 from nfo_sinus_driver.simulator.identification import KNOWN
 from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.memory import RegisterMap
+from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -58,6 +65,8 @@ LINE_SETTINGS = frozenset(
 )
 #: Who runs the motor, by drive family: what one does its own way.
 _RUNNERS: Mapping[str, type[Runner]] = {'sinus_g2': G2Runner, 'sinus_optimal': OptimalRunner}
+#: By these the bus takes control.
+COMMANDS = frozenset({'fieldbus.mode', 'fieldbus.drive_control'})
 #: The longest step of model time (s) while something moves, and while nothing does.
 _STEP = 0.005
 _IDLE_STEP = 0.1
@@ -75,14 +84,18 @@ class SimulatedDrive:
     :param serial_number: at most 16 characters; by default one for each address.
     :param newer_functions: how it treats functions 17, 23 and 43: ``known``, ``refused`` as by
         older firmware, or ``silent``.
+    :param lenient: a Classic message that it refuses is no serial fault.
     :raises ValueError: an unknown model or parameter, or a value that the drive would refuse.
 
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
+    :ivar firmware: what its firmware does its own way.
+    :ivar tears: how many times yet a counter goes on between the readings of its two halves.
     :ivar time: model time since the start (s).
     :ivar identification: the objects of Read Device Identification, by number [M0 §6.2.4].
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
     :ivar command_writes: how often it wrote each set-point or command, by key.
-    :ivar ack_reads: how often 02A4h was read, which acknowledges.
+    :ivar ack_reads: how often 02A4h or E00E8 was read, which acknowledges.
+    :ivar sio_err_reads: how often SioErr was read, which clears it and Sio Fail.
     :ivar mode_ext_writes: how often MODE = 2 was written, which may start the motor.
     """
 
@@ -96,6 +109,7 @@ class SimulatedDrive:
         boot_time: float = 2.0,
         serial_number: str | None = None,
         newer_functions: str = KNOWN,
+        lenient: bool = False,
     ) -> None:
         self.model = load_model(model)
         machine = machine_of(self.model)
@@ -108,7 +122,8 @@ class SimulatedDrive:
             and key not in self._setpoints
         )
         self.memory = Memory(machine, {**(settings or {}), 'serial.address': address})
-        self.faults = Faults(self.model)
+        self.firmware = firmware_of(self.memory)
+        self.faults = Faults(self.model, self.firmware.log_size)
         self.motor = Motor(nameplate(self.memory))
         self.counters = Counters()
         self.runner = _RUNNERS[model](self.memory, self.motor, self.faults, self.counters)
@@ -120,8 +135,11 @@ class SimulatedDrive:
         self.writes: Counter[str] = Counter()
         self.command_writes: Counter[str] = Counter()
         self.ack_reads = 0
+        self.sio_err_reads = 0
         self.mode_ext_writes = 0
+        self.tears = 0
         self.time = 0.0
+        self._lenient = lenient
         self._registers = RegisterMap(self.model)
         self._origin: float | None = None
         self._boot_left = 0.0
@@ -161,6 +179,9 @@ class SimulatedDrive:
 
         :raises Refused: no such parameter, or not its length.
         """
+        entry = self._registers.log_entry(register, count)
+        if entry is not None:
+            return ErrorLogArea.TYPE.to_words(self.faults.log_word(entry))
         parameter = self._registers.find(register, count)
         return parameter.place(Protocol.MODBUS).type.to_words(self.read_raw(parameter.key))
 
@@ -171,7 +192,10 @@ class SimulatedDrive:
         :raises Refused: as the reason says.
         """
         parameter = self._registers.find(register, len(words))
-        self.write_raw(parameter.key, parameter.place(Protocol.MODBUS).type.to_raw(words))
+        raw = parameter.place(Protocol.MODBUS).type.to_raw(words)
+        self.write_raw(parameter.key, raw)
+        if parameter.key in COMMANDS:
+            self.runner.by_fieldbus = self.firmware.own_bus_codes
 
     def write_and_read(
         self, register: int, words: Sequence[int], source: int, count: int
@@ -187,7 +211,8 @@ class SimulatedDrive:
 
     def read_raw(self, key: str) -> int:
         """
-        Read a parameter as the bus does, side effects included.
+        Read a parameter as the bus does, a number of the memory, side effects included.
+
 
         :raises Refused: ADDRESS; it can only be written.
         """
@@ -199,11 +224,16 @@ class SimulatedDrive:
             self.faults.acknowledge()
             self._settle()
             return code
+        if key == 'fieldbus.sio_err':
+            self.sio_err_reads += 1
+            flags = self.faults.take_sio_err()
+            self._settle()
+            return flags
         return self._peek(key)
 
     def write_raw(self, key: str, raw: int) -> None:
         """
-        Write a parameter as the bus does.
+        Write a parameter as the bus does, a number of the memory.
 
         :raises Refused: ADDRESS when it can only be read, VALUE or STATE.
         """
@@ -224,6 +254,17 @@ class SimulatedDrive:
         counter = self.writes if key in self.settings else self.command_writes
         counter[key] += 1
         self._settle()
+
+    def serial_error(self, what: SioErr) -> None:
+        """
+        Note what went wrong on the line; a serial fault if the bus has control [M0 §6.1.5].
+
+        That another fault blocks the drive is no fault of its own.
+        """
+        self.faults.sio_err |= what
+        harmless = REFUSALS if self._lenient else SioErr.BLOCKED
+        if self._bus_controls and what & ~harmless:
+            self.trip(SIO_FAIL)
 
     # ---- what happens to it ----
 
@@ -302,6 +343,16 @@ class SimulatedDrive:
         return self.serial.address
 
     @property
+    def version(self) -> Fraction | None:
+        """SWVer; ``None`` of a drive that has none."""
+        return version(self.memory)
+
+    @property
+    def inv_st_text(self) -> str:
+        """What the display says."""
+        return self.model.inv_st_text(self.inv_st, self.version)
+
+    @property
     def inv_st(self) -> int:
         """The inverter status, without acknowledging anything [M0 table 19]."""
         return self.faults.shown or self.runner.inv_st
@@ -314,7 +365,10 @@ class SimulatedDrive:
             key = self.runner.setpoint_key
         if key in ('fieldbus.inv_st', 'fieldbus.inv_st_with_ack'):
             return self.inv_st
-        shown = measure(self.memory.model[key], self.motor, self.counters)
+        if key == 'fieldbus.sio_err':
+            return self.faults.sio_err
+        parameter = self.memory.model[key]
+        shown = measure(parameter, home(parameter), self.motor, self.counters)
         if shown is None:
             shown = self.runner.show(key)
         return self.memory.raw(key) if shown is None else shown
@@ -361,8 +415,8 @@ class SimulatedDrive:
                 self._booted()
             return
         self.serial.advance(dt)
-        if self._bus_controls and self.serial.timed_out:
-            self.trip(SIO_FAIL)
+        if self.serial.timed_out:
+            self.serial_error(SioErr.TIMEOUT)
         self.runner.wait(dt)
         self.motor.advance(dt)
         self.counters.advance(dt, self.motor)

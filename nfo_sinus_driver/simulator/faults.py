@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import enum
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
@@ -27,8 +28,35 @@ from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 #: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges them
 #: [M0 §6.1.5].
 SERIAL = frozenset({SIO_FAIL, BUS_FAIL})
-#: Entries that the error log holds [C4].
-_LOG_SIZE = 128
+
+
+class SioErr(enum.IntFlag):
+    """What may go wrong on the line: the flags of SioErr [M2 table 4]."""
+
+    BLOCKED = 1 << 0
+    PARITY = 1 << 1
+    CHECK_SUM = 1 << 2
+    STRUCTURE = 1 << 3
+    TIMEOUT = 1 << 4
+    PREFIX = 1 << 5
+    NOT_PERMITTED = 1 << 6
+    UNKNOWN = 1 << 7
+    UNREADABLE = 1 << 8
+    UNWRITABLE = 1 << 9
+    OUT_OF_RANGE = 1 << 10
+    OVERRUN = 1 << 14
+
+
+#: The flags of messages that were understood and are not carried out.
+REFUSALS = (
+    SioErr.BLOCKED
+    | SioErr.PREFIX
+    | SioErr.NOT_PERMITTED
+    | SioErr.UNKNOWN
+    | SioErr.UNREADABLE
+    | SioErr.UNWRITABLE
+    | SioErr.OUT_OF_RANGE
+)
 
 
 @dataclass(frozen=True)
@@ -45,10 +73,13 @@ class Faults:
 
     A drive whose status word has a bit for alarms can have alarms too, which stop nothing.
 
+    :param log_size: entries that the error log holds [C4].
+
     :ivar log: the error log, newest first.
+    :ivar sio_err: what went wrong on the line since it was last read.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, log_size: int) -> None:
         self._model = model
         self._kinds = {Kind.FAULT}
         if Fact.ALARM in model.dialect.by_bit.values():
@@ -57,6 +88,8 @@ class Faults:
         self._kept = {SIO_FAIL} if 'fieldbus.sio_err' in model else set()
         self._present: dict[int, bool] = {}
         self.log: list[LogEntry] = []
+        self._log_size = log_size
+        self.sio_err = SioErr(0)
 
     def __bool__(self) -> bool:
         return bool(self.codes)
@@ -91,7 +124,7 @@ class Faults:
             raise ValueError(f'{code} is no fault of {self._model.name}: see its InvSt')
         if code not in self._present:
             self.log.insert(0, LogEntry(code, op_time))
-            del self.log[_LOG_SIZE:]
+            del self.log[self._log_size :]
         self._present[code] = cause_present
 
     def end_causes(self) -> None:
@@ -111,10 +144,26 @@ class Faults:
 
     def acknowledge_serial(self) -> None:
         """Acknowledge the serial channel's faults, as MODE = Stop does [M0 §6.1.5]."""
+        self.sio_err = SioErr(0)
         self._present = {code: cause for code, cause in self._present.items() if code not in SERIAL}
+
+    def take_sio_err(self) -> SioErr:
+        """Return the flags of SioErr and clear them, and Sio Fail unless its cause lasts."""
+        flags, self.sio_err = self.sio_err, SioErr(0)
+        if not self._present.get(SIO_FAIL, True):
+            del self._present[SIO_FAIL]
+        return flags
+
+    def log_word(self, entry: int) -> int:
+        """Return an entry of the log, 0 being the newest, as 32 bits; 0 if it is empty [M2 §9]."""
+        if entry >= len(self.log):
+            return 0
+        one = self.log[entry]
+        return one.code << 24 | int(10 * one.op_time) & 0xFFFFFF
 
     def restart(self) -> None:
         """Forget the faults whose cause is gone, as a power cycle does; the log stays."""
+        self.sio_err = SioErr(0)
         self._present = {code: True for code, cause in self._present.items() if cause}
 
     def _of(self, kind: Kind) -> list[int]:

@@ -26,6 +26,7 @@ from typing import Any
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.line import Line
 
 #: Stands for an argument that must be given.
@@ -166,6 +167,18 @@ def _line_dead(target: Target, given: dict[str, Any]) -> None:
     target.line.faults.dead_until = target.now + given['seconds']
 
 
+def _sio_error(target: Target, given: dict[str, Any]) -> None:
+    try:
+        flag = SioErr(1 << given['bit'])
+    except ValueError:
+        raise ValueError(f'SioErr has no bit {given["bit"]}') from None
+    target.one.serial_error(flag)
+
+
+def _torn(target: Target, given: dict[str, Any]) -> None:
+    target.one.tears += given['times']
+
+
 def _load(target: Target, given: dict[str, Any]) -> None:
     target.one.motor.load = given['share']
 
@@ -194,6 +207,16 @@ VERBS: Mapping[str, Verb] = {
     'ack-cause-gone': Verb(
         'take away the causes of all faults, so that they can be acknowledged',
         lambda target, _: target.one.end_fault_causes(),
+    ),
+    'sio-error': Verb(
+        'let something go wrong on the line: a flag of SioErr, and Sio Fail under bus control',
+        _sio_error,
+        (Argument('bit', int, 'bit of SioErr, such as 1: parity'),),
+    ),
+    'torn': Verb(
+        'let a counter carry just after Classic has read one of its two words',
+        _torn,
+        (Argument('times', int, 'how many times', 1),),
     ),
     'run': Verb(
         'switch the digital input RUN',

@@ -32,16 +32,18 @@ from nfo_sinus_driver.simulator.line_faults import LineFaults
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.protocol import Protocol
 from nfo_sinus_driver.simulator.receiver import Arrived
-from nfo_sinus_driver.simulator.receiver import Protocol
 from nfo_sinus_driver.simulator.receiver import Receiver
-from nfo_sinus_driver.simulator.timing import BAUD_CODES
-from nfo_sinus_driver.simulator.timing import FORMAT_CODES
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.trace import Trace
 
 #: How long to wait before a port that could not come back is tried again (s).
 _TRY_AGAIN = 0.1
+#: By how much an RTU frame is shorter than the same one of Modbus TCP.
+_SHORTER = 4
+#: Whose echo is.
+_NOBODY = -1
 
 
 @dataclass
@@ -52,6 +54,7 @@ class _Answer:
     reply: Reply
     sent: int = 0
     began: float = 0.0
+    is_echo: bool = False
 
 
 @dataclass(order=True)
@@ -70,6 +73,8 @@ class Line:
 
     :param paced: bytes take the time that they take on a real line, never less.
     :param turnaround: time a drive takes before it answers (s).
+    :param echo: whatever comes in goes out again, as from a half-duplex adapter.
+    :param always_heard: the drives hear it whatever protocol, speed and format they are set to.
     :param clock: for the stamps of bytes that go out (s); everything else is told the time.
     """
 
@@ -83,18 +88,26 @@ class Line:
         *,
         paced: bool = False,
         turnaround: float = 0.0,
+        echo: bool = False,
+        always_heard: bool = False,
         trace: Trace | None = None,
     ) -> None:
         self.port = port
         self.protocol = protocol
         self.drives = drives
         self.timing = timing
-        self.faults = LineFaults()
+        self.faults = LineFaults(int(timing.char_format[0]))
         self._clock = clock
         self._trace = trace
-        self._character = timing.character if paced else 0.0
-        self._pause = max(turnaround, timing.t35 if paced else 0.0)
-        self._receiver = Receiver(protocol, self._character, timing.t35)
+        self._echo = echo
+        self._always_heard = always_heard
+        character = timing.character if paced else 0.0
+        self._character = character if protocol.serial else 0.0
+        #: Of the line behind a gateway.
+        self._character_behind = 0.0 if protocol.serial else character
+        self._pause = max(turnaround, protocol.gap(timing) if paced else 0.0)
+        self._receiver = Receiver(protocol, self._character, protocol.patience(timing))
+        self._echo_end = float('-inf')
         self._deliveries: list[_Delivery] = []
         self._order = itertools.count()
         self._gone_until: float | None = None
@@ -108,6 +121,8 @@ class Line:
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""
+        if self._echo:
+            self._send_back(data, now)
         for arrived in self._receiver.feed(data, now):
             self._handle(arrived)
 
@@ -143,42 +158,58 @@ class Line:
         request = self.protocol.unwrap(arrived.data)
         dead = arrived.last < self.faults.dead_until
         if self._trace is not None:
-            note = 'lost' if dead else 'rubbish' if request is None else ''
+            rubbish = request is None or not request.whole
+            note = 'lost' if dead else 'rubbish' if rubbish else ''
             self._trace.record('request', arrived.data, arrived.first, arrived.last, note)
         if dead or request is None:
             return
-        address, pdu = request
-        everybody = self.protocol.broadcast(address, pdu)
+        there = answered = False
         for drive in self.drives:
-            if not everybody and drive.address != address:
+            if not self.protocol.concerns(drive, request):
                 continue
+            there = True
             drive.advance_to(arrived.last)
             if not self._hears(drive):
                 continue
-            drive.heard()
-            answer = self.protocol.answer(drive, pdu)
-            if answer and not everybody:
-                self._send(address, answer, arrived.last)
+            # carrying it out may change it
+            address = drive.address
+            if request.whole:
+                drive.heard()
+            frame = self.protocol.answer(drive, request)
+            if frame:
+                answered = True
+                instead = self.protocol.instead(request, there)
+                replies = self.faults.alter(address, frame, instead)
+                self._send(address, replies, arrived)
+        if not answered:
+            refusal = self.protocol.instead(request, there)
+            self._send(request.address, [refusal] if refusal else [], arrived)
 
     def _hears(self, drive: SimulatedDrive) -> bool:
-        serial = drive.serial
-        return (
-            drive.listening
-            and self.protocol.speaks(drive)
-            and serial.baud == BAUD_CODES[self.timing.baud]
-            and serial.char_format == FORMAT_CODES[self.timing.char_format]
-        )
+        if not drive.listening:
+            return False
+        return self._always_heard or drive.serial.hears(self.protocol.bus_type, self.timing)
 
-    def _send(self, address: int, pdu: bytes, asked: float) -> None:
-        start = asked + self._pause
-        for reply in self.faults.alter(address, self.protocol.wrap(address, pdu)):
-            answer = _Answer(address, reply)
+    def _send(self, address: int, replies: Sequence[Reply], asked: Arrived) -> None:
+        for reply in replies:
             length = len(reply.data)
-            begin = max(start + reply.delay, self._free(address))
-            end = begin + length * self._character
-            if self._character:
-                self._schedule(begin + self._character, answer, 1)
-            self._schedule(end, answer, length)
+            start = asked.last + self._pause + reply.delay
+            if self._character_behind:
+                # both ways in RTU frames, which are shorter than those of TCP
+                both = len(asked.data) + length - 2 * _SHORTER
+                start += both * self._character_behind
+            self._on_its_way(_Answer(address, reply), max(start, self._free(address)))
+
+    def _on_its_way(self, answer: _Answer, begin: float) -> None:
+        length = len(answer.reply.data)
+        if self._character:
+            self._schedule(begin + self._character, answer, 1)
+        self._schedule(begin + length * self._character, answer, length)
+
+    def _send_back(self, data: bytes, now: float) -> None:
+        begin = max(now, self._echo_end)
+        self._echo_end = begin + len(data) * self._character
+        self._on_its_way(_Answer(_NOBODY, Reply(data), is_echo=True), begin)
 
     def _free(self, address: int) -> float:
         """Return when a drive that has answers on their way may begin the next, a new frame."""
@@ -194,10 +225,11 @@ class Line:
         stamp = self._clock()
         if not answer.sent:
             answer.began = stamp
-        dead = now < self.faults.dead_until
+        # the adapter hears itself on a dead line, too
+        dead = now < self.faults.dead_until and not answer.is_echo
         if not dead:
             self.port.send(data[answer.sent : delivery.until])
         answer.sent = delivery.until
-        if delivery.until == len(data) and self._trace is not None:
+        if delivery.until == len(data) and self._trace is not None and not answer.is_echo:
             note = 'lost' if dead else answer.reply.note
             self._trace.record('answer', data, answer.began, stamp, note)

@@ -22,6 +22,8 @@ import random
 
 #: Faults of the next answers.
 ANSWER_FAULTS = ('noise', 'damage', 'delay', 'drop', 'double')
+#: Those that an answer does not survive where a gateway reads it, and what the trace calls them.
+_NOTES = {'noise': 'noise', 'damage': 'damaged', 'drop': 'lost'}
 
 
 @dataclass
@@ -45,10 +47,13 @@ class LineFaults:
     """
     The faults that wait for the next answers.
 
+    :param bits: data bits of a character.
+
     :ivar dead_until: until when the whole line carries nothing, either way.
     """
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, bits: int = 8, seed: int = 0) -> None:
+        self._bits = bits
         self.dead_until = float('-inf')
         self._pending: list[_Pending] = []
         self._random = random.Random(seed)
@@ -69,17 +74,26 @@ class LineFaults:
         self._pending.clear()
         self.dead_until = float('-inf')
 
-    def alter(self, address: int, frame: bytes) -> list[Reply]:
-        """Return what goes on the line in place of an answer."""
+    def alter(self, address: int, frame: bytes, instead: Reply | None = None) -> list[Reply]:
+        """
+        Return what goes on the line in place of an answer.
+
+        :param instead: what a gateway says when the answer does not reach it whole.
+        """
         replies = [Reply(frame)]
         for fault in list(self._pending):
             if fault.address in (None, address):
-                replies = [new for reply in replies for new in self._spoiled(fault, reply)]
+                replies = [
+                    new for reply in replies for new in self._spoiled(fault, reply, instead)
+                ]
                 fault.left -= 1
         self._pending = [fault for fault in self._pending if fault.left > 0]
         return replies
 
-    def _spoiled(self, fault: _Pending, reply: Reply) -> list[Reply]:
+    def _spoiled(self, fault: _Pending, reply: Reply, instead: Reply | None) -> list[Reply]:
+        if fault.what in _NOTES and instead is not None:
+            delay = reply.delay + instead.delay
+            return [replace(instead, delay=delay, note=_noted(reply, _NOTES[fault.what]))]
         if fault.what == 'drop':
             return []
         if fault.what == 'double':
@@ -88,10 +102,14 @@ class LineFaults:
             note = _noted(reply, 'delayed')
             return [replace(reply, delay=reply.delay + fault.seconds, note=note)]
         if fault.what == 'noise':
-            data = self._random.randbytes(self._random.randint(1, 5)) + reply.data
+            noise = self._random.randbytes(self._random.randint(1, 5))
+            mask = (1 << self._bits) - 1
+            data = bytes(byte & mask for byte in noise) + reply.data
             return [replace(reply, data=data, note=_noted(reply, 'noise'))]
         damaged = bytearray(reply.data)
-        damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(8)
+        damaged[self._random.randrange(len(damaged))] ^= (
+            1 << self._random.randrange(self._bits)
+        )
         return [replace(reply, data=bytes(damaged), note=_noted(reply, 'damaged'))]
 
 

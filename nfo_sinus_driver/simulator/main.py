@@ -27,16 +27,18 @@ from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.simulator.control import ControlError
+from nfo_sinus_driver.simulator.doors import GATEWAY_TIMEOUT
+from nfo_sinus_driver.simulator.doors import PROTOCOLS
+from nfo_sinus_driver.simulator.firmware import DIALECTS
 from nfo_sinus_driver.simulator.identification import KNOWN
 from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.inject import inject
 from nfo_sinus_driver.simulator.injections import parse_setting
 from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.ports import PortError
-from nfo_sinus_driver.simulator.simulator import PROTOCOLS
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.timing import BAUD_CODES
-from nfo_sinus_driver.simulator.timing import FORMAT_CODES
+from nfo_sinus_driver.simulator.timing import FORMATS
 
 #: Lets the line's thread go on soon after another one was busy (s).
 _SWITCH_INTERVAL = 0.0002
@@ -80,11 +82,13 @@ def _serve(simulator: Simulator) -> int:
     sys.setswitchinterval(_SWITCH_INTERVAL)
     drives = 'drive' if len(simulator.drives) == 1 else 'drives'
     addresses = ', '.join(str(address) for address in simulator.drives)
+    first, *others = (
+        f'{line.protocol.name} at {line.timing.baud} {line.timing.char_format} on {line.port.name}'
+        for line in simulator.lines
+    )
+    also = ''.join(f'; also {other}' for other in others)
     print(
-        f'serving {simulator.protocol} at {simulator.timing.baud} '
-        f'{simulator.timing.char_format} on {simulator.port}, {drives} {addresses}; '
-        f'control {simulator.control}',
-        flush=True,
+        f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True
     )
     # the line has a thread of its own: this one waits for a signal, or for a failure there
     simulator.finished.wait()
@@ -129,6 +133,11 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         tcp=options.tcp,
         baud=options.baud,
         char_format=options.char_format,
+        also=options.also,
+        dialect=options.dialect,
+        lenient=options.lenient,
+        echo=options.echo,
+        gateway_timeout=options.gateway_timeout,
         paced=options.paced,
         turnaround=options.turnaround,
         trace=options.trace,
@@ -193,8 +202,35 @@ def _parser() -> argparse.ArgumentParser:
     )
     add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
-    add('--baud', type=int, default=19200, choices=BAUD_CODES, help='default: 19200')
-    add('--char-format', default='8E1', choices=FORMAT_CODES, help='default: 8E1')
+    add(
+        '--also',
+        action='append',
+        default=[],
+        metavar='PROTOCOL:PLACE',
+        help='serve the same drives by another protocol as well, at a link or TCP port; may be '
+        'repeated',
+    )
+    add('--baud', type=int, choices=BAUD_CODES, help='default: 19200, of classic 9600')
+    add('--char-format', choices=FORMATS, help='default: 8E1, of classic and modbus_ascii 7E1')
+    add(
+        '--dialect',
+        choices=DIALECTS,
+        help='the manual that describes the Classic protocol of the drives (default: as their '
+        'firmware, fieldbus.sw_ver, says)',
+    )
+    add(
+        '--lenient',
+        action='store_true',
+        help='a Classic message that is refused while the bus has control is no serial fault',
+    )
+    add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
+    add(
+        '--gateway-timeout',
+        type=_seconds,
+        default=GATEWAY_TIMEOUT,
+        metavar='SECONDS',
+        help=f'how long the gateway of modbus_tcp waits for a drive (default: {GATEWAY_TIMEOUT})',
+    )
     add('--paced', action='store_true', help='bytes take the time they take on a real line')
     add(
         '--turnaround',

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.simulator.memory import home
+from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.simulator.motor import Motor
 
 _HOUR = 3600.0
@@ -55,6 +55,16 @@ class Counters:
             self.sigma_e_out += energy
         if motor.chopper:
             self.br_time += dt
+
+    def carry(self, parameter: Parameter) -> bool:
+        """Let a counter go on to where its low word begins anew; ``False`` if it is none."""
+        name = parameter.key.removeprefix('status.')
+        if name not in self.__dict__:
+            return False
+        factor = float(parameter.factor(Protocol.CLASSIC))
+        high = round(getattr(self, name) / factor) >> 16
+        setattr(self, name, (high + 1 << 16) * factor)
+        return True
 
 
 def _process(motor: Motor) -> float:
@@ -90,12 +100,13 @@ _MEASURED: Mapping[str, Callable[[Motor, Counters], float]] = {
 }
 
 
-def measure(parameter: Parameter, motor: Motor, counters: Counters) -> int | None:
-    """Return the raw number of a measured parameter; ``None`` for one that is stored."""
+def measure(
+    parameter: Parameter, protocol: Protocol, motor: Motor, counters: Counters
+) -> int | None:
+    """Return what ``protocol`` carries of a measured parameter; ``None`` for a stored one."""
     function = _MEASURED.get(parameter.key)
     if function is None:
         return None
-    protocol = home(parameter)
     raw = round(function(motor, counters) / float(parameter.factor(protocol)))
     type_ = parameter.place(protocol).type
     return min(max(raw, type_.minimum), type_.maximum)

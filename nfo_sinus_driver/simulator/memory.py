@@ -23,8 +23,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+import math
 
 from nfo_sinus_driver.catalog import DEFAULT_SCALING
+from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Protocol
@@ -82,6 +84,16 @@ FACTORY: Mapping[str, Value] = {
 def home(parameter: Parameter) -> Protocol:
     """Return the protocol whose raw number the memory keeps."""
     return Protocol.MODBUS if Protocol.MODBUS in parameter.places else Protocol.CLASSIC
+
+
+def convert(parameter: Parameter, raw: int, protocol: Protocol) -> int:
+    """Return the number that ``protocol`` carries for one of the memory, the nearest it can."""
+    source = home(parameter)
+    if protocol is source:
+        return raw
+    exact = raw * parameter.factor(source) / parameter.factor(protocol)
+    type_ = parameter.place(protocol).type
+    return min(max(math.floor(exact + Fraction(1, 2)), type_.minimum), type_.maximum)
 
 
 class Memory:
@@ -184,6 +196,21 @@ class RegisterMap:
             for parameter in model.values()
             if Protocol.MODBUS in parameter.places
         }
+        # the manual of the Optimal tells of none
+        self._log = ERROR_LOG[Protocol.MODBUS] if model.name == 'sinus_g2' else None
+
+    def log_entry(self, register: int, count: int) -> int | None:
+        """
+        Return which entry of the error log stands at ``register``; ``None`` if it is none.
+
+        :raises Refused: ADDRESS; not exactly one entry.
+        """
+        entry, rest = divmod(register - self._log.first, self._log.stride) if self._log else (-1, 0)
+        if self._log is None or not 0 <= entry < self._log.limit:
+            return None
+        if rest or count != self._log.TYPE.words:
+            raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
+        return entry
 
     def find(self, register: int, count: int) -> Parameter:
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Modbus as a simulated drive speaks it, over RTU frames ([M0 §6.2.3, §6.2.4], [M1])."""
+"""Modbus as a simulated drive speaks it, in whatever frames ([M0 §6.2.3, §6.2.4], [M1])."""
 
 from __future__ import annotations
 
@@ -26,11 +26,6 @@ from nfo_sinus_driver.simulator.identification import REFUSED
 from nfo_sinus_driver.simulator.identification import SILENT
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
-
-#: Everybody obeys a write to this address and nobody answers.
-BROADCAST = 0
-#: BusType of a drive that speaks Modbus RTU [M0 table 4].
-BUS_TYPE_RTU = 3
 
 _READ = 3
 _READ_INPUT = 4
@@ -50,11 +45,6 @@ _MOST_READ = 125
 _MOST_WRITTEN = 123
 _MOST_WRITTEN_WITH_READ = 121
 
-#: Length of a request's whole RTU frame by function: fixed, or what the byte count at an index
-#: adds to the rest.
-_FIXED = dict.fromkeys((1, 2, 3, 4, 5, 6, 8), 8) | {7: 4, 11: 4, 12: 4, 17: 4, 22: 10, 24: 6, 43: 7}
-_COUNTED = {15: 6, 16: 6, 20: 2, 21: 2, 23: 10}
-
 
 def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
     """Let the drive carry out a request PDU and return the answer PDU; empty if it stays silent."""
@@ -73,6 +63,11 @@ def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
             raise Refused(Reason.VALUE, str(error)) from error
     except Refused as refused:
         return pymodbus_compat.encode_exception(function, refused.reason)
+
+
+def is_write(pdu: bytes) -> bool:
+    """Whether a request only writes, so that it may go to everybody."""
+    return pdu[:1] in (bytes([_WRITE_SINGLE]), bytes([_WRITE_MULTIPLE]))
 
 
 def _read(drive: SimulatedDrive, data: bytes) -> bytes:
@@ -164,55 +159,3 @@ _FUNCTIONS: Mapping[str, frozenset[int]] = {
     'sinus_g2': _BASIC_FUNCTIONS | _NEWER,
     'sinus_optimal': _BASIC_FUNCTIONS | {_READ_INPUT},
 }
-
-
-class ModbusRtu:
-    """RTU frames: where they end, whom they are for, and whether they arrived whole."""
-
-    name = 'modbus_rtu'
-    data_bits = 8
-
-    @staticmethod
-    def speaks(drive: SimulatedDrive) -> bool:
-        """Whether the drive's parameter BusType is set to this protocol."""
-        return drive.serial.bus_type == BUS_TYPE_RTU
-
-    @staticmethod
-    def length(buffer: bytes) -> int | None:
-        """
-        Return how long the request that begins the buffer is, CRC included.
-
-        0 when more bytes are needed to tell, ``None`` when only silence can tell.
-        """
-        if len(buffer) < 2:
-            return 0
-        function = buffer[1]
-        if function in _FIXED:
-            return _FIXED[function]
-        if function in _COUNTED:
-            at = _COUNTED[function]
-            return at + 1 + buffer[at] + 2 if len(buffer) > at else 0
-        return None
-
-    @staticmethod
-    def unwrap(frame: bytes) -> tuple[int, bytes] | None:
-        """Return address and PDU of a frame; ``None`` when it is damaged."""
-        if len(frame) < 4 or pymodbus_compat.crc(frame[:-2]) != frame[-2:]:
-            return None
-        return frame[0], frame[1:-2]
-
-    @staticmethod
-    def wrap(address: int, pdu: bytes) -> bytes:
-        """Return the frame of an answer."""
-        body = bytes([address]) + pdu
-        return body + pymodbus_compat.crc(body)
-
-    @staticmethod
-    def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
-        """Let the drive carry out a request; return the answer's PDU, empty if there is none."""
-        return answer(drive, pdu)
-
-    @staticmethod
-    def broadcast(address: int, pdu: bytes) -> bool:
-        """Whether every drive obeys the request and none answers."""
-        return address == BROADCAST and pdu[0] in (_WRITE_SINGLE, _WRITE_MULTIPLE)

@@ -23,12 +23,15 @@ What changed on the way:
   ``registers``). Made without arguments and filled by attributes they are the same everywhere.
 * A register's value is ``value`` (06) or ``values`` (16) in old ones, ``registers`` in new ones.
 * Old ones do not check counts while decoding; new ones raise ``ValueError``.
-* The CRC stands in ``pymodbus.message.rtu.MessageRTU`` (3.6.9) or ``pymodbus.framer.rtu`` and
-  always comes byte-swapped: most significant byte first is the order on the line.
+* The framers stand in ``pymodbus.message`` as ``MessageRTU`` (3.6.9) and its like, or in
+  ``pymodbus.framer`` as ``FramerRTU``; new ones want a decoder, which encoding does not need.
+  ``decode`` of each version returns something else, so it is not used.
+* The CRC always comes byte-swapped: most significant byte first is the order on the line.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
 import importlib
@@ -75,16 +78,40 @@ _DeviceResponse = _first_of(_MEI, 'ReadDeviceInformationResponse')
 _ExceptionResponse = _first_of(
     ('pymodbus.pdu.exceptionresponse', 'pymodbus.pdu'), 'ExceptionResponse'
 )
-try:
-    _Rtu = _first_of(('pymodbus.framer.rtu', 'pymodbus.framer'), 'FramerRTU')
-except ImportError:
-    _Rtu = _first_of(('pymodbus.message.rtu',), 'MessageRTU')
+
+
+def _framer(name: str, kind: str) -> Any:
+    try:
+        return _first_of((f'pymodbus.framer.{name}', 'pymodbus.framer'), f'Framer{kind}')
+    except ImportError:
+        return _first_of((f'pymodbus.message.{name}',), f'Message{kind}')
+
+
+_Rtu = _framer('rtu', 'RTU')
+_Ascii = _framer('ascii', 'Ascii')
+_Tcp = _framer('socket', 'Socket')
 
 
 def crc(data: bytes) -> bytes:
     """Return the two CRC bytes of an RTU frame, in the order they go over the line."""
     checksum: int = _Rtu.compute_CRC(data)
     return checksum.to_bytes(2, 'big')
+
+
+def lrc(data: bytes) -> int:
+    """Return the LRC of the bytes of an ASCII frame."""
+    checksum: int = _Ascii.compute_LRC(data)
+    return checksum
+
+
+def ascii_frame(address: int, pdu: bytes) -> bytes:
+    """Return the ASCII frame of a PDU."""
+    return _encoder(_Ascii)(pdu, address, 0)
+
+
+def tcp_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
+    """Return the TCP frame of a PDU."""
+    return _encoder(_Tcp)(pdu, unit, transaction)
 
 
 def decode_read(data: bytes) -> tuple[int, int]:
@@ -174,6 +201,12 @@ def encode_device(code: int, conformity: int, objects: Mapping[int, bytes]) -> b
 def encode_exception(function: int, code: int) -> bytes:
     """Return the answer PDU that refuses a request."""
     return _encoded(_ExceptionResponse(function & 0x7F, code))
+
+
+def _encoder(framer: Any) -> Callable[[bytes, int, int], bytes]:
+    # an object without its constructor: what that wants differs, and encoding needs none of it
+    encode: Callable[[bytes, int, int], bytes] = framer.__new__(framer).encode
+    return encode
 
 
 def _decoded(request: Any, data: bytes) -> Any:

@@ -18,40 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol as Interface
 
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.protocol import Protocol
 
 #: More than any frame has: rubbish is not collected for ever.
-_MOST = 512
-#: Added to t3.5 before silence is believed: the system may hold bytes of one frame apart.
-_SLACK = 0.002
-
-
-class Protocol(Interface):
-    """What the line has to know about a protocol."""
-
-    name: str
-    #: The data bits that a character must have.
-    data_bits: int
-
-    def speaks(self, drive: SimulatedDrive) -> bool:
-        """Whether the drive is set to this protocol."""
-
-    def length(self, buffer: bytes) -> int | None:
-        """Length of the request at the beginning; 0: not known yet, ``None``: until silence."""
-
-    def unwrap(self, frame: bytes) -> tuple[int, bytes] | None:
-        """Address and request in a frame; ``None`` when it is damaged."""
-
-    def wrap(self, address: int, pdu: bytes) -> bytes:
-        """The frame of an answer."""
-
-    def answer(self, drive: SimulatedDrive, pdu: bytes) -> bytes:
-        """Let the drive carry out a request; return the answer, empty if there is none."""
-
-    def broadcast(self, address: int, pdu: bytes) -> bool:
-        """Whether everybody obeys the request and nobody answers."""
+_MOST = 600
 
 
 @dataclass(frozen=True)
@@ -69,13 +40,13 @@ class Receiver:
 
     :param protocol: knows how long a frame is.
     :param character: time of one character on the line (s); 0 on a line without pace.
-    :param t35: the silence that ends a frame (s).
+    :param silence: the silence that ends what is no whole frame (s).
     """
 
-    def __init__(self, protocol: Protocol, character: float, t35: float) -> None:
+    def __init__(self, protocol: Protocol, character: float, silence: float) -> None:
         self._protocol = protocol
         self._character = character
-        self._silence = t35 + _SLACK
+        self._silence = silence
         self._buffer = b''
         self._first = 0.0
         #: When the byte at the buffer's beginning began, and when its last one ends, on the wire.
@@ -116,8 +87,8 @@ class Receiver:
     def _next(self) -> tuple[int, float]:
         """How much of the buffer comes out next, and when."""
         have = len(self._buffer)
-        length = self._protocol.length(self._buffer) or 0
-        if 0 < length <= have and self._protocol.unwrap(self._buffer[:length]) is not None:
+        length = self._protocol.cut(self._buffer)
+        if length:
             whole = length == have
             return length, self._end if whole else self._begin + length * self._character
         return have, self._end if have > _MOST else self._end + self._silence

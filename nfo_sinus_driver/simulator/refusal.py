@@ -36,6 +36,15 @@ class Reason(enum.IntEnum):
     STATE = 4
 
 
+class GatewayReason(enum.IntEnum):
+    """What a gateway says in place of a drive; the standard's exception codes."""
+
+    #: It knows no way to the drive.
+    NO_PATH = 10
+    #: The drive does not answer it.
+    NO_ANSWER = 11
+
+
 class Refused(Exception):
     """The drive refuses a request; ``reason`` goes over the line, the text is for people."""
 

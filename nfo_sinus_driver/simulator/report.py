@@ -25,7 +25,6 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive
 def describe(drive: SimulatedDrive) -> dict[str, Any]:
     """Return everything about a drive, in engineering units; it can be written as JSON."""
     motor, runner = drive.motor, drive.runner
-    code = drive.inv_st
     return {
         'address': drive.address,
         'model': drive.model.name,
@@ -36,8 +35,8 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'source': runner.source.value,
         'scmd': int(runner.scmd),
         'run_input': runner.run_input,
-        'inv_st': code,
-        'inv_st_text': drive.model.inv_st_text(code),
+        'inv_st': drive.inv_st,
+        'inv_st_text': drive.inv_st_text,
         'fault': next(iter(drive.faults.codes), 0),
         'faults': drive.faults.codes,
         'alarms': drive.faults.alarms,
@@ -55,7 +54,9 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'setpoint': drive.peek(runner.setpoint_key),
         'setpoint_raw': drive.memory.raw(runner.setpoint_key),
         'setpoint_key': runner.setpoint_key,
+        'sio_err': int(drive.faults.sio_err),
         'ack_reads': drive.ack_reads,
+        'sio_err_reads': drive.sio_err_reads,
         'mode_ext_writes': drive.mode_ext_writes,
         'writes': dict(drive.writes),
         'command_writes': dict(drive.command_writes),

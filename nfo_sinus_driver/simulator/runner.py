@@ -36,6 +36,7 @@ from nfo_sinus_driver.simulator.refusal import Refused
 
 #: InvSt by source: standing by, running, accelerating, retarding ([M0 table 19], [M1]).
 _BUS_CODES = (37, 38, 39, 40)
+_FIELDBUS_CODES = (41, 42, 43, 44)
 _CODES = {
     Source.STOP: (24, 24, 24, 24),
     Source.EXT: (33, 34, 35, 36),
@@ -69,6 +70,7 @@ class Runner(abc.ABC):
     :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input and a
         fault, so the motor starts by itself when they are over.
     :ivar run_input: the digital input RUN.
+    :ivar by_fieldbus: the bus that commands is a fieldbus, to the older firmware [C3].
     :ivar initialised: the self-test after power-on is over.
     :ivar refuses_writes_when_faulted: while a fault stands every write is refused.
     """
@@ -89,6 +91,7 @@ class Runner(abc.ABC):
         self.source = Source.STOP
         self.run_input = True
         self.initialised = False
+        self.by_fieldbus = False
         #: Seconds of RunDly left; None while nobody wants to run.
         self._delay_left: float | None = None
 
@@ -165,7 +168,10 @@ class Runner(abc.ABC):
     @property
     def inv_st(self) -> int:
         """The inverter status while no fault stands ([M0 table 19], [M1])."""
-        standby, running, faster, slower = _CODES[self.source]
+        codes = _CODES[self.source]
+        standby, running, faster, slower = (
+            _FIELDBUS_CODES if self.by_fieldbus and codes is _BUS_CODES else codes
+        )
         motor = self._motor
         if self._delay_left:
             return self.delayed

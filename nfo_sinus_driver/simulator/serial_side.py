@@ -16,7 +16,14 @@
 
 from __future__ import annotations
 
+from nfo_sinus_driver.simulator.firmware import NEW
+from nfo_sinus_driver.simulator.firmware import firmware_of
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.timing import Timing
+
+#: Codes of BusType [M0 table 4].
+CLASSIC, MODBUS_ASCII, MODBUS_RTU = 1, 2, 3
 
 
 class SerialSide:
@@ -24,7 +31,7 @@ class SerialSide:
     What the group Serial does.
 
     A change of address, speed or format takes effect at the next power-on, or at once with
-    AutoReset [M0 §5.3.4].
+    AutoReset [M0 §5.3.4]; on older firmware always at once [C7].
 
     :ivar address: the address in effect.
     :ivar baud: code of SiBaud in effect.
@@ -51,8 +58,19 @@ class SerialSide:
 
     def changed(self) -> None:
         """Take note that one of the settings was written."""
-        if self._memory.raw('serial.auto_reset'):
+        # the older firmware knows nothing but Classic
+        firmware = firmware_of(self._memory) if self.bus_type == CLASSIC else NEW
+        if firmware.at_once or self._memory.raw('serial.auto_reset'):
             self.initialise()
+
+    def hears(self, bus_type: int, timing: Timing) -> bool:
+        """Whether it is set to this protocol, speed and format."""
+        firmware = firmware_of(self._memory) if bus_type == CLASSIC else NEW
+        return (
+            self.bus_type == bus_type
+            and self.baud == BAUD_CODES[timing.baud]
+            and self.char_format == firmware.formats.get(timing.char_format)
+        )
 
     def heard(self) -> None:
         """Take note of a valid frame: the bus is alive."""

@@ -31,28 +31,26 @@ from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
+from nfo_sinus_driver.simulator.doors import GATEWAY_TIMEOUT
+from nfo_sinus_driver.simulator.doors import door
+from nfo_sinus_driver.simulator.doors import parse_door
+from nfo_sinus_driver.simulator.drive import LINE_SETTINGS
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.firmware import firmware_of
+from nfo_sinus_driver.simulator.firmware import with_firmware
 from nfo_sinus_driver.simulator.identification import KNOWN
 from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.injections import VERBS
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.machine import machine_of
-from nfo_sinus_driver.simulator.modbus import ModbusRtu
-from nfo_sinus_driver.simulator.ports import Port
+from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.ports import PortError
-from nfo_sinus_driver.simulator.ports import PtyPort
-from nfo_sinus_driver.simulator.ports import TcpPort
-from nfo_sinus_driver.simulator.receiver import Protocol
 from nfo_sinus_driver.simulator.report import describe
 from nfo_sinus_driver.simulator.timing import BAUD_CODES
-from nfo_sinus_driver.simulator.timing import FORMAT_CODES
-from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 from nfo_sinus_driver.simulator.trace import Trace
 
-PROTOCOLS: Mapping[str, type[Protocol]] = {ModbusRtu.name: ModbusRtu}
-ADDRESSES = range(1, 248)
 #: How often every drive catches up with the clock while nobody asks it (s).
 _TICK = 0.05
 #: A drive does not catch up when something is due within this time (s).
@@ -61,11 +59,20 @@ _HURRY = 0.0005
 
 class Simulator:
     """
-    Simulated drives on one line; a context manager.
+    Simulated drives on one line, or on several; a context manager.
 
     :param addresses: one drive for each.
+    :param protocol: one of :data:`~nfo_sinus_driver.simulator.doors.PROTOCOLS`.
     :param link: a symbolic link to the pseudo-terminal; without it, only the device.
     :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
+    :param baud: of the line and of the drives; by default the protocol's.
+    :param char_format: likewise.
+    :param also: more lines to the same drives, each as ``PROTOCOL:LINK`` or ``PROTOCOL:TCP_PORT``.
+    :param dialect: the manual that describes the drives' Classic protocol, ``2.03`` or ``5.0``;
+        by default as the parameter fieldbus.sw_ver says.
+    :param lenient: a Classic message that is refused is no serial fault.
+    :param echo: the first line returns every byte it gets, as a half-duplex adapter does.
+    :param gateway_timeout: how long the gateway of Modbus TCP waits for a drive (s).
     :param paced: bytes take the time they take on a real line.
     :param turnaround: how long a drive takes before it answers (s).
     :param trace: a file to write every frame to.
@@ -80,7 +87,8 @@ class Simulator:
     :raises PortError: the port or link cannot be had.
     :raises ControlError: another simulator is there.
 
-    :ivar port: what a master opens.
+    :ivar port: what a master opens, of the first line.
+    :ivar ports: the same of every line.
     :ivar control: path of the control channel, or ``None``.
     :ivar finished: it serves no more, because it was stopped or because of a failure.
     :ivar failure: what made the thread of the line fail, or ``None``.
@@ -95,8 +103,13 @@ class Simulator:
         protocol: str = 'modbus_rtu',
         link: str | None = None,
         tcp: int | None = None,
-        baud: int = 19200,
-        char_format: str = '8E1',
+        baud: int | None = None,
+        char_format: str | None = None,
+        also: Sequence[str] = (),
+        dialect: str | None = None,
+        lenient: bool = False,
+        echo: bool = False,
+        gateway_timeout: float = GATEWAY_TIMEOUT,
         paced: bool = False,
         turnaround: float = 0.0,
         trace: str | None = None,
@@ -107,19 +120,25 @@ class Simulator:
         serial_numbers: Sequence[str] = (),
         newer_functions: str = KNOWN,
     ) -> None:
-        if protocol not in PROTOCOLS:
-            raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
-        if link is not None and tcp is not None:
-            raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
-        timing = Timing(baud, char_format)
-        data_bits = PROTOCOLS[protocol].data_bits
-        if not char_format.startswith(str(data_bits)):
-            raise ValueError(f'{protocol} has {data_bits} data bits, {char_format} has not')
         machine = machine_of(load_model(model))
+        known = with_firmware(machine, settings or {}, dialect)
+        firmware = firmware_of(Memory(machine, known))
+        first = door(
+            protocol, link=link, tcp=tcp, baud=baud, char_format=char_format, firmware=firmware
+        )
+        doors = [first, *(parse_door(text, firmware) for text in also)]
+        if echo and not first.make(0.0).serial:
+            raise ValueError(f'{protocol} has no echo')
+        for address in _checked(addresses):
+            for one in doors:
+                one.check(model, address)
+        timing = first.timing
+        labels = {key: machine[key].labels for key in LINE_SETTINGS}
         serial = {
-            'serial.si_baud': machine['serial.si_baud'].labels[BAUD_CODES[baud]],
-            'serial.si_prot': machine['serial.si_prot'].labels[FORMAT_CODES[char_format]],
-            **(settings or {}),
+            'serial.bus_type': labels['serial.bus_type'][first.bus_type],
+            'serial.si_baud': labels['serial.si_baud'][BAUD_CODES[timing.baud]],
+            'serial.si_prot': labels['serial.si_prot'][first.format_code(firmware)],
+            **known,
         }
         if newer_functions not in NEWER_FUNCTIONS:
             raise ValueError(f'newer_functions: choose one of {", ".join(NEWER_FUNCTIONS)}')
@@ -134,8 +153,9 @@ class Simulator:
                 boot_time=boot_time,
                 serial_number=number,
                 newer_functions=newer_functions,
+                lenient=lenient,
             )
-            for address, number in itertools.zip_longest(_checked(addresses), serial_numbers)
+            for address, number in itertools.zip_longest(addresses, serial_numbers)
         }
         self.lock = threading.RLock()
         self.control: str | None = None
@@ -144,37 +164,45 @@ class Simulator:
         self._wake_read, self._wake_write = -1, -1
         self._thread: threading.Thread | None = None
         with contextlib.ExitStack() as stack:
-            if control == '' and tcp is None:
+            if control == '' and first.tcp is None:
                 control = control_path(link)
             if control and somebody_listens(control):
                 raise PortError(
                     f'a simulator already serves there (control channel {control}): '
                     'stop it, or choose another --link or --control'
                 )
-            port: Port = PtyPort(link) if tcp is None else TcpPort(tcp)
-            stack.callback(port.close)
-            stream = None
-            if trace is not None:
-                stream = stack.enter_context(open(trace, 'w', encoding='utf-8'))
-            self.line = Line(
-                port,
-                PROTOCOLS[protocol](),
-                list(self.drives.values()),
-                timing,
-                time.monotonic,
-                paced=paced,
-                turnaround=turnaround,
-                trace=Trace(stream) if stream else None,
-            )
+            self.lines = []
+            for number, one in enumerate(doors):
+                port = one.open()
+                stack.callback(port.close)
+                stream = None
+                if trace is not None:
+                    name = f'{trace}.{number + 1}' if number else trace
+                    stream = stack.enter_context(open(name, 'w', encoding='utf-8'))
+                line = Line(
+                    port,
+                    one.make(gateway_timeout),
+                    list(self.drives.values()),
+                    one.timing,
+                    time.monotonic,
+                    paced=paced,
+                    turnaround=turnaround,
+                    echo=echo and not number,
+                    always_heard=number > 0,
+                    trace=Trace(stream) if stream else None,
+                )
+                self.lines.append(line)
+            self.line = self.lines[0]
+            self.ports = tuple(line.port.name for line in self.lines)
+            self.port = self.ports[0]
             if control == '':
-                control = control_path(tcp=int(port.name.rpartition(':')[2]))
+                control = control_path(tcp=int(self.port.rpartition(':')[2]))
             if control is not None:
                 server = ControlServer(control, self._control)
                 stack.callback(server.close)
                 self.control = control
             # nothing went wrong: keep it all until stop()
             self._clean_up = stack.pop_all()
-        self.port = port.name
         self.protocol = protocol
         self.timing = timing
 
@@ -281,27 +309,28 @@ class Simulator:
             self.finished.set()
 
     def _serve(self) -> None:
-        line = self.line
         turn = list(self.drives.values())
         tick = time.monotonic()
         while not self.finished.is_set():
-            until = min(line.due, tick)
-            ports = line.port.filenos()
-            wait = max(0.0, until - time.monotonic())
+            due = self._due
+            ports = {number: line for line in self.lines for number in line.port.filenos()}
+            wait = max(0.0, min(due, tick) - time.monotonic())
             ready, _, _ = select.select([*ports, self._wake_read], [], [], wait)
             with self.lock:
                 if self._wake_read in ready:
                     os.read(self._wake_read, 4096)
-                if ports and ports[0] in ready:
-                    data = line.port.receive()
+                for number, line in ports.items():
+                    data = line.port.receive() if number in ready else b''
                     if data:
                         line.receive(data, time.monotonic())
                 now = time.monotonic()
-                line.act(now)
+                for line in self.lines:
+                    line.act(now)
                 if now < tick:
                     continue
-                if line.due < now + _HURRY:
-                    tick = line.due + _HURRY
+                due = self._due
+                if due < now + _HURRY:
+                    tick = due + _HURRY
                 else:
                     # one drive at a time, so that an answer never waits for all of them
                     drive = turn.pop(0)
@@ -309,11 +338,14 @@ class Simulator:
                     drive.advance_to(now)
                     tick = now + _TICK / len(turn)
 
+    @property
+    def _due(self) -> float:
+        """When one of the lines has something to do."""
+        return min(line.due for line in self.lines)
+
 
 def _checked(addresses: Sequence[int]) -> Sequence[int]:
     for address in addresses:
-        if address not in ADDRESSES:
-            raise ValueError(f'address {address} is not possible: 1 to 247')
         if addresses.count(address) > 1:
             raise ValueError(f'address {address} is given twice')
     if not addresses:

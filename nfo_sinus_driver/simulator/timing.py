@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 import contextlib
 import ctypes
 from dataclasses import dataclass
@@ -25,6 +26,10 @@ import re
 BAUD_CODES = {1200: 16, 2400: 32, 4800: 64, 9600: 128, 19200: 256, 38400: 512, 57600: 768}
 #: The character formats of the drive and the codes of SiProt [M0 table 4].
 FORMAT_CODES = {'7E1': 0, '7O1': 1, '7N2': 2, '8E1': 4, '8O1': 5, '8N2': 6}
+#: Those of the drive of [M2] [C5].
+OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
+#: All there are.
+FORMATS = tuple(dict.fromkeys((*FORMAT_CODES, *OLD_FORMAT_CODES)))
 
 _PR_SET_TIMERSLACK = 29
 
@@ -45,8 +50,8 @@ class Timing:
     def __post_init__(self) -> None:
         if self.baud not in BAUD_CODES:
             raise ValueError(f'{self.baud} baud: choose one of {_listed(BAUD_CODES)}')
-        if self.char_format not in FORMAT_CODES:
-            raise ValueError(f'{self.char_format!r}: choose one of {_listed(FORMAT_CODES)}')
+        if self.char_format not in FORMATS:
+            raise ValueError(f'{self.char_format!r}: choose one of {_listed(FORMATS)}')
 
     @property
     def character(self) -> float:
@@ -68,5 +73,5 @@ def sharpen_timers() -> None:
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
-def _listed(choices: dict[int, int] | dict[str, int]) -> str:
+def _listed(choices: Iterable[object]) -> str:
     return ', '.join(str(choice) for choice in choices)

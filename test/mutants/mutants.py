@@ -23,6 +23,7 @@ _NO_RESTART = 'test/ros/test_no_restart.py'
 _INTERFACE = 'test/ros/test_interface.py'
 _TRACE = 'test/ros/test_trace.py'
 _RTU_LINK = 'test/unit/link/test_rtu_link.py'
+_ECHO = 'test/unit/link/test_echo.py'
 
 _MOTION = 'nfo_sinus_driver/drive/motion.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
@@ -244,8 +245,8 @@ MUTANTS = (
     Mutant(
         8,
         'a late answer is believed',
-        'nfo_sinus_driver/link/rtu_link.py',
-        '        if not isinstance(request, rtu.Write) and doubt:',
+        'nfo_sinus_driver/link/serial_link.py',
+        '        if not isinstance(request, Write) and doubt:',
         '        if False:',
         (_RTU_LINK,),
     ),
@@ -253,9 +254,41 @@ MUTANTS = (
         8,
         'the check sum of an answer is not looked at',
         'nfo_sinus_driver/link/rtu.py',
-        '            and crc(buffer[start : end - 2]) == buffer[end - 2 : end]\n',
-        '',
+        ' and crc(buffer[start : end - 2]) == buffer[end - 2 : end]:',
+        ':',
         ('test/unit/link/test_rtu_codec.py',),
+    ),
+    Mutant(
+        8,
+        'the check sum of an ASCII answer is not looked at',
+        'nfo_sinus_driver/link/modbus_ascii.py',
+        '            if lrc(data[:-1]) == data[-1]:',
+        '            if True:',
+        ('test/unit/link/test_ascii_codec.py',),
+    ),
+    Mutant(
+        8,
+        'an answer that comes twice is believed twice',
+        'nfo_sinus_driver/link/serial_link.py',
+        '        if self._repeats is None:',
+        '        if True:',
+        (_ECHO,),
+    ),
+    Mutant(
+        8,
+        'the echo of a write is its answer',
+        'nfo_sinus_driver/link/serial_link.py',
+        '                self._echo.present = True',
+        '                pass',
+        (_ECHO,),
+    ),
+    Mutant(
+        8,
+        'any answer of a gateway is the right one',
+        'nfo_sinus_driver/link/tcp_link.py',
+        '                if number == self._number:',
+        '                if True:',
+        ('test/unit/link/test_tcp_link.py',),
     ),
     Mutant(
         8,

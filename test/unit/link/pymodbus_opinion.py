@@ -22,7 +22,9 @@ import logging
 from typing import Any
 
 try:
+    from pymodbus.framer import FramerAscii
     from pymodbus.framer import FramerRTU
+    from pymodbus.framer import FramerSocket
     from pymodbus.pdu import DecodePDU
     from pymodbus.pdu import ExceptionResponse
     from pymodbus.pdu import register_message as read_message
@@ -34,7 +36,9 @@ except ImportError:
     from pymodbus import register_write_message as write_message
     from pymodbus.factory import ServerDecoder
     from pymodbus.framer.rtu_framer import ModbusRtuFramer
+    from pymodbus.message.ascii import MessageAscii as FramerAscii
     from pymodbus.message.rtu import MessageRTU as FramerRTU
+    from pymodbus.message.socket import MessageSocket as FramerSocket
     from pymodbus.pdu import ExceptionResponse
 
     OLD = True
@@ -46,6 +50,20 @@ def crc(data: bytes) -> bytes:
     """The check sum as it goes over the line."""
     checksum: int = FramerRTU.compute_CRC(data)
     return checksum.to_bytes(2, 'big')
+
+
+def ascii_frame(message: bytes) -> bytes:
+    """The ASCII frame of unit, function and data."""
+    framer = FramerAscii() if OLD else FramerAscii(DecodePDU(False))
+    packet: bytes = framer.encode(message[1:], message[0], 0)
+    return packet
+
+
+def tcp_frame(message: bytes, number: int) -> bytes:
+    """The TCP frame of unit, function and data."""
+    framer = FramerSocket() if OLD else FramerSocket(DecodePDU(False))
+    packet: bytes = framer.encode(message[1:], message[0], number)
+    return packet
 
 
 def read_request(unit: int, register: int, count: int) -> bytes:

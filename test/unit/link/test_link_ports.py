@@ -33,11 +33,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link import serial_port
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.rtu import Read
+from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.rtu import crc
 from nfo_sinus_driver.link.rtu import encode
 from nfo_sinus_driver.link.serial_port import SerialPort
@@ -480,6 +481,23 @@ def test_no_port_and_seven_data_bits_can_never_work() -> None:
         open_link('modbus_rtu', '', LineSettings())
     with pytest.raises(ValueError, match=r"char_format '7O1': modbus_rtu has 8 data bits.* 8O1"):
         open_link('modbus_rtu', '/dev/x', LineSettings(char_format='7O1'))
+    with pytest.raises(ValueError, match=r"char_format '8N2': modbus_ascii has 7 data bits.* 7N2"):
+        open_link('modbus_ascii', '/dev/x', LineSettings(char_format='8N2'))
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'baud_rate', 'char_format'),
+    [('modbus_rtu', 19200, '8E1'), ('modbus_ascii', 19200, '7E1')],
+)
+def test_factory_settings(protocol: str, baud_rate: int, char_format: str) -> None:
+    # [M0 §6.2.2]
+    line = line_settings(protocol)
+    assert (line.baud_rate, line.char_format) == (baud_rate, char_format)
+    open_link(protocol, '/dev/x', line)
+    asked = line_settings(protocol, baud_rate=9600, char_format=f'{char_format[0]}N2')
+    assert (asked.baud_rate, asked.char_format) == (9600, f'{char_format[0]}N2')
+    with pytest.raises(ValueError, match='unknown protocol'):
+        line_settings('profibus')
 
 
 def test_device_server_that_goes_away(server: Server) -> None:

@@ -28,10 +28,11 @@ import pytest
 
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Words
-from nfo_sinus_driver.link.rtu import AnswerReader
-from nfo_sinus_driver.link.rtu import Read
-from nfo_sinus_driver.link.rtu import Request
-from nfo_sinus_driver.link.rtu import Write
+from nfo_sinus_driver.link.modbus_pdu import Read
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.rtu import CRC_LENGTH
+from nfo_sinus_driver.link.rtu import RtuReader
 from nfo_sinus_driver.link.rtu import crc
 from nfo_sinus_driver.link.rtu import encode
 
@@ -83,7 +84,7 @@ def pieces(draw: st.DrawFn, data: bytes) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
 
-def feed(reader: AnswerReader, data: list[bytes]) -> Words | None:
+def feed(reader: RtuReader, data: list[bytes]) -> Words | None:
     """Feed pieces until something is found."""
     for piece in data:
         words = reader.feed(piece)
@@ -168,9 +169,9 @@ def test_answer_of_pymodbus_in_any_pieces(
 ) -> None:
     request, words = exchange
     frame = answer_to(request, words)
-    assert len(frame) == request.answer_length
+    assert len(frame) == request.answer_length + CRC_LENGTH
     assert frame.startswith(request.answer_head)
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     assert feed(reader, data.draw(pieces(frame))) == wanted(request, words)
     assert reader.received == 0
 
@@ -180,7 +181,7 @@ def test_exception_of_pymodbus_in_any_pieces(
     data: st.DataObject, request: Request, code: int
 ) -> None:
     frame = opinion.exception(request.unit, request.function, code)
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     with pytest.raises(Refused) as refusal:
         feed(reader, data.draw(pieces(frame)))
     assert refusal.value.code == code
@@ -199,7 +200,7 @@ def test_noise_before_a_good_answer(
     request, words = exchange
     frame = answer_to(request, words)
     assume(frames_in(request, noise + frame) == [frame])
-    got = outcome(AnswerReader(request), data.draw(pieces(noise + frame)))
+    got = outcome(RtuReader(request), data.draw(pieces(noise + frame)))
     assert got == wanted(request, words)
 
 
@@ -207,7 +208,7 @@ def test_noise_before_a_good_answer(
 @example((Read(1, 0x2A5, 1), (37,)), 0)
 def test_damaged_answer_is_none(exchange: tuple[Request, Words], bit: int) -> None:
     request, words = exchange
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     damaged = spoil(answer_to(request, words), bit)
     assume(not frames_in(request, damaged))
     assert outcome(reader, [damaged]) is None
@@ -222,7 +223,7 @@ def test_damaged_answer_and_then_a_good_one(
     damaged = spoil(answer_to(request, data.draw(words_for(request))), bit)
     stream = damaged + answer_to(request, words)
     assume(frames_in(request, stream) == [answer_to(request, words)])
-    assert outcome(AnswerReader(request), data.draw(pieces(stream))) == wanted(request, words)
+    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, words)
 
 
 @given(st.data(), exchanges(CLOSE), CLOSE)
@@ -232,7 +233,7 @@ def test_answer_to_something_else_is_passed_over(
     request, words = exchange
     alien = answer_to(other, data.draw(words_for(other)))
     same = alien.startswith(request.answer_head)
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     got = outcome(reader, data.draw(pieces(alien)))
     if same:
         # a read answer does not say what was read: the link above has to know
@@ -257,7 +258,7 @@ def test_exception_to_somebody_else_is_passed_over(
     frame = answer_to(request, words)
     stream = b''.join([*aliens, frame])
     assume(frames_in(request, stream) == [frame])
-    assert outcome(AnswerReader(request), data.draw(pieces(stream))) == wanted(request, words)
+    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, words)
 
 
 @given(exchanges(CLOSE), st.binary(min_size=1, max_size=10))
@@ -265,7 +266,7 @@ def test_bytes_behind_the_answer_are_counted(
     exchange: tuple[Request, Words], rest: bytes
 ) -> None:
     request, words = exchange
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     assert reader.feed(answer_to(request, words) + rest) == wanted(request, words)
     assert reader.received == len(rest)
 
@@ -273,7 +274,7 @@ def test_bytes_behind_the_answer_are_counted(
 @given(exchanges(CLOSE), st.integers(1, 255))
 def test_feeding_goes_on_after_a_refusal(exchange: tuple[Request, Words], code: int) -> None:
     request, words = exchange
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     stream = opinion.exception(request.unit, request.function, code) + answer_to(request, words)
     with pytest.raises(Refused):
         reader.feed(stream)
@@ -285,7 +286,7 @@ def test_feeding_goes_on_after_a_refusal(exchange: tuple[Request, Words], code: 
 Outcome = Words | str | None
 
 
-def outcome(reader: AnswerReader, data: list[bytes]) -> Outcome:
+def outcome(reader: RtuReader, data: list[bytes]) -> Outcome:
     """What comes of bytes: words, a refusal, or nothing; anything else raises."""
     try:
         return feed(reader, data)
@@ -296,7 +297,7 @@ def outcome(reader: AnswerReader, data: list[bytes]) -> Outcome:
 def frames_in(request: Request, stream: bytes) -> list[bytes]:
     """Every piece of the bytes that is a frame to believe, by pymodbus's check sum."""
     heads = [
-        (request.answer_head, request.answer_length),
+        (request.answer_head, request.answer_length + CRC_LENGTH),
         (bytes((request.unit, request.function | 0x80)), 5),
     ]
     return [
@@ -354,7 +355,7 @@ def traffic(draw: st.DrawFn, request: Request) -> bytes:
 @given(st.data(), CLOSE)
 def test_nothing_is_believed_but_a_whole_frame(data: st.DataObject, request: Request) -> None:
     stream = data.draw(traffic(request))
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     fed = b''
     for piece in data.draw(pieces(stream)):
         fed += piece
@@ -367,5 +368,5 @@ def test_nothing_is_believed_but_a_whole_frame(data: st.DataObject, request: Req
 
 @given(st.data(), CLOSE, st.binary(max_size=64))
 def test_any_bytes_at_all(data: st.DataObject, request: Request, stream: bytes) -> None:
-    got = outcome(AnswerReader(request), data.draw(pieces(stream)))
+    got = outcome(RtuReader(request), data.draw(pieces(stream)))
     assert got in everything(request, stream)

@@ -28,6 +28,7 @@ import pymodbus_opinion as opinion
 import pytest
 from virtual_wire import Wire
 
+from nfo_sinus_driver.link.doubts import LATEST_ANSWER
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -35,21 +36,21 @@ from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.rtu import AnswerReader
-from nfo_sinus_driver.link.rtu import Request
-from nfo_sinus_driver.link.rtu import WriteAndRead
+from nfo_sinus_driver.link.modbus_identify import BASIC
+from nfo_sinus_driver.link.modbus_identify import REGULAR
+from nfo_sinus_driver.link.modbus_identify import SPECIFIC
+from nfo_sinus_driver.link.modbus_identify import DeviceObjects
+from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
+from nfo_sinus_driver.link.modbus_identify import ReadDevice
+from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
+from nfo_sinus_driver.link.modbus_identify import revision
+from nfo_sinus_driver.link.modbus_identify import serial_number
+from nfo_sinus_driver.link.modbus_identify import text
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.rtu import CRC_LENGTH
+from nfo_sinus_driver.link.rtu import RtuReader
 from nfo_sinus_driver.link.rtu import encode
-from nfo_sinus_driver.link.rtu_identify import BASIC
-from nfo_sinus_driver.link.rtu_identify import REGULAR
-from nfo_sinus_driver.link.rtu_identify import SPECIFIC
-from nfo_sinus_driver.link.rtu_identify import DeviceObjects
-from nfo_sinus_driver.link.rtu_identify import ReadDevice
-from nfo_sinus_driver.link.rtu_identify import ReportSlaveId
-from nfo_sinus_driver.link.rtu_identify import RtuInquiry
-from nfo_sinus_driver.link.rtu_identify import revision
-from nfo_sinus_driver.link.rtu_identify import serial_number
-from nfo_sinus_driver.link.rtu_identify import text
-from nfo_sinus_driver.link.rtu_link import LATEST_ANSWER
 from nfo_sinus_driver.link.rtu_link import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
 
@@ -191,7 +192,7 @@ def pieces(draw: st.DrawFn, data: bytes) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
 
-def outcome(reader: AnswerReader[Any], data: list[bytes]) -> object:
+def outcome(reader: RtuReader[Any], data: list[bytes]) -> object:
     """What comes of bytes: an answer, a refusal, or nothing; anything else raises."""
     for piece in data:
         try:
@@ -256,9 +257,9 @@ def test_request_is_pymodbus_s(request: Request[Any]) -> None:
 @given(st.data(), REQUESTS)
 def test_answer_of_pymodbus_in_any_pieces(data: st.DataObject, request: Request[Any]) -> None:
     frame, wanted = data.draw(answers(request))
-    assert len(frame) <= request.answer_length <= 256
+    assert len(frame) - CRC_LENGTH <= request.answer_length <= 254
     assert frame.startswith(request.answer_head)
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     assert outcome(reader, data.draw(pieces(frame))) == wanted
     assert reader.received == 0
 
@@ -266,7 +267,7 @@ def test_answer_of_pymodbus_in_any_pieces(data: st.DataObject, request: Request[
 @given(st.data(), REQUESTS)
 def test_never_more_is_waited_for_than_comes(data: st.DataObject, request: Request[Any]) -> None:
     frame, _ = data.draw(answers(request))
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     come = data.draw(st.integers(0, len(frame) - 1))
     assert reader.feed(frame[:come]) is None
     assert 1 <= reader.missing <= max(1, len(frame) - come)
@@ -280,7 +281,7 @@ def test_refusal_of_pymodbus_in_any_pieces(
     data: st.DataObject, request: Request[Any], code: int
 ) -> None:
     frame = opinion.exception(request.unit, request.function, code)
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     assert outcome(reader, data.draw(pieces(frame))) == f'refused {code}'
     assert reader.received == 0
 
@@ -293,7 +294,7 @@ def test_what_pymodbus_puts_into_several_answers(contents: list[bytes]) -> None:
     while True:
         # pymodbus's server goes on with the objects from the one asked for
         rest = {number: content for number, content in objects.items() if number >= first}
-        answer = AnswerReader(ReadDevice(1, REGULAR, first)).feed(device_answer(1, REGULAR, rest))
+        answer = RtuReader(ReadDevice(1, REGULAR, first)).feed(device_answer(1, REGULAR, rest))
         assert isinstance(answer, DeviceObjects)
         got.update(answer.objects)
         if answer.next_object is None:
@@ -362,7 +363,7 @@ def test_damaged_answer_is_none(data: st.DataObject, request: Request[Any], bit:
     frame, _ = data.draw(answers(request))
     damaged = spoil(frame, bit)
     assume(everything(request, damaged) == [None])
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     assert outcome(reader, data.draw(pieces(damaged))) is None
     assert reader.received == len(damaged)
 
@@ -373,7 +374,7 @@ def test_noise_before_a_good_answer(
 ) -> None:
     frame, wanted = data.draw(answers(request))
     assume(everything(request, noise + frame) == [wanted])
-    assert outcome(AnswerReader(request), data.draw(pieces(noise + frame))) == wanted
+    assert outcome(RtuReader(request), data.draw(pieces(noise + frame))) == wanted
 
 
 @st.composite
@@ -405,7 +406,7 @@ def test_nothing_is_believed_but_a_whole_frame(
     data: st.DataObject, request: Request[Any]
 ) -> None:
     stream = data.draw(traffic(request))
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     fed = b''
     for piece in data.draw(pieces(stream)):
         fed += piece
@@ -422,7 +423,7 @@ def test_nothing_is_believed_but_a_whole_frame(
 def test_any_bytes_at_all(
     data: st.DataObject | None, request: Request[Any], stream: bytes
 ) -> None:
-    reader = AnswerReader(request)
+    reader = RtuReader(request)
     got = outcome(reader, data.draw(pieces(stream)) if data else [stream])
     assert got in everything(request, stream)
     assert reader.missing >= 1
@@ -431,11 +432,11 @@ def test_any_bytes_at_all(
 @pytest.mark.parametrize('more', [1, 0x7F, 0xFE])
 def test_more_follows_is_yes_or_no(more: int) -> None:
     body = bytes((1, 43, 14, 2, 0x82, more, 0, 1, 0, 1)) + b'A'
-    assert AnswerReader(ReadDevice(1)).feed(body + opinion.crc(body)) is None
+    assert RtuReader(ReadDevice(1)).feed(body + opinion.crc(body)) is None
 
 
 def test_another_object_is_no_answer_to_one_by_its_number() -> None:
-    reader = AnswerReader(ReadDevice(1, SPECIFIC, 5))
+    reader = RtuReader(ReadDevice(1, SPECIFIC, 5))
     assert reader.feed(device_answer(1, SPECIFIC, {4: b'NFO Sinus'})) is None
     assert reader.feed(device_answer(1, SPECIFIC, {4: b'NFO Sinus', 5: b'1.50/400'})) is None
     assert reader.feed(device_answer(1, SPECIFIC, {5: b'1.50/400'})) == DeviceObjects(
@@ -523,7 +524,7 @@ class Script:
         return reply, float(len(self.asked))
 
 
-def asked_all(inquiry: RtuInquiry) -> Identification:
+def asked_all(inquiry: ModbusInquiry) -> Identification:
     while not inquiry.done:
         with contextlib.suppress(Refused, NoAnswer, DamagedAnswer):
             inquiry.ask()
@@ -532,12 +533,12 @@ def asked_all(inquiry: RtuInquiry) -> Identification:
 
 def test_two_questions_tell_all() -> None:
     script = Script(DeviceObjects(tuple(G2.items())), SERIAL)
-    assert asked_all(RtuInquiry(1, script)) == KNOWN
+    assert asked_all(ModbusInquiry(1, script)) == KNOWN
     assert script.asked == [ReadDevice(1, REGULAR, 0), ReportSlaveId(1)]
 
 
 def test_reply_says_when_its_last_byte_came() -> None:
-    inquiry = RtuInquiry(1, Script(DeviceObjects(()), b''))
+    inquiry = ModbusInquiry(1, Script(DeviceObjects(()), b''))
     assert [inquiry.ask().arrived, inquiry.ask().arrived] == [1.0, 2.0]
     assert inquiry.done
 
@@ -549,7 +550,7 @@ def test_reading_goes_on_where_more_follows() -> None:
         DeviceObjects(((4, b'NFO Sinus'), (5, b'1.50/400'))),
         SERIAL,
     )
-    found = asked_all(RtuInquiry(1, script))
+    found = asked_all(ModbusInquiry(1, script))
     assert (found.vendor, found.revision, found.model) == ('NFO', '4.30 / 4018', '1.50/400')
     assert script.asked[1:3] == [ReadDevice(1, REGULAR, 2), ReadDevice(1, REGULAR, 4)]
 
@@ -557,30 +558,30 @@ def test_reading_goes_on_where_more_follows() -> None:
 @pytest.mark.parametrize('following', [0, 1, 2, 7, 0x80, 255])
 def test_only_what_is_ahead_and_known_is_read_on(following: int) -> None:
     script = Script(DeviceObjects((), 2), DeviceObjects((), following), b'')
-    asked_all(RtuInquiry(1, script))
+    asked_all(ModbusInquiry(1, script))
     assert [type(question) for question in script.asked] == [ReadDevice, ReadDevice, ReportSlaveId]
 
 
 def test_objects_that_nobody_knows_are_passed_over() -> None:
     script = Script(DeviceObjects(((0, b'NFO'), (7, b'x'), (0x80, b'y'))), b'')
-    assert asked_all(RtuInquiry(1, script)) == Identification(vendor='NFO')
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
 
 
 @pytest.mark.parametrize('error', [Refused(1), Refused(2), Refused(3), NoAnswer(), DamagedAnswer()])
 def test_a_question_without_answer_is_not_asked_again(error: LinkError) -> None:
     script = Script(error, SERIAL)
-    assert asked_all(RtuInquiry(1, script)) == Identification(serial='0123456789ABCDEF')
+    assert asked_all(ModbusInquiry(1, script)) == Identification(serial='0123456789ABCDEF')
     script = Script(DeviceObjects(((0, b'NFO'),)), error)
-    assert asked_all(RtuInquiry(1, script)) == Identification(vendor='NFO')
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
     script = Script(DeviceObjects(((0, b'NFO'),), 1), error, error)
-    assert asked_all(RtuInquiry(1, script)) == Identification(vendor='NFO')
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
     script = Script(error, error)
-    assert asked_all(RtuInquiry(1, script)) == Identification()
+    assert asked_all(ModbusInquiry(1, script)) == Identification()
 
 
 def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
     script = Script(NotReady(1.0), DeviceObjects(((0, b'NFO'),)), NotReady(2.0), SERIAL)
-    inquiry = RtuInquiry(1, script)
+    inquiry = ModbusInquiry(1, script)
     for _ in range(2):
         with pytest.raises(NotReady):
             inquiry.ask()

@@ -25,12 +25,21 @@ from hypothesis import example
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from link_bench import ONE
+from link_bench import SETTINGS
+from link_bench import TIMEOUT
+from link_bench import TWO
+from link_bench import UNIT
+from link_bench import A
+from link_bench import B
+from link_bench import Bench
+from link_bench import C
+from link_bench import D
 import pymodbus_opinion as opinion
 import pytest
 from virtual_wire import Fate
-from virtual_wire import Slave
-from virtual_wire import Wire
 
+from nfo_sinus_driver.link.doubts import LATEST_ANSWER
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -38,64 +47,8 @@ from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.rtu_link import LATEST_ANSWER
-from nfo_sinus_driver.link.rtu_link import RtuLink
 from nfo_sinus_driver.link.settings import BAUD_RATES
 from nfo_sinus_driver.link.settings import LineSettings
-
-TIMEOUT = 0.1
-SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
-UNIT = 1
-#: Probes of one word and of two, as a drive has them.
-ONE = Address((0x2A5,), 1)
-TWO = Address((0x258,), 2)
-A = Address((0x400,), 1)
-B = Address((0x264,), 1)
-C = Address((0x3EC,), 2)
-D = Address((0x2A8,), 2)
-
-
-class Bench:
-    """A link on a virtual line; everything done with it happens in virtual time."""
-
-    def __init__(
-        self,
-        fates: list[Fate] | None = None,
-        settings: LineSettings = SETTINGS,
-        probes: tuple[Address, ...] = (ONE, TWO),
-    ) -> None:
-        self.wire = Wire(settings)
-        self.slave = Slave(self.wire, iter(fates or []))
-        self.link = RtuLink(self.wire, settings)
-        with self.wire.time():
-            self.link.open()
-        self.link.use_probes(UNIT, probes)
-
-    def read(self, address: Address, unit: int = UNIT) -> Reply:
-        with self.wire.time():
-            return self.link.read(unit, address)
-
-    def write(self, address: Address, *words: int, unit: int = UNIT) -> Reply:
-        with self.wire.time():
-            return self.link.write(unit, address, words)
-
-    def expect(self, error: type[LinkError], action: Callable[[], object]) -> LinkError:
-        with pytest.raises(error) as raised:
-            action()
-        assert type(raised.value) is error
-        return raised.value
-
-    @property
-    def asked(self) -> list[int]:
-        """The registers of all requests so far."""
-        return [register for _, _, register, _ in self.slave.requests]
-
-    def answer_of(self, number: int) -> tuple[int, ...]:
-        """What the slave says to the request with this number."""
-        _, _, register, count = self.slave.requests[number]
-        return self.slave.words(register, count, number)
-
 
 # --- plain transactions ---------------------------------------------------------------------------
 

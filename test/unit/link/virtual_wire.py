@@ -28,7 +28,8 @@ from unittest import mock
 
 import pymodbus_opinion as opinion
 
-from nfo_sinus_driver.link import rtu_link
+from nfo_sinus_driver.link import doubts
+from nfo_sinus_driver.link import serial_link
 from nfo_sinus_driver.link.settings import LineSettings
 
 #: More looks at the clock than any honest transaction takes: the link hangs.
@@ -37,15 +38,18 @@ _PATIENCE = 100_000
 
 class Wire:
     """
-    The port of an :class:`RtuLink`, and the clock that it sees.
+    The port of a :class:`SerialLink`, and the clock that it sees.
 
+    :ivar gap: the silence before a frame, s.
     :ivar sent: every frame sent, and when it began.
     :ivar seen: when bytes were read, and how many.
-    :ivar far_end: called with each frame and the time at which its last byte is sent.
+    :ivar far_end: called with each frame, as RTU has it, and the time at which its last byte is
+        sent.
     """
 
     def __init__(self, settings: LineSettings) -> None:
         self.settings = settings
+        self.gap = settings.frame_gap
         self.now = 1000.0
         self.sent: list[tuple[float, bytes]] = []
         self.seen: list[tuple[float, int]] = []
@@ -60,10 +64,21 @@ class Wire:
         assert self._looks < _PATIENCE, 'the link hangs'
         return self.now
 
+    def pack(self, frame: bytes) -> bytes:
+        """What goes over this line for an RTU frame."""
+        return frame
+
+    def unpack(self, data: bytes) -> bytes:
+        """The RTU frame for what went over this line."""
+        return data
+
     @contextlib.contextmanager
     def time(self) -> Iterator[None]:
         """Let the link see this clock."""
-        with mock.patch.object(rtu_link, 'time', SimpleNamespace(monotonic=self.monotonic)):
+        clock = SimpleNamespace(monotonic=self.monotonic)
+        with contextlib.ExitStack() as stack:
+            for module in (serial_link, doubts):
+                stack.enter_context(mock.patch.object(module, 'time', clock))
             yield
 
     def arrive(self, at: float, data: bytes, *, lump: bool = False) -> float:
@@ -89,7 +104,7 @@ class Wire:
     def write(self, data: bytes) -> None:
         self.sent.append((self.now, data))
         self._looks = 0
-        self.far_end(data, self.now + len(data) * self.settings.char_time)
+        self.far_end(self.unpack(data), self.now + len(data) * self.settings.char_time)
 
     def read(self, until: float) -> bytes:
         if not self._arrivals or self._arrivals[0][0] > max(until, self.now):
@@ -103,13 +118,29 @@ class Wire:
         return data
 
     def check_gaps(self) -> None:
-        """Every frame must begin t3.5 after whatever was on the line before, as far as seen."""
+        """Every frame must begin a gap after whatever was on the line before, as far as seen."""
         ends = [(at + len(frame) * self.settings.char_time, at) for at, frame in self.sent]
         ends += [(at, at) for at, _ in self.seen]
         for start, _ in self.sent:
             before = [end for end, began in ends if began < start]
             if before:
-                assert start - max(before) >= self.settings.frame_gap - 1e-9
+                assert start - max(before) >= self.gap - 1e-9
+
+
+class AsciiWire(Wire):
+    """The same for Modbus ASCII; whoever is at the far end speaks RTU."""
+
+    def __init__(self, settings: LineSettings) -> None:
+        super().__init__(settings)
+        self.gap = 2 * settings.char_time
+
+    def pack(self, frame: bytes) -> bytes:
+        return opinion.ascii_frame(frame[:-2])
+
+    def unpack(self, data: bytes) -> bytes:
+        assert data[:1] == b':' and data[-2:] == b'\r\n' and data == data.upper()
+        message = bytes.fromhex(data[1:-4].decode())
+        return message + opinion.crc(message)
 
 
 @dataclass(frozen=True)
@@ -120,11 +151,13 @@ class Fate:
     :ivar delay: how long the slave takes, in time-outs.
     :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
         ``double``, ``refuse twice``.
+    :ivar again: how much later the second of two answers comes, in time-outs.
     """
 
     delay: float = 0.0
     what: str = 'answer'
     lump: bool = False
+    again: float = 0.0
 
 
 GOOD = Fate()
@@ -171,9 +204,15 @@ class Slave:
             answer = opinion.read_answer(unit, self.words(register, count, number))
         else:
             answer = opinion.write_answer(unit, register, words)
+        answer = self._wire.pack(answer)
         if fate.what == 'damage':
             answer = answer[:-1] + bytes((answer[-1] ^ 1,))
-        if fate.what in ('double', 'refuse twice'):
+        timeout = self._wire.settings.response_timeout
+        start = max(self._free, end + fate.delay * timeout)
+        twice = fate.what in ('double', 'refuse twice')
+        if twice and not fate.again:
             answer += answer
-        start = max(self._free, end + fate.delay * self._wire.settings.response_timeout)
         self._free = self._wire.arrive(start, answer, lump=fate.lump)
+        if twice and fate.again:
+            again = self._free + fate.again * timeout
+            self._free = self._wire.arrive(again, answer, lump=fate.lump)

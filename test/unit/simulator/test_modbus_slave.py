@@ -24,7 +24,8 @@ import pytest
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.modbus import ModbusRtu
+from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
+from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.receiver import Receiver
 
 RTU = ModbusRtu()
@@ -111,7 +112,7 @@ def test_the_crc_of_the_standards_example():
 
 @given(st.integers(0, 255), st.binary(min_size=1, max_size=100))
 def test_wrap_and_unwrap(address, pdu):
-    assert RTU.unwrap(RTU.wrap(address, pdu)) == (address, pdu)
+    assert RTU.unwrap(RTU.wrap(address, pdu)) == Request(address, pdu)
 
 
 @given(st.binary(min_size=4, max_size=30), st.data())
@@ -123,10 +124,13 @@ def test_a_flipped_bit_is_noticed(body, data):
 
 
 def test_only_writes_are_obeyed_by_everybody():
-    assert RTU.broadcast(0, b'\x06')
-    assert RTU.broadcast(0, b'\x10')
-    assert not RTU.broadcast(0, b'\x03')
-    assert not RTU.broadcast(1, b'\x06')
+    drive = SimulatedDrive(address=7)
+    assert RTU.concerns(drive, Request(0, b'\x06'))
+    assert RTU.concerns(drive, Request(0, b'\x10'))
+    assert not RTU.concerns(drive, Request(0, b'\x03'))
+    assert not RTU.concerns(drive, Request(1, b'\x06'))
+    assert RTU.answer(drive, Request(0, bytes.fromhex('0602940003'))) == b''
+    assert RTU.answer(drive, Request(7, bytes.fromhex('0602940003')))
 
 
 # ---- cutting bytes into frames ----
@@ -138,7 +142,7 @@ WRITE = RTU.wrap(1, bytes.fromhex('10027E00020413880000'))
 
 
 def receiver(character=0.0):
-    return Receiver(RTU, character, T35)
+    return Receiver(RTU, character, T35 + 0.002)
 
 
 @pytest.mark.parametrize('frame', [READ, WRITE])
@@ -198,7 +202,7 @@ def test_an_unknown_function_ends_with_silence():
     frame = RTU.wrap(1, b'\x41abc')
     assert not list(receive.feed(frame, 0.0))
     (arrived,) = receive.take(1.0)
-    assert RTU.unwrap(arrived.data) == (1, b'\x41abc')
+    assert RTU.unwrap(arrived.data) == Request(1, b'\x41abc')
 
 
 def test_endless_rubbish_is_not_collected():

@@ -172,7 +172,7 @@ def test_the_log_keeps_what_happened_when(bench):
         acknowledge(bench)
         bench.drive.advance(36)
     log = bench.drive.faults.log
-    assert len(log) == 128
+    assert len(log) == 32
     assert log[0].code == 7
     assert log[1].code == 5
     assert log[0].op_time - log[1].op_time == pytest.approx(0.01)

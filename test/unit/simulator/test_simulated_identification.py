@@ -22,7 +22,7 @@ from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
 from nfo_sinus_driver.simulator.main import main
-from nfo_sinus_driver.simulator.modbus import ModbusRtu
+from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 SERIAL = '0123456789ABCDEF'

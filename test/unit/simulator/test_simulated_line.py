@@ -21,7 +21,7 @@ import pytest
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line import Line
-from nfo_sinus_driver.simulator.modbus import ModbusRtu
+from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.timing import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.trace import Trace

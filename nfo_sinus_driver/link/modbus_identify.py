@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Who a unit says it is, in Modbus RTU frames and without I/O [M0 §6.2.4].
+Who a unit says it is, in Modbus messages and without I/O [M0 §6.2.4].
 
 Function 43/14, Read Device Identification (MODBUS APPLICATION PROTOCOL SPECIFICATION V1.1b
 §6.21), and function 17, Report Slave ID (§6.13). How long their answers are stands in them.
@@ -25,10 +25,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import re
 
-from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.modbus_pdu import Request
 
 REPORT_SLAVE_ID = 17
 ENCAPSULATED_INTERFACE = 43
@@ -38,9 +38,8 @@ _DEVICE_IDENTIFICATION = 14
 #: Read device ID codes: the first three objects, all that are standard, one by its number.
 BASIC, REGULAR, SPECIFIC = 1, 2, 4
 
-#: The longest RTU frame there is.
-_LONGEST = 256
-_CRC_LENGTH = 2
+#: The longest message there is.
+_LONGEST = 254
 #: Where the objects begin in an answer: behind unit, function, MEI type, code, conformity level,
 #: more follows, next object and number of objects.
 _OBJECTS_AT = 8
@@ -81,7 +80,7 @@ class ReadDevice:
 
     @property
     def body(self) -> bytes:
-        """The request without unit, function and CRC."""
+        """The request without unit and function."""
         return bytes((_DEVICE_IDENTIFICATION, self.code, self.first))
 
     @property
@@ -90,28 +89,28 @@ class ReadDevice:
         return bytes((self.unit, self.function, _DEVICE_IDENTIFICATION, self.code))
 
     def measure(self, beginning: bytes) -> int:
-        """Bytes of an answer that begins like this, CRC included; the least there can be."""
+        """Bytes of an answer that begins like this; the least there can be."""
         at = _OBJECTS_AT
         if len(beginning) >= at:
             for _ in range(beginning[at - 1]):
                 # number, length, content; of what has not come, number and length at least
                 at += 2 + (beginning[at + 1] if len(beginning) > at + 1 else 0)
-        return at + _CRC_LENGTH
+        return at
 
-    def decode(self, frame: bytes) -> DeviceObjects | None:
-        """Return what a whole frame says; ``None`` if it is no answer after all."""
-        more = _MORE_FOLLOWS.get(frame[5])
+    def decode(self, message: bytes) -> DeviceObjects | None:
+        """Return what a whole message says; ``None`` if it is no answer after all."""
+        more = _MORE_FOLLOWS.get(message[5])
         objects = []
         at = _OBJECTS_AT
-        for _ in range(frame[at - 1]):
-            end = at + 2 + frame[at + 1]
-            objects.append((frame[at], frame[at + 2 : end]))
+        for _ in range(message[at - 1]):
+            end = at + 2 + message[at + 1]
+            objects.append((message[at], message[at + 2 : end]))
             at = end
         if more is None:
             return None
         if self.code == SPECIFIC and [number for number, _ in objects] != [self.first]:
             return None
-        return DeviceObjects(tuple(objects), frame[6] if more else None)
+        return DeviceObjects(tuple(objects), message[6] if more else None)
 
 
 @dataclass(frozen=True)
@@ -130,12 +129,12 @@ class ReportSlaveId:
         return bytes((self.unit, self.function))
 
     def measure(self, beginning: bytes) -> int:
-        """Bytes of an answer that begins like this, CRC included; the least there can be."""
-        return 3 + (beginning[2] if len(beginning) > 2 else 0) + _CRC_LENGTH
+        """Bytes of an answer that begins like this; the least there can be."""
+        return 3 + (beginning[2] if len(beginning) > 2 else 0)
 
-    def decode(self, frame: bytes) -> bytes:
+    def decode(self, message: bytes) -> bytes:
         """Return the data, without their count."""
-        return frame[3:-_CRC_LENGTH]
+        return message[3:]
 
 
 def text(data: bytes) -> str:
@@ -159,7 +158,7 @@ def serial_number(report: bytes) -> str:
     return max((part.strip() for part in _TEXT.findall(report)), key=len, default=b'').decode()
 
 
-class RtuInquiry:
+class ModbusInquiry:
     """
     The questions by which a unit tells who it is.
 
@@ -169,10 +168,10 @@ class RtuInquiry:
     :param ask: sends a request; returns its answer and when that came.
     """
 
-    def __init__(self, unit: int, ask: Callable[[rtu.Request[object]], tuple[object, float]]):
+    def __init__(self, unit: int, ask: Callable[[Request[object]], tuple[object, float]]):
         self._unit = unit
         self._ask = ask
-        self._questions: list[rtu.Request[object]] = [ReadDevice(unit), ReportSlaveId(unit)]
+        self._questions: list[Request[object]] = [ReadDevice(unit), ReportSlaveId(unit)]
         self._told: dict[str, str] = {}
 
     @property

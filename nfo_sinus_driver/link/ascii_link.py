@@ -1,0 +1,46 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Modbus ASCII over one serial line."""
+
+from __future__ import annotations
+
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.serial_link import SerialLink
+
+#: Frames need no silence between them, but transmitters take a moment to switch, characters.
+_SWITCHING = 2
+
+_T = TypeVar('_T')
+
+
+class AsciiLink(SerialLink):
+    """A Modbus ASCII master; a frame may pause up to a second between characters."""
+
+    @property
+    def _gap(self) -> float:
+        return _SWITCHING * self._settings.char_time
+
+    def _encode(self, request: Request[Any]) -> bytes:
+        return modbus_ascii.encode(request)
+
+    def _reader(self, request: Request[_T]) -> modbus_ascii.AsciiReader[_T]:
+        return modbus_ascii.AsciiReader(request)
+
+    def _frame_length(self, message_length: int) -> int:
+        return modbus_ascii.length(message_length)

@@ -1,0 +1,228 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Messages of the Classic protocol of NFO, without I/O [M0 §6.1.3], [M2 §5].
+
+:func:`encode` makes a message; a :class:`Reader` finds messages in whatever bytes come in, in any
+pieces, among noise and the remains of others. Hexadecimal digits are sent in upper case and read
+in both [C86].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from operator import xor
+
+#: The address at which a drive answers whatever its own is; for a drive alone on the line.
+POINT_TO_POINT = 0
+#: The address that all drives obey and none answers.
+BROADCAST = 95
+
+_EOT = 0x04
+_ENQ = 0x05
+_STX = 0x02
+_ETX = 0x03
+_ACK = 0x06
+_NAK = 0x15
+_FIRST_ADDRESS = 0x20
+
+
+@dataclass(frozen=True)
+class Enquiry:
+    """Ask for the value of a parameter."""
+
+    unit: int
+    number: int
+
+
+@dataclass(frozen=True)
+class Select:
+    """Give a parameter a value."""
+
+    unit: int
+    number: int
+    word: int
+
+
+@dataclass(frozen=True)
+class Value:
+    """REPLY: the value that a parameter has."""
+
+    unit: int
+    number: int
+    word: int
+
+
+@dataclass(frozen=True)
+class Ack:
+    """It was done."""
+
+    unit: int
+
+
+@dataclass(frozen=True)
+class Nak:
+    """It was not done, or there is no such parameter."""
+
+    unit: int
+
+
+Request = Enquiry | Select
+Message = Enquiry | Select | Value | Ack | Nak
+#: What tells answers apart: the number that a REPLY names, else only what it is.
+Kind = int | type[Message]
+
+
+def kind(message: Message) -> Kind:
+    """Return what tells an answer from others."""
+    return message.number if isinstance(message, Value) else type(message)
+
+
+def kinds(request: Request) -> tuple[Kind, Kind]:
+    """Return the kinds of answers that a request may have."""
+    return request.number if isinstance(request, Enquiry) else Ack, Nak
+
+
+def nameless(request: Request) -> tuple[Kind, ...]:
+    """Return those of them that do not say what they answer."""
+    return tuple(kind for kind in kinds(request) if isinstance(kind, type))
+
+
+def answers(message: Message, request: Request) -> bool:
+    """Tell whether a message may be the answer to a request."""
+    if request.unit not in (message.unit, POINT_TO_POINT) or isinstance(message, (Enquiry, Select)):
+        return False
+    return kind(message) in kinds(request)
+
+
+def encode(message: Message) -> bytes:
+    """
+    Return the bytes of a message.
+
+    :raises ValueError: an address, a parameter or a value that the protocol cannot express.
+    """
+    if not 0 <= message.unit <= BROADCAST:
+        raise ValueError(f'address {message.unit}: Classic has 0 to {BROADCAST}')
+    address = bytes((_FIRST_ADDRESS + message.unit,))
+    if isinstance(message, Ack):
+        return address + bytes((_ACK,))
+    if isinstance(message, Nak):
+        return address + bytes((_NAK,))
+    parameter = b'E' + _digits(message.number)
+    if isinstance(message, Enquiry):
+        return bytes((_EOT,)) + address + parameter + bytes((_ENQ,))
+    body = parameter + b'=' + _digits(message.word) + bytes((_ETX,))
+    frame = address + bytes((_STX,)) + body + bytes((check_sum(body),))
+    return bytes((_EOT,)) + frame if isinstance(message, Select) else frame
+
+
+def check_sum(body: bytes | bytearray) -> int:
+    """Return the BCC: all characters after STX, ETX included, exclusive-ored [C44]."""
+    return reduce(xor, body, 0)
+
+
+def _digits(number: int) -> bytes:
+    if not 0 <= number <= 0xFFFF:
+        raise ValueError(f'{number} does not fit into four hexadecimal digits')
+    return b'%04X' % number
+
+
+_Chars = frozenset[int]
+_ADDRESS: _Chars = frozenset(range(_FIRST_ADDRESS, _FIRST_ADDRESS + BROADCAST + 1))
+_HEX: _Chars = frozenset(b'0123456789ABCDEFabcdef')
+_ANY: _Chars = frozenset(range(256))
+_PARAMETER = (frozenset(b'Ee'), *4 * (_HEX,))
+_TEXT = (frozenset((_STX,)), *_PARAMETER, frozenset(b'='), *4 * (_HEX,), frozenset((_ETX,)))
+#: What characters each kind of message may have, one set for each; an answer has no EOT.
+_VALUE = (_ADDRESS, *_TEXT, _ANY)
+_VERDICT = (_ADDRESS, frozenset((_ACK, _NAK)))
+_ENQUIRY = (frozenset((_EOT,)), _ADDRESS, *_PARAMETER, frozenset((_ENQ,)))
+_SELECT = (frozenset((_EOT,)), *_VALUE)
+_SHAPES = (_VALUE, _VERDICT, _ENQUIRY, _SELECT)
+
+#: Characters of a REPLY, the longest answer.
+LONGEST_ANSWER = len(_VALUE)
+
+
+class Reader:
+    """
+    Finds the messages in the bytes that come in.
+
+    A message counts only when every character is one that may stand there and the check sum is
+    right. It is cut by its length, for a check sum may be any control character. What breaks off
+    is passed over up to the character that breaks it, so that its remains are taken for nothing
+    and the next whole message is found. A REPLY straight behind an EOT is no REPLY but a SELECT:
+    the echo of a request never looks like an answer.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    @property
+    def pending(self) -> int:
+        """How many bytes have come of a message that is not whole yet."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[Message]:
+        """Take bytes that came in; return the messages that became whole, in their order."""
+        self._buffer += data
+        found: list[Message] = []
+        while self._buffer:
+            fit, shape = max(((_fit(self._buffer, shape), shape) for shape in _SHAPES), key=_first)
+            message = _decode(self._buffer[:fit]) if fit == len(shape) else None
+            if message is not None:
+                found.append(message)
+                del self._buffer[:fit]
+            elif fit == len(self._buffer) < len(shape):
+                break
+            else:
+                # a check sum that is wrong breaks the message, and may begin the next one
+                del self._buffer[: self._broken_at(min(fit, len(shape) - 1))]
+        return found
+
+    def _broken_at(self, fit: int) -> int:
+        """Return where to look on, when only the first ``fit`` characters belong together."""
+        # an STX has its address before it, even where that could be a digit of what broke off
+        return max(1, fit - (self._buffer[fit] == _STX))
+
+
+def _first(entry: tuple[int, object]) -> int:
+    return entry[0]
+
+
+def _fit(data: bytearray, shape: tuple[_Chars, ...]) -> int:
+    """Return how many characters at the beginning are as the shape wants them."""
+    fit = 0
+    for char, allowed in zip(data, shape, strict=False):
+        if char not in allowed:
+            break
+        fit += 1
+    return fit
+
+
+def _decode(frame: bytearray) -> Message | None:
+    """Return the message of a whole frame; ``None`` if its check sum is wrong."""
+    is_request = frame[0] == _EOT
+    unit = frame[is_request] - _FIRST_ADDRESS
+    if len(frame) == len(_VERDICT):
+        return Ack(unit) if frame[1] == _ACK else Nak(unit)
+    if len(frame) == len(_ENQUIRY):
+        return Enquiry(unit, int(frame[3:7], 16))
+    body = frame[is_request + 2 : -1]
+    if check_sum(body) != frame[-1]:
+        return None
+    number, word = int(body[1:5], 16), int(body[6:10], 16)
+    return Select(unit, number, word) if is_request else Value(unit, number, word)

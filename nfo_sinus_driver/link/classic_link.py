@@ -1,0 +1,384 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Classic protocol over one serial line: no belief in a doubtful answer, nor in a bare ACK."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import time
+from typing import NamedTuple
+
+from nfo_sinus_driver.link import classic
+from nfo_sinus_driver.link import classic_refusal
+from nfo_sinus_driver.link.classic import BROADCAST
+from nfo_sinus_driver.link.classic import Enquiry
+from nfo_sinus_driver.link.classic import Kind
+from nfo_sinus_driver.link.classic import Message
+from nfo_sinus_driver.link.classic import Nak
+from nfo_sinus_driver.link.classic import Request
+from nfo_sinus_driver.link.classic import Select
+from nfo_sinus_driver.link.classic import Value
+from nfo_sinus_driver.link.classic import nameless
+from nfo_sinus_driver.link.classic_refusal import INV_ST
+from nfo_sinus_driver.link.classic_refusal import MODE
+from nfo_sinus_driver.link.classic_refusal import SIO_ERR
+from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
+from nfo_sinus_driver.link.doubts import LATEST_ANSWER
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NotReady
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Words
+from nfo_sinus_driver.link.serial_link import Port
+from nfo_sinus_driver.link.settings import LineSettings
+
+#: SiProt of both firmwares [M0 §6.1.2], [M2 §4], [C5].
+CHAR_FORMATS = ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1')
+
+#: Pauses within an answer may last this long, s: no manual limits them [C86].
+_LUMP = 0.03
+#: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
+_NO_DOUBLE = 2
+_NO_DOUBLE_LEAST = 0.002
+#: How long drives may be busy with a broadcast, which none of them confirms, s.
+_TURNAROUND = 0.1
+#: How often the words of a value that changes meanwhile are read again.
+_TRIES = 5
+#: How old the inverter status may be to show that a serial fault is new, s.
+_FRESH = 1.0
+
+
+class _Answer(NamedTuple):
+    request: Request
+    kind: Kind
+    arrived: float
+
+
+class ClassicLink:
+    """
+    A master of the Classic protocol on one line.
+
+    A REPLY names its parameter, ACK and NAK name nothing. So whenever an answer is missing or
+    damaged, or bytes come that nobody asked for, the kinds of answers that may still come are in
+    doubt until an answer of another kind has come (units answer in order), or for
+    :data:`LATEST_ANSWER` time-outs. A parameter whose REPLY is in doubt is only read after
+    another one has been. A write is never kept waiting, for it may be a stop; but if its answer
+    is in doubt it is not believed: the line is cleared by reading something, and
+    :class:`DamagedAnswer` says that nobody knows.
+
+    An adapter that echoes what is sent is noticed at the first request; from then on an answer
+    counts only behind the echo.
+
+    Point to point (unit 0) an answer may carry any address [C86]. Do not mix it with others on
+    one line.
+
+    What is promised: no value of another parameter or another drive is taken, no answer up to
+    three time-outs late to a question asked before, no ACK of another write. A REPLY that comes
+    twice is noticed when it comes before the same question, asked again at once, can have been
+    answered, ACK and NAK when they begin again within two characters; later ones may pass for the
+    answer, a REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that
+    protects them, so choose a format that has it.
+
+    :raises ValueError: a character format that no firmware has.
+    """
+
+    space = 'classic'
+
+    def __init__(self, port: Port, settings: LineSettings) -> None:
+        if settings.char_format not in CHAR_FORMATS:
+            raise ValueError(
+                f'char_format {settings.char_format!r}: classic has {", ".join(CHAR_FORMATS)}'
+            )
+        self._port = port
+        self._settings = settings
+        self._probes: dict[int, tuple[int, ...]] = {}
+        self._doubts: dict[int, dict[Kind, float]] = {}
+        #: The inverter status that each unit told last, and when.
+        self._inv_st: dict[int, tuple[int, float]] = {}
+        self._last: _Answer | None = None
+        self._echoes = False
+        #: Nothing is sent before.
+        self._free_at = 0.0
+
+    def open(self) -> None:
+        """
+        Open the port.
+
+        :raises PortError: it cannot be opened; the message says what to do.
+        """
+        self._port.open()
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        self._port.close()
+        self._doubts.clear()
+        self._inv_st.clear()
+        self._last = None
+        self._echoes = False
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        """
+        Name more parameters that are safe to read at any time.
+
+        E00E9 and E0029, which every firmware has, are taken first: to ask for what a drive does
+        not have is a serial fault, for which it stops when under serial control [M2 table 4].
+        """
+        self._probes[unit] = tuple(number for probe in probes for number in probe.numbers)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """
+        Read one parameter; one of two words in three transactions or more, until it stands still.
+
+        :raises LinkError: as its subclasses say.
+        """
+        number, *rest = reversed(address.numbers)
+        word, arrived = self._enquire(unit, number)
+        if not rest:
+            return Reply((word,), arrived)
+        (low_number,) = rest
+        for _ in range(_TRIES):
+            high = word
+            low, _ = self._enquire(unit, low_number)
+            word, arrived = self._enquire(unit, number)
+            if word == high:
+                return Reply((low, high), arrived)
+        raise DamagedAnswer(f'unit {unit}: E{number:04X} never stood still')
+
+    def write(self, unit: int, address: Address, words: Words) -> Reply:
+        """
+        Write one parameter; unit 95 means all of them, and nobody confirms it.
+
+        Of two words the low one is written first, as they are numbered; the manuals have no
+        such parameter, so nothing says how. A refused second word leaves the first one written.
+
+        :raises LinkError: as its subclasses say.
+        """
+        arrived = 0.0
+        for position, (number, word) in enumerate(zip(address.numbers, words, strict=True)):
+            try:
+                arrived = self._select(Select(unit, number, word))
+            except LinkError as error:
+                error.maybe_done = error.maybe_done or position > 0
+                raise
+        return Reply((), arrived)
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        """
+        Write one parameter, then read another; in as many transactions as that takes.
+
+        :raises LinkError: as its subclasses say.
+        """
+        self.write(unit, address, words)
+        return self.read(unit, source)
+
+    def identify(self, unit: int) -> NothingToAsk:
+        """Return no questions: the protocol has none but for parameters."""
+        return NothingToAsk()
+
+    # --- transactions -------------------------------------------------------------------------
+
+    def _enquire(self, unit: int, number: int) -> tuple[int, float]:
+        """Return the value of a parameter, and when it came."""
+        if unit == BROADCAST:
+            raise ValueError('nobody answers a broadcast')
+        request = Enquiry(unit, number)
+        self._listen(request)
+        doubt = self._doubt(unit)
+        if number in doubt:
+            self._clear(unit)
+            self._listen(request)
+        answer, arrived, early = self._transact(request)
+        if early:
+            self._distrust(request)
+            self._clear(unit)
+            self._listen(request)
+            answer, arrived, _ = self._transact(request)
+        if isinstance(answer, Value):
+            if number == INV_ST:
+                self._inv_st[unit] = answer.word, arrived
+            return answer.word, arrived
+        text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
+        raise Refused(Refused.ILLEGAL_ADDRESS, text)
+
+    def _select(self, request: Select) -> float:
+        """Write one word; return when the answer came."""
+        self._listen(request)
+        if request.unit == BROADCAST:
+            sent = self._send(request)
+            self._last = None
+            self._free_at = sent + _TURNAROUND
+            return sent
+        began = time.monotonic()
+        try:
+            answer, arrived, _ = self._transact(request)
+        except DamagedAnswer:
+            self._settle(request.unit)
+            raise
+        if isinstance(answer, Nak):
+            raise self._refusal(request.unit, began)
+        return arrived
+
+    def _refusal(self, unit: int, began: float) -> Refused:
+        """
+        Ask why a SELECT was answered by NAK [M0 §6.1.5]; nothing but our own error is cleared.
+
+        :param began: when the SELECT was sent.
+        """
+        before, seen = self._inv_st.get(unit, (SIO_FAIL, 0.0))
+        # a serial fault that was not there just before: this SELECT is its cause
+        ours = before != SIO_FAIL and began - seen < _FRESH
+        try:
+            inv_st, _ = self._enquire(unit, INV_ST)
+            if inv_st != SIO_FAIL or not ours:
+                return classic_refusal.by_status(inv_st)
+            return classic_refusal.by_flags(self._enquire(unit, SIO_ERR)[0])
+        except PortError:
+            raise
+        except LinkError as error:
+            return classic_refusal.unknown(error)
+
+    def _settle(self, unit: int) -> None:
+        """Read something, so that the next answer is believed again; if not, then not."""
+        try:
+            self._clear(unit)
+        except PortError:
+            raise
+        except LinkError:
+            return
+
+    def _clear(self, unit: int) -> None:
+        """
+        Read something that cannot be mistaken: what was late has come before it.
+
+        :raises NotReady: everything that could be read is in doubt.
+        """
+        doubt = self._doubt(unit)
+        numbers = (INV_ST, MODE, *self._probes.get(unit, ()))
+        for number in numbers:
+            if number not in doubt:
+                self._enquire(unit, number)
+                return
+        raise NotReady(max(doubt[number] for number in numbers))
+
+    def _doubt(self, unit: int) -> dict[Kind, float]:
+        """Return what may still come, and until when, without what is too late by now."""
+        now = time.monotonic()
+        doubt = {kind: until for kind, until in self._doubts.get(unit, {}).items() if until > now}
+        self._doubts[unit] = doubt
+        return doubt
+
+    def _distrust(self, request: Request) -> None:
+        until = time.monotonic() + (LATEST_ANSWER - 1) * self._settings.response_timeout
+        doubt = self._doubts.setdefault(request.unit, {})
+        doubt.update(dict.fromkeys(classic.kinds(request), until))
+
+    def _listen(self, request: Request) -> None:
+        """Take what came unasked; wait for it where it could pass for the answer to a request."""
+        last = self._last
+        until = self._free_at
+        if last and last.request.unit == request.unit and last.kind in nameless(request):
+            pause = max(_NO_DOUBLE * self._settings.char_time, _NO_DOUBLE_LEAST)
+            until = max(until, last.arrived + pause)
+        while True:
+            if self._port.read(until) and last:
+                self._distrust(last.request)
+            if time.monotonic() >= until:
+                return
+
+    def _send(self, request: Request) -> float:
+        """Hand a request to the port; return when its last byte will have left."""
+        frame = classic.encode(request)
+        began = time.monotonic()
+        self._port.write(frame)
+        return began + len(frame) * self._settings.char_time
+
+    def _transact(self, request: Request) -> tuple[Message, float, bool]:
+        """
+        Return the answer to a request, when its last byte came, and whether that was too early.
+
+        Too early is what was told just before and is told again before the request can have been
+        answered. A line without speed, such as a pseudo-terminal, is always early.
+        """
+        before, self._last = self._last, None
+        sent = self._send(request)
+        try:
+            answer, arrived, more = self._receive(request, sent)
+        except (NoAnswer, DamagedAnswer):
+            self._distrust(request)
+            # if the adapter still echoes, the next echo will tell
+            self._echoes = False
+            raise
+        # units answer in order: whatever was still to come has come before this
+        self._doubts.pop(request.unit, None)
+        self._last = _Answer(request, classic.kind(answer), arrived)
+        if more:
+            self._distrust(request)
+        again = before is not None and before.request == request and isinstance(answer, Value)
+        # a character less, for no clock is exact
+        least = (classic.LONGEST_ANSWER - 1) * self._settings.char_time
+        return answer, arrived, again and arrived < sent + least
+
+    def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
+        """Return the answer, when it came, and whether more came behind it."""
+        doubt = self._doubt(request.unit)
+        longest = classic.LONGEST_ANSWER * self._settings.char_time + _LUMP
+        deadline = sent + self._settings.response_timeout
+        # one answer, and as much rubbish again, however long somebody keeps talking
+        last_chance = deadline + 2 * longest
+        reader = classic.Reader()
+        echoed = not self._echoes
+        came = 0
+        while True:
+            data = self._port.read(deadline)
+            now = time.monotonic()
+            if not data:
+                if now < deadline:
+                    continue
+                break
+            came += len(data)
+            messages = reader.feed(data)
+            for number, message in enumerate(messages, start=1):
+                if message == request:
+                    self._echoes = echoed = True
+                    came -= len(classic.encode(request))
+                elif echoed and classic.answers(message, request):
+                    if classic.kind(message) not in doubt:
+                        return message, now, bool(messages[number:] or reader.pending)
+                    if isinstance(request, Select):
+                        raise DamagedAnswer(
+                            f'unit {request.unit} answered, but perhaps to an earlier request'
+                        )
+            deadline = min(max(deadline, now + longest), last_chance)
+        if came:
+            raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
+        raise NoAnswer(f'unit {request.unit} did not answer')
+
+
+class NothingToAsk:
+    """An inquiry without questions."""
+
+    done = True
+    found = Identification()
+
+    def ask(self) -> Reply:
+        """Ask nothing: there is no question."""
+        raise IndexError('there is no question left')

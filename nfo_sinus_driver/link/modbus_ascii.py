@@ -1,0 +1,98 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Modbus ASCII frames of a master, without I/O.
+
+A frame is ``:``, the message and its check sum in hexadecimal characters, carriage return and line
+feed (MODBUS over Serial Line V1.02 §2.5.2). Upper case is sent, both are read. A colon always
+begins a frame: whatever came before it is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import re
+from typing import TypeVar
+
+from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link.answer_reader import AnswerReader
+from nfo_sinus_driver.link.modbus_pdu import Request
+
+#: How long a pause between two characters of a frame may last, s.
+PAUSE = 1.0
+#: How long one may last where no frame is begun: adapters hand characters over in lumps, s.
+_LUMP = 0.03
+
+_FRAME = re.compile(rb':((?:[0-9A-Fa-f]{2})+)\r\n')
+_BEGUN = re.compile(rb':([0-9A-Fa-f]*)\r?\Z')
+
+_T = TypeVar('_T')
+
+
+def lrc(data: bytes) -> int:
+    """Return the check sum of a message: with it, all bytes add up to nothing, modulo 256."""
+    return -sum(data) & 0xFF
+
+
+def encode(request: Request[object]) -> bytes:
+    """Return the frame of a request."""
+    message = modbus_pdu.encode(request)
+    return b':%b%02X\r\n' % (message.hex().upper().encode(), lrc(message))
+
+
+def length(message_length: int) -> int:
+    """Return how many characters the frame of a message has: two for each byte, and the rest."""
+    return 2 * (message_length + 1) + len(':\r\n')
+
+
+class AsciiReader(AnswerReader[_T]):
+    """Finds an answer in ASCII frames."""
+
+    def __init__(self, request: Request[_T]) -> None:
+        super().__init__(request)
+        self._longest = length(request.answer_length)
+        self._heads = [
+            head.hex().upper().encode()
+            for head in (request.answer_head, modbus_pdu.refusal_head(request))
+        ]
+
+    @property
+    def missing(self) -> int:
+        """How many characters have to come yet, at least, as far as those that came tell."""
+        begun = self._begun()
+        digits = begun[1] if begun else b''
+        beginning = bytes.fromhex(digits[: len(digits) & ~1].decode())
+        come = len(begun[0]) if begun else 0
+        return max(1, length(self._request.measure(beginning)) - come)
+
+    @property
+    def patience(self) -> float:
+        """How long a pause may last before the next character comes, s."""
+        return PAUSE if self._begun() else _LUMP
+
+    def _messages(self) -> Iterator[tuple[int, int, bytes]]:
+        for frame in _FRAME.finditer(self._buffer):
+            data = bytes.fromhex(frame[1].decode())
+            if lrc(data[:-1]) == data[-1]:
+                yield frame.start(), frame.end(), data[:-1]
+
+    def _begun(self) -> re.Match[bytes] | None:
+        """Return the frame that has begun and not ended, if it can become an answer."""
+        begun = _BEGUN.search(self._buffer)
+        if begun is None or len(begun[0]) >= self._longest:
+            return None
+        digits = begun[1].upper()
+        fits = any(digits.startswith(head[: len(digits)]) for head in self._heads)
+        return begun if fits else None

@@ -1,0 +1,73 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every Modbus link does: turn what is asked for into requests."""
+
+from __future__ import annotations
+
+from abc import ABC
+from abc import abstractmethod
+from typing import TypeVar
+
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Words
+from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
+from nfo_sinus_driver.link.modbus_pdu import Read
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+
+_T = TypeVar('_T')
+
+
+class ModbusLink(ABC):
+    """A Modbus master, whatever carries its requests."""
+
+    space = 'modbus'
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """
+        Read one parameter (function 03).
+
+        :raises LinkError: as its subclasses say.
+        """
+        return Reply(*self._ask(Read(unit, address.numbers[0], address.words)))
+
+    def write(self, unit: int, address: Address, words: Words) -> Reply:
+        """
+        Write one parameter (function 06 for one word, 16 for several).
+
+        :raises LinkError: as its subclasses say.
+        """
+        return Reply(*self._ask(Write(unit, address.numbers[0], words)))
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        """
+        Write one parameter and read another, in one transaction (function 23).
+
+        :raises LinkError: as its subclasses say.
+        """
+        register, read_from = address.numbers[0], source.numbers[0]
+        return Reply(*self._ask(WriteAndRead(unit, register, words, read_from, source.words)))
+
+    def identify(self, unit: int) -> ModbusInquiry:
+        """Return the questions by which a unit tells who it is (functions 43/14 and 17)."""
+        return ModbusInquiry(unit, self._ask)
+
+    @abstractmethod
+    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request, and when its last byte came."""

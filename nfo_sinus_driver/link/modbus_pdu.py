@@ -1,0 +1,217 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a Modbus master asks and is answered, however it is packed [M0 §6.2.3].
+
+A *message* is unit, function and data: what RTU, ASCII and TCP have in common. Each of them packs
+it into frames of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import struct
+from typing import Protocol
+from typing import TypeVar
+
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Words
+
+READ_HOLDING_REGISTERS = 3
+WRITE_SINGLE_REGISTER = 6
+WRITE_MULTIPLE_REGISTERS = 16
+WRITE_AND_READ_REGISTERS = 23
+
+_EXCEPTION = 0x80
+#: Unit, function, code.
+REFUSAL_LENGTH = 3
+
+_T = TypeVar('_T')
+_Answer = TypeVar('_Answer', covariant=True)
+
+
+class Request(Protocol[_Answer]):
+    """What a request knows of itself and of its answer; all in messages."""
+
+    @property
+    def unit(self) -> int:
+        """Who is asked."""
+
+    @property
+    def function(self) -> int:
+        """The function code."""
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand: unit, function and what follows them."""
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer; the most there can be."""
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of an answer that begins like this; the least there can be."""
+
+    def decode(self, message: bytes) -> _Answer | None:
+        """Return what a whole message says; ``None`` if it is no answer after all."""
+
+
+@dataclass(frozen=True)
+class Read:
+    """Read ``count`` registers of ``unit``, from ``register`` on (function 03)."""
+
+    unit: int
+    register: int
+    count: int
+
+    function = READ_HOLDING_REGISTERS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        return struct.pack('>HH', self.register, self.count)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function, 2 * self.count))
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer."""
+        return 3 + 2 * self.count
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, message: bytes) -> Words:
+        """Return the words read."""
+        return struct.unpack(f'>{self.count}H', message[3:])
+
+
+@dataclass(frozen=True)
+class Write:
+    """Write ``words`` to the registers of ``unit`` from ``register`` on (function 06 or 16)."""
+
+    unit: int
+    register: int
+    words: Words
+
+    @property
+    def function(self) -> int:
+        """06 for one word, 16 for several."""
+        return WRITE_SINGLE_REGISTER if len(self.words) == 1 else WRITE_MULTIPLE_REGISTERS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        count = len(self.words)
+        if count == 1:
+            return struct.pack('>HH', self.register, self.words[0])
+        return struct.pack(f'>HHB{count}H', self.register, count, 2 * count, *self.words)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand: all of it."""
+        second = self.words[0] if len(self.words) == 1 else len(self.words)
+        return struct.pack('>BBHH', self.unit, self.function, self.register, second)
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer."""
+        return 6
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, message: bytes) -> Words:
+        """Return no words: the answer only says that it was done."""
+        return ()
+
+
+@dataclass(frozen=True)
+class WriteAndRead:
+    """
+    Write ``words`` from ``register`` on, then read ``count`` registers from ``source`` on.
+
+    One transaction (function 23) [M0 §6.2.3]; only the G2 has it [C57]. The answer is that of a
+    read: it names no register.
+    """
+
+    unit: int
+    register: int
+    words: Words
+    source: int
+    count: int
+
+    function = WRITE_AND_READ_REGISTERS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        size = len(self.words)
+        where = (self.source, self.count, self.register, size)
+        return struct.pack(f'>4HB{size}H', *where, 2 * size, *self.words)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function, 2 * self.count))
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer."""
+        return 3 + 2 * self.count
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, message: bytes) -> Words:
+        """Return the words read."""
+        return struct.unpack(f'>{self.count}H', message[3:])
+
+
+def encode(request: Request[object]) -> bytes:
+    """Return the message of a request."""
+    return bytes((request.unit, request.function)) + request.body
+
+
+def refusal_head(request: Request[object]) -> bytes:
+    """Return how a message begins by which the unit refuses a request."""
+    return bytes((request.unit, request.function | _EXCEPTION))
+
+
+def understand(request: Request[_T], message: bytes) -> _T | None:
+    """
+    Return what a whole message says as the answer to a request.
+
+    :returns: the words read, ``()`` for a write done, or what else the request's ``decode`` makes
+        of it; ``None`` if it is the answer to something else.
+    :raises Refused: the unit answered with an exception.
+    """
+    if len(message) == REFUSAL_LENGTH and message.startswith(refusal_head(request)):
+        raise Refused(message[2])
+    if not message.startswith(request.answer_head):
+        return None
+    if not request.measure(message) == len(message) <= request.answer_length:
+        return None
+    return request.decode(message)

@@ -1,0 +1,302 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Modbus over one serial line: exact time, and no belief in a doubtful answer."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+import contextlib
+import time
+from typing import Any
+from typing import Protocol
+from typing import TypeVar
+
+from nfo_sinus_driver.link.answer_reader import AnswerReader
+from nfo_sinus_driver.link.doubts import Doubts
+from nfo_sinus_driver.link.echo import Echo
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NotReady
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.modbus_link import ModbusLink
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.settings import LineSettings
+
+_T = TypeVar('_T')
+
+#: How many of the longest pauses within an answer there may be.
+_PAUSES = 3
+
+
+class Port(Protocol):
+    """What carries the bytes."""
+
+    def open(self) -> None: ...  # noqa: D102
+
+    def close(self) -> None: ...  # noqa: D102
+
+    def write(self, data: bytes) -> None: ...  # noqa: D102
+
+    def read(self, until: float) -> bytes: ...  # noqa: D102
+
+
+class SerialLink(ModbusLink):
+    """
+    A Modbus master on one line.
+
+    Between frames the line is silent for a gap at least, counted from the last byte seen on it.
+
+    A read answer does not name its register. So whenever an answer is missing or damaged, or
+    bytes come that nobody asked for, the unit is in doubt: a request whose answer could be
+    confused with one still on its way is only sent after a request of another shape has been
+    answered (units answer in order), or after :data:`LATEST_ANSWER` time-outs of silence.
+
+    For the same reason an answer with the very bytes of the one before is believed only after a
+    request of another shape: it may be the one before, told twice. If it answers the same question
+    too, what it says is right, but one more may come: the next request of its shape waits for that.
+    """
+
+    def __init__(self, port: Port, settings: LineSettings) -> None:
+        self._port = port
+        self._settings = settings
+        self._doubts = Doubts(settings.response_timeout)
+        self._echo = Echo()
+        self._last: Request[Any] | None = None
+        #: The last answer of each unit, to what, and until when it may come again.
+        self._told: dict[int, tuple[bytes, Request[Any], float]] = {}
+        #: The last answer repeats the one before it, to this request.
+        self._repeats: Request[Any] | None = None
+        #: What each unit was asked twice and answered in the same words.
+        self._asked_twice: dict[int, Request[Any]] = {}
+        #: Other bytes came with the last answer.
+        self._stray = False
+        #: When the last byte was on the line, as far as we know.
+        self._line_end = 0.0
+
+    def open(self) -> None:
+        """
+        Open the port.
+
+        :raises PortError: it cannot be opened; the message says what to do.
+        """
+        self._port.open()
+        self._line_end = time.monotonic()
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        self._port.close()
+        self._doubts.clear()
+        self._echo = Echo()
+        self._told.clear()
+        self._asked_twice.clear()
+        self._last = None
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        """Name parameters of different sizes that are safe to read at any time."""
+        self._doubts.use_probes(unit, probes)
+
+    # --- what the protocols differ in -------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def _gap(self) -> float:
+        """How long the line is silent between two frames, s."""
+
+    @abstractmethod
+    def _encode(self, request: Request[Any]) -> bytes:
+        """Return the frame of a request."""
+
+    @abstractmethod
+    def _reader(self, request: Request[_T]) -> AnswerReader[_T]:
+        """Return what finds the answer to a request."""
+
+    @abstractmethod
+    def _frame_length(self, message_length: int) -> int:
+        """Return how many bytes the frame of a message has."""
+
+    # --- belief -----------------------------------------------------------------------------------
+
+    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request, and when its last byte came."""
+        self._await_silence()
+        before = self._asked_twice.get(request.unit)
+        if before is not None and before.answer_head == request.answer_head:
+            self._doubts.add(before)
+        doubt = self._doubts.of(request.unit)
+        # a write answer names what was written, and nobody believes it without reading back
+        if not isinstance(request, Write) and doubt:
+            self._probe(request)
+            self._await_silence()
+        try:
+            answer = self._transact(request)
+        except Refused:
+            self._confirm(request)
+            raise
+        self._confirm(request, names_it=isinstance(request, Write))
+        return answer
+
+    def _probe(self, request: Request[Any]) -> None:
+        """Have the unit answer something that cannot be confused with what may still come."""
+        probe, until = self._doubts.probe(request.unit)
+        if probe is None:
+            raise NotReady(until)
+        # a refusal that is believed tells as well as an answer that all is said
+        with contextlib.suppress(Refused):
+            self._transact(probe)
+
+    def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
+        """
+        Make sure that the answer is not the one before, told twice.
+
+        :param names_it: the answer says itself what it is about.
+        """
+        if self._repeats is None:
+            return
+        if names_it or self._repeats == request:
+            self._asked_twice[request.unit] = request
+            return
+        stray = self._stray
+        self._doubts.add(request)
+        stray |= self._await_silence()
+        try:
+            self._probe(request)
+            if not stray and not self._stray:
+                return
+        except NotReady:
+            pass
+        except (NoAnswer, DamagedAnswer):
+            # the right answer may be as late as that to the probe
+            self._doubts.add(request)
+            raise
+        raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
+
+    def _await_silence(self) -> bool:
+        """Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for."""
+        give_up = time.monotonic() + self._settings.response_timeout
+        came = False
+        while True:
+            data = self._port.read(self._line_end + self._gap)
+            now = time.monotonic()
+            if not data:
+                if now >= self._line_end + self._gap:
+                    return came
+                continue
+            came = True
+            self._line_end = max(self._line_end, now)
+            if self._last is not None:
+                self._doubts.add(self._last)
+            if now > give_up:
+                raise DamagedAnswer('the line is never silent: noise, or another master on it')
+
+    # --- one transaction --------------------------------------------------------------------------
+
+    def _transact(self, request: Request[_T]) -> tuple[_T, float]:
+        frame = self._encode(request)
+        self._last = request
+        self._repeats = None
+        self._echo.sent(frame)
+        self._port.write(frame)
+        self._line_end = time.monotonic() + len(frame) * self._settings.char_time
+        reader = self._reader(request)
+        try:
+            answer, arrived = self._receive(request, reader, frame)
+        except (NoAnswer, DamagedAnswer):
+            self._doubts.add(request)
+            raise
+        except Refused:
+            self._doubts.end(request.unit)
+            self._remember(request, reader.frame)
+            raise
+        finally:
+            # what comes back before the answer to a write may be its answer
+            if not isinstance(request, Write) and frame in reader.other:
+                self._echo.present = True
+            self._stray = bool(self._echo.before or reader.other.replace(frame, b'', 1))
+        self._remember(request, reader.frame)
+        late = request.answer_head in self._doubts.of(request.unit)
+        if not late:
+            # units answer in order: whatever was still to come has come before this
+            self._doubts.end(request.unit)
+        if not late and self._repeats is None:
+            # and the request has left, even where the port is faster than its settings say
+            self._line_end = arrived
+        if late or reader.received:
+            # it may answer an earlier write of the same, or answer twice: one more may come
+            self._doubts.add(request)
+        return answer, arrived
+
+    def _remember(self, request: Request[Any], frame: bytes) -> None:
+        """Note what a unit told, and whether it told just that a moment ago."""
+        now = time.monotonic()
+        self._asked_twice.pop(request.unit, None)
+        before = self._told.get(request.unit)
+        if before is not None and before[0] == frame and now < before[2]:
+            self._repeats = before[1]
+        until = now + self._settings.response_timeout
+        self._told[request.unit] = frame, request, until
+
+    def _receive(
+        self, request: Request[_T], reader: AnswerReader[_T], frame: bytes
+    ) -> tuple[_T, float]:
+        char_time = self._settings.char_time
+        # an exception names neither register nor length: it may belong to the earlier request
+        doubt = self._doubts.of(request.unit)
+        believe_refusal = all(head[1] != request.function for head in doubt)
+        first = deadline = self._line_end + self._settings.response_timeout
+        # one answer, and as much rubbish again, however long somebody keeps talking
+        length = self._frame_length(request.answer_length)
+        last_chance = first + 2 * length * char_time
+        came = 0
+        while True:
+            data = self._port.read(deadline)
+            now = time.monotonic()
+            if not data:
+                if now < deadline:
+                    continue
+                break
+            # what comes while the request still leaves is no answer to it
+            self._line_end = max(self._line_end, now)
+            data = self._echo.strip(data)
+            came += len(data)
+            answer = _feed(reader, data, believe_refusal)
+            if answer is not None:
+                return answer, now
+            rest = (self._echo.missing + reader.missing) * char_time + reader.patience
+            deadline = min(max(first, now + rest), last_chance + _PAUSES * reader.patience)
+        held = self._echo.give_up()
+        if held and not isinstance(request, Write):
+            answer = _feed(reader, held, False)
+            if answer is not None and not reader.other:
+                # an answer and nothing else: the adapter echoes no more
+                self._echo.present = False
+                return answer, now
+        if held or (came and reader.other != frame):
+            raise DamagedAnswer(
+                f'unit {request.unit}: {came + len(held)} bytes came that are no answer'
+            )
+        raise NoAnswer(f'unit {request.unit} did not answer')
+
+
+def _feed(reader: AnswerReader[_T], data: bytes, believe_refusal: bool) -> _T | None:
+    while True:
+        try:
+            return reader.feed(data)
+        except Refused:
+            if believe_refusal:
+                raise
+            data = b''

@@ -1,0 +1,176 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Modbus TCP, to drives behind a gateway.
+
+The connection is ours and not pymodbus's client's: that one asks again and connects again by
+itself, and closes the connection of all drives when one of them is silent (3.6.9 at once, later
+ones after some more).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import select
+import socket
+import time
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import GatewaySilent
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NoPath
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.modbus_link import ModbusLink
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import understand
+from nfo_sinus_driver.link.modbus_tcp import FrameReader
+from nfo_sinus_driver.link.modbus_tcp import encode
+
+_T = TypeVar('_T')
+
+#: How long the gateway may take to accept a connection, s.
+_CONNECT_TIMEOUT = 3.0
+#: How long it may take to acknowledge bytes before the connection counts as lost, s.
+_ACKNOWLEDGE_TIMEOUT = 5.0
+_HINT = 'is the gateway switched on and its address right?'
+_READ_SIZE = 4096
+
+
+class TcpLink(ModbusLink):
+    """
+    A Modbus master on one connection to a gateway; a unit is a drive behind it.
+
+    Every request has a number of its own, which its answer repeats: a late or doubled answer is
+    told from the right one by that, so no unit is ever in doubt. Drives that do not answer leave
+    the connection as it is.
+
+    :param response_timeout: from a request sent to its answer, s.
+    """
+
+    def __init__(self, host: str, port: int, response_timeout: float) -> None:
+        self._host = host
+        self._port = port
+        self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
+        self._response_timeout = response_timeout
+        self._socket: socket.socket | None = None
+        self._reader = FrameReader()
+        self._number = 0
+
+    def open(self) -> None:
+        """
+        Connect to the gateway.
+
+        :raises PortError: nobody there.
+        """
+        self.close()
+        try:
+            self._socket = socket.create_connection((self._host, self._port), _CONNECT_TIMEOUT)
+            # requests are small and shall leave at once
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            # a cable that was pulled says nothing by itself
+            milliseconds = int(1000 * _ACKNOWLEDGE_TIMEOUT)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
+        except OSError as error:
+            self.close()
+            raise PortError(f'{self._name} cannot be reached ({error}): {_HINT}') from error
+        self._reader = FrameReader()
+
+    def close(self) -> None:
+        """Close the connection; harmless when it is closed already."""
+        connection, self._socket = self._socket, None
+        if connection is not None:
+            connection.close()
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        """Take parameters that are safe to read; here nothing has to be probed."""
+
+    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request, and when it came."""
+        connection = self._connection()
+        self._number = self._number % 0xFFFF + 1
+        try:
+            connection.sendall(encode(request, self._number))
+        except OSError as error:
+            raise self._lost(error) from error
+        deadline = time.monotonic() + self._response_timeout
+        while True:
+            data = self._receive(connection, deadline)
+            now = time.monotonic()
+            for number, message in self._reader.feed(data):
+                # others answer requests that were given up, or answer twice
+                if number == self._number:
+                    return self._understood(request, message), now
+            if self._reader.out_of_step:
+                raise PortError(
+                    f'{self._name} does not speak Modbus TCP; if it is a serial device server, '
+                    f'set protocol to modbus_rtu and port to socket://{self._name}'
+                )
+            if now >= deadline:
+                break
+        if self._reader.received:
+            raise DamagedAnswer(f'unit {request.unit}: only a part of the answer came')
+        raise GatewaySilent(
+            f'the gateway did not answer for unit {request.unit}: '
+            'response_timeout has to be longer than its own'
+        )
+
+    def _understood(self, request: Request[_T], message: bytes) -> _T:
+        try:
+            answer = understand(request, message)
+        except Refused as refusal:
+            raise _of_gateway(request, refusal) from None
+        if answer is None:
+            raise DamagedAnswer(f'unit {request.unit}: the gateway sent what is no answer')
+        return answer
+
+    def _receive(self, connection: socket.socket, until: float) -> bytes:
+        """Return what has come; nothing when the time is over."""
+        wait = max(0.0, until - time.monotonic())
+        try:
+            if not select.select((connection,), (), (), wait)[0]:
+                return b''
+            data = connection.recv(_READ_SIZE)
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost('the gateway closed it')
+        return data
+
+    def _connection(self) -> socket.socket:
+        if self._socket is None:
+            raise PortError(f'{self._name} is not connected')
+        return self._socket
+
+    def _lost(self, why: OSError | str) -> PortError:
+        return PortError(f'the connection to {self._name} was lost ({why}): {_HINT}')
+
+
+def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:
+    """Return what a refusal means: a gateway speaks with the voice of the unit that is asked."""
+    if refusal.code == Refused.NO_PATH:
+        return NoPath(
+            f'the gateway has no path to unit {request.unit} (exception {refusal.code}): '
+            'check the table of units and the serial port in the settings of the gateway'
+        )
+    if refusal.code == Refused.NO_ANSWER:
+        return NoAnswer(
+            f'unit {request.unit} did not answer the gateway (exception {refusal.code})'
+        )
+    return refusal

@@ -1,0 +1,121 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Messages of the Classic protocol, byte by byte ([M0 §6.1.3], [M2 §5]).
+
+They are cut by their length: a check sum may be any control character, EOT among them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import functools
+import operator
+import re
+
+from nfo_sinus_driver.simulator.faults import SioErr
+
+STX, ETX, EOT, ENQ, ACK, NAK = 0x02, 0x03, 0x04, 0x05, 0x06, 0x15
+
+#: Added to an address, so that it is no control character.
+_ADDRESS = 0x20
+#: All drives answer to this one: it is for a line with one drive [M0 §6.1.4].
+POINT_TO_POINT = 0
+#: All drives obey a SELECT to this one, and none answers.
+BROADCAST = 95
+ADDRESSES = range(POINT_TO_POINT, BROADCAST + 1)
+
+_ENQUIRY_LENGTH = 8
+_SELECT_LENGTH = 15
+_PREFIX = b'E'
+_ENQUIRY = re.compile(rb'(?s)..(.)([0-9A-Fa-f]{4})\x05')
+_SELECT = re.compile(rb'(?s)..\x02(.)([0-9A-Fa-f]{4})=([0-9A-Fa-f]{4})\x03.')
+_SMALL = re.compile(rb'[a-f]')
+
+_NOTHING = SioErr(0)
+
+
+@dataclass(frozen=True)
+class Message:
+    """
+    A message from a master.
+
+    :ivar id: the parameter's number.
+    :ivar value: what to set it to; ``None`` in an ENQUIRY.
+    :ivar wrong: what is wrong with it, 0 for nothing; the rest counts only then.
+    """
+
+    id: int = 0
+    value: int | None = None
+    wrong: SioErr = _NOTHING
+
+
+def length(buffer: bytes) -> int:
+    """
+    Return how many bytes at the beginning belong together, 0 while more must come.
+
+    An EOT where none can be begins a message, and ends what was before it.
+    """
+    if buffer[0] != EOT:
+        return max(buffer.find(EOT), 0)
+    whole = _SELECT_LENGTH if buffer[2:3] == bytes([STX]) else _ENQUIRY_LENGTH
+    # of the check sum, the last byte of a SELECT, everything is expected
+    safe = whole - 1 if whole == _SELECT_LENGTH else whole
+    again = buffer.find(EOT, 1, safe)
+    if again > 0:
+        return again
+    return whole if len(buffer) >= whole else 0
+
+
+def address(frame: bytes) -> int | None:
+    """Return whom a message is for; ``None`` if it does not tell."""
+    if len(frame) < 2 or frame[0] != EOT or frame[1] - _ADDRESS not in ADDRESSES:
+        return None
+    return frame[1] - _ADDRESS
+
+
+def parse(frame: bytes, *, small_letters: bool = True) -> Message:
+    """Return what a message says, or what is wrong with it."""
+    select = _SELECT.fullmatch(frame)
+    match = select or _ENQUIRY.fullmatch(frame)
+    if match is None or (not small_letters and _SMALL.search(b''.join(match.groups()[1:]))):
+        return Message(wrong=SioErr.STRUCTURE)
+    if select and check_sum(frame[3:-1]) != frame[-1]:
+        return Message(wrong=SioErr.CHECK_SUM)
+    if match[1] != _PREFIX:
+        return Message(wrong=SioErr.PREFIX)
+    return Message(int(match[2], 16), int(select[3], 16) if select else None)
+
+
+def is_select(frame: bytes) -> bool:
+    """Whether a message is a SELECT, or would be one if it were whole."""
+    return frame[2:3] == bytes([STX])
+
+
+def check_sum(data: bytes) -> int:
+    """Return the BCC of what lies between STX, excluded, and ETX, included [C44]."""
+    return functools.reduce(operator.xor, data, 0)
+
+
+def reply(sender: int, id_: int, word: int, *, small_letters: bool) -> bytes:
+    """Return a REPLY: the value of a parameter."""
+    digits = '04x' if small_letters else '04X'
+    text = _PREFIX + f'{id_:{digits}}={word:{digits}}'.encode('ascii') + bytes([ETX])
+    return bytes([sender + _ADDRESS, STX]) + text + bytes([check_sum(text)])
+
+
+def acknowledge(sender: int, yes: bool) -> bytes:
+    """Return ACK or NAK."""
+    return bytes([sender + _ADDRESS, ACK if yes else NAK])

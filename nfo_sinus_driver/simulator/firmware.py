@@ -1,0 +1,167 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the firmware before 4.28, the one of [M2], does otherwise than that of [M0]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from dataclasses import field
+from fractions import Fraction
+
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.timing import FORMAT_CODES
+from nfo_sinus_driver.simulator.timing import OLD_FORMAT_CODES
+
+SW_VER = 'fieldbus.sw_ver'
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """
+    One firmware's way.
+
+    :ivar manual: the manual that describes it.
+    :ivar sw_ver: the SWVer of a drive that has it.
+    :ivar log_size: entries that the error log holds [C4].
+    :ivar formats: character formats by their names, and their codes of SiProt [C5].
+    :ivar most_baud: the highest baud rate [C6].
+    :ivar at_once: settings of the serial interface count as soon as they are written [C7].
+    :ivar naks_damage: a message with a wrong check sum is answered by NAK; else not at all [C8].
+    :ivar obeys_stop: MODE = Stop is obeyed by the one addressed in spite of a serial fault; else
+        only when it goes to all [C9].
+    :ivar most_address: the highest that the parameter Address takes on Classic [C10].
+    :ivar sets_references: FrqSet and its like can be written on Classic; else only E001E [C11].
+    :ivar short_counters: hours and seconds are counted in 24 bits [C26].
+    :ivar even_stops: every even SCMD below 800h is Stop [C31].
+    :ivar own_address: a message to address 0 is answered with the drive's own [C86].
+    :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
+    :ivar own_bus_codes: control over a fieldbus has InvSt codes of its own, four higher [C3].
+    :ivar lacks: parameters that it does not have on Classic [C21].
+    :ivar codes: enumerations of which it has these codes only.
+    """
+
+    manual: str
+    sw_ver: float
+    log_size: int
+    formats: Mapping[str, int]
+    most_baud: int
+    at_once: bool
+    naks_damage: bool
+    obeys_stop: bool
+    most_address: int
+    sets_references: bool
+    short_counters: bool
+    even_stops: bool
+    own_address: bool
+    lower_case: bool
+    own_bus_codes: bool
+    lacks: frozenset[str] = frozenset()
+    codes: Mapping[str, frozenset[int]] = field(default_factory=dict)
+
+
+NEW = Firmware(
+    manual='2.03',
+    sw_ver=4.38,
+    log_size=32,
+    formats=FORMAT_CODES,
+    most_baud=57600,
+    at_once=False,
+    naks_damage=False,
+    obeys_stop=True,
+    most_address=94,
+    sets_references=True,
+    short_counters=False,
+    even_stops=False,
+    own_address=False,
+    lower_case=False,
+    own_bus_codes=False,
+)
+OLD = Firmware(
+    manual='5.0',
+    sw_ver=4.21,
+    log_size=128,
+    formats=OLD_FORMAT_CODES,
+    most_baud=9600,
+    at_once=True,
+    naks_damage=True,
+    obeys_stop=False,
+    most_address=95,
+    sets_references=False,
+    short_counters=True,
+    even_stops=True,
+    own_address=True,
+    lower_case=True,
+    own_bus_codes=True,
+    lacks=frozenset(
+        {
+            'control.f_sleep',
+            'serial.bus_type',
+            'status.e_out',
+            'status.sigma_e_out',
+            'error.short_c_err_cnt',
+            'fieldbus.sw_ver',
+            'fieldbus.nfo_ver',
+            'fieldbus.drive_control',
+            'fieldbus.drive_status',
+            'fieldbus.spd_scl_numerator',
+            'fieldbus.spd_scl_denominator',
+        }
+    ),
+    codes={
+        'serial.si_baud': frozenset({16, 32, 64, 128}),
+        'serial.si_prot': frozenset(OLD_FORMAT_CODES.values()),
+        'pi_reg.unit': frozenset(range(12)),
+    },
+)
+#: By the manual that describes them.
+DIALECTS: Mapping[str, Firmware] = {firmware.manual: firmware for firmware in (NEW, OLD)}
+#: The first firmware that [M0] describes.
+_FIRST_NEW = Fraction('4.28')
+
+
+def version(memory: Memory) -> Fraction | None:
+    """Return SWVer; ``None`` of a drive that does not tell it."""
+    if SW_VER not in memory.model:
+        return None
+    return Fraction(memory.raw(SW_VER), 100)
+
+
+def firmware_of(memory: Memory) -> Firmware:
+    """Return which of the two a drive has, by its SWVer."""
+    number = version(memory)
+    return OLD if number is not None and number < _FIRST_NEW else NEW
+
+
+def with_firmware(
+    model: Model, settings: Mapping[str, Value], dialect: str | None
+) -> dict[str, Value]:
+    """
+    Return settings with the firmware that a manual describes.
+
+    :raises ValueError: there is no such manual, or the settings name another firmware.
+    """
+    if dialect is None:
+        return dict(settings)
+    if dialect not in DIALECTS:
+        raise ValueError(f'unknown dialect {dialect!r}: choose one of {", ".join(DIALECTS)}')
+    if SW_VER not in model:
+        raise ValueError(f'{model.name} has no dialects')
+    known = {SW_VER: DIALECTS[dialect].sw_ver, **settings}
+    if firmware_of(Memory(model, known)) is not DIALECTS[dialect]:
+        raise ValueError(f'dialect {dialect} is not that of firmware {known[SW_VER]}')
+    return known

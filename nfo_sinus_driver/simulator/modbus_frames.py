@@ -1,0 +1,252 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Modbus RTU, ASCII and TCP: three ways to pack the same requests."""
+
+from __future__ import annotations
+
+import abc
+import binascii
+import re
+
+from nfo_sinus_driver.simulator import pymodbus_compat
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.modbus import answer
+from nfo_sinus_driver.simulator.modbus import is_write
+from nfo_sinus_driver.simulator.protocol import Request
+from nfo_sinus_driver.simulator.refusal import GatewayReason
+from nfo_sinus_driver.simulator.serial_side import MODBUS_ASCII
+from nfo_sinus_driver.simulator.serial_side import MODBUS_RTU
+from nfo_sinus_driver.simulator.timing import Timing
+
+#: Everybody obeys a write to this address and nobody answers.
+BROADCAST = 0
+
+#: Added to t3.5 before silence is believed: the system may hold bytes of one frame apart (s).
+_SLACK = 0.002
+#: The longest pause within an ASCII frame (s), by the standard.
+_ASCII_PAUSE = 1.0
+#: How long the rest of a TCP frame may take (s).
+_TCP_PAUSE = 1.0
+
+#: Length of a request's whole RTU frame by function: fixed, or what the byte count at an index
+#: adds to the rest.
+_FIXED = dict.fromkeys((1, 2, 3, 4, 5, 6, 8), 8) | {7: 4, 11: 4, 12: 4, 17: 4, 22: 10, 24: 6, 43: 7}
+_COUNTED = {15: 6, 16: 6, 20: 2, 21: 2, 23: 10}
+
+_ASCII_FRAME = re.compile(rb':((?:[0-9A-F]{2}){3,})\r\n')
+
+#: Transaction, protocol (0), length of the rest: what precedes the unit.
+_MBAP = 6
+_MOST_IN_TCP = 254
+
+
+class _OnSerialLine(abc.ABC):
+    """What RTU and ASCII have in common: an address, a PDU, and silence where nobody answers."""
+
+    serial = True
+
+    @staticmethod
+    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+        """Whether the drive is meant; only writes are for everybody."""
+        return drive.address == request.address or _for_all(request.address, request.body)
+
+    @staticmethod
+    @abc.abstractmethod
+    def wrap(address: int, pdu: bytes) -> bytes:
+        """Return the frame of a PDU."""
+
+    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+        """Let the drive carry out a request; return the answer's frame."""
+        pdu = answer(drive, request.body)
+        if not pdu or _for_all(request.address, request.body):
+            return b''
+        return self.wrap(request.address, pdu)
+
+    @staticmethod
+    def instead(request: Request, there: bool) -> Reply | None:
+        """Nothing: on a wire, silence is silence."""
+        return None
+
+
+class ModbusRtu(_OnSerialLine):
+    """RTU frames: cut by their length, and by silence where their CRC is not right."""
+
+    name = 'modbus_rtu'
+    bus_type = MODBUS_RTU
+
+    @staticmethod
+    def gap(timing: Timing) -> float:
+        """t3.5."""
+        return timing.t35
+
+    @staticmethod
+    def patience(timing: Timing) -> float:
+        """t3.5, and what a computer needs beyond it."""
+        return timing.t35 + _SLACK
+
+    def cut(self, buffer: bytes) -> int:
+        """Return the length of the frame at the beginning, 0 while there is none."""
+        length = _rtu_length(buffer)
+        whole = 0 < length <= len(buffer) and self.unwrap(buffer[:length]) is not None
+        return length if whole else 0
+
+    @staticmethod
+    def unwrap(frame: bytes) -> Request | None:
+        """Return address and PDU of a frame; ``None`` when it is damaged."""
+        if len(frame) < 4 or pymodbus_compat.crc(frame[:-2]) != frame[-2:]:
+            return None
+        return Request(frame[0], frame[1:-2])
+
+    @staticmethod
+    def wrap(address: int, pdu: bytes) -> bytes:
+        """Return the frame of a PDU."""
+        body = bytes([address]) + pdu
+        return body + pymodbus_compat.crc(body)
+
+
+class ModbusAscii(_OnSerialLine):
+    """ASCII frames: a colon, upper-case digits, LRC, CR LF; as slow as anybody likes."""
+
+    name = 'modbus_ascii'
+    bus_type = MODBUS_ASCII
+
+    @staticmethod
+    def gap(timing: Timing) -> float:
+        """None: the colon begins a frame."""
+        return 0.0
+
+    @staticmethod
+    def patience(timing: Timing) -> float:
+        """A second."""
+        return _ASCII_PAUSE
+
+    @staticmethod
+    def cut(buffer: bytes) -> int:
+        """Return what lies before the next colon, or up to the end of the line."""
+        end = buffer.find(b'\r\n') + 2
+        colon = buffer.find(b':', 1)
+        if colon > 0 and not 1 < end <= colon:
+            return colon
+        return end if end > 1 and buffer[:1] == b':' else 0
+
+    @staticmethod
+    def unwrap(frame: bytes) -> Request | None:
+        """Return address and PDU of a frame; ``None`` when it is damaged."""
+        match = _ASCII_FRAME.fullmatch(frame)
+        if match is None:
+            return None
+        data = binascii.unhexlify(match[1])
+        if pymodbus_compat.lrc(data[:-1]) != data[-1]:
+            return None
+        return Request(data[0], data[1:-1])
+
+    @staticmethod
+    def wrap(address: int, pdu: bytes) -> bytes:
+        """Return the frame of a PDU."""
+        return pymodbus_compat.ascii_frame(address, pdu)
+
+
+class ModbusTcp:
+    """
+    Modbus TCP as of a gateway, behind which the drives are on an RTU line.
+
+    Units are drives. The body of a request is its transaction number and its PDU.
+
+    :param wait: how long the gateway waits for a drive (s), before it says that there was none.
+    """
+
+    name = 'modbus_tcp'
+    bus_type = MODBUS_RTU
+    serial = False
+
+    def __init__(self, wait: float) -> None:
+        self._wait = wait
+
+    @staticmethod
+    def gap(timing: Timing) -> float:
+        """t3.5: what the drive keeps on the line behind the gateway."""
+        return timing.t35
+
+    @staticmethod
+    def patience(timing: Timing) -> float:
+        """A second."""
+        return _TCP_PAUSE
+
+    @staticmethod
+    def cut(buffer: bytes) -> int:
+        """Return the length of the frame at the beginning, 0 while there is none."""
+        if len(buffer) < _MBAP:
+            return 0
+        rest = int.from_bytes(buffer[4:6], 'big')
+        if buffer[2:4] != b'\0\0' or not 2 <= rest <= _MOST_IN_TCP:
+            return len(buffer)
+        return _MBAP + rest if len(buffer) >= _MBAP + rest else 0
+
+    @staticmethod
+    def unwrap(frame: bytes) -> Request | None:
+        """Return unit, and transaction with PDU; ``None`` when it is none of Modbus."""
+        rest = int.from_bytes(frame[4:6], 'big')
+        if len(frame) < _MBAP + 2 or frame[2:4] != b'\0\0' or len(frame) != _MBAP + rest:
+            return None
+        return Request(frame[6], frame[:2] + frame[7:])
+
+    @staticmethod
+    def wrap(transaction: int, unit: int, pdu: bytes) -> bytes:
+        """Return the frame of a PDU."""
+        return pymodbus_compat.tcp_frame(transaction, unit, pdu)
+
+    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+        """Let the drive carry out a request; return the answer's frame."""
+        pdu = answer(drive, request.body[2:])
+        if not pdu or _for_all(request.address, request.body[2:]):
+            return b''
+        return self._framed(request, pdu)
+
+    @staticmethod
+    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+        """Whether the drive is meant; only writes are for everybody."""
+        return drive.address == request.address or _for_all(request.address, request.body[2:])
+
+    def instead(self, request: Request, there: bool) -> Reply | None:
+        """
+        Say that the drive does not answer, after having waited for it.
+
+        To a drive that there is not the gateway has no path, and says so at once.
+        """
+        if request.address == BROADCAST:
+            return None
+        reason = GatewayReason.NO_ANSWER if there else GatewayReason.NO_PATH
+        pdu = pymodbus_compat.encode_exception(request.body[2], reason)
+        return Reply(self._framed(request, pdu), self._wait if there else 0.0)
+
+    def _framed(self, request: Request, pdu: bytes) -> bytes:
+        return self.wrap(int.from_bytes(request.body[:2], 'big'), request.address, pdu)
+
+
+def _for_all(address: int, pdu: bytes) -> bool:
+    """Whether every drive obeys a request and none answers."""
+    return address == BROADCAST and is_write(pdu)
+
+
+def _rtu_length(buffer: bytes) -> int:
+    """Return how long the request at the beginning is, CRC included; 0 when nothing tells."""
+    if len(buffer) < 2:
+        return 0
+    function = buffer[1]
+    if function in _COUNTED:
+        at = _COUNTED[function]
+        return at + 1 + buffer[at] + 2 if len(buffer) > at else 0
+    return _FIXED.get(function, 0)

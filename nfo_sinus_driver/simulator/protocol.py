@@ -1,0 +1,74 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a line has to know about a protocol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol as Interface
+
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.timing import Timing
+
+
+@dataclass(frozen=True)
+class Request:
+    """
+    A frame that came in.
+
+    :ivar address: whom it is for.
+    :ivar body: what the protocol made of the rest.
+    :ivar whole: it arrived undamaged; a drive may yet have something to say to one that did not.
+    """
+
+    address: int
+    body: bytes
+    whole: bool = True
+
+
+class Protocol(Interface):
+    """How frames look, whom they concern and what comes back."""
+
+    name: str
+    #: BusType of a drive that speaks it [M0 table 4].
+    bus_type: int
+    #: Bytes go over a serial line, not through a gateway.
+    serial: bool
+
+    def gap(self, timing: Timing) -> float:
+        """The silence that a drive keeps between two frames (s)."""
+
+    def patience(self, timing: Timing) -> float:
+        """The silence after which what is no whole frame is given up (s)."""
+
+    def cut(self, buffer: bytes) -> int:
+        """How many bytes at the beginning belong together; 0 while only silence can tell."""
+
+    def unwrap(self, frame: bytes) -> Request | None:
+        """What the bytes say; ``None`` when they say nothing to anybody."""
+
+    def concerns(self, drive: SimulatedDrive, request: Request) -> bool:
+        """Whether the drive is meant, alone or with others."""
+
+    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+        """Let the drive carry out a request; return the answer's frame, empty if there is none."""
+
+    def instead(self, request: Request, there: bool) -> Reply | None:
+        """
+        What comes when no drive's answer does: a gateway has something to say, a wire has not.
+
+        :param there: there is such a drive, though it keeps silent.
+        """

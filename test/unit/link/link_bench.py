@@ -1,0 +1,97 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A Modbus link on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from virtual_wire import Fate
+from virtual_wire import Slave
+from virtual_wire import Wire
+
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.serial_link import SerialLink
+from nfo_sinus_driver.link.settings import LineSettings
+
+TIMEOUT = 0.1
+SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
+UNIT = 1
+#: Probes of one word and of two, as a drive has them.
+ONE = Address((0x2A5,), 1)
+TWO = Address((0x258,), 2)
+A = Address((0x400,), 1)
+B = Address((0x264,), 1)
+C = Address((0x3EC,), 2)
+D = Address((0x2A8,), 2)
+
+
+class Bench:
+    """
+    A link on a virtual line; everything done with it happens in virtual time.
+
+    :ivar link_class: which link.
+    :ivar wire_class: and on which line.
+    """
+
+    link_class: type[SerialLink] = RtuLink
+    wire_class: type[Wire] = Wire
+
+    def __init__(
+        self,
+        fates: list[Fate] | None = None,
+        settings: LineSettings = SETTINGS,
+        probes: tuple[Address, ...] = (ONE, TWO),
+    ) -> None:
+        self.wire = self.wire_class(settings)
+        self.slave = Slave(self.wire, iter(fates or []))
+        self.link = self.link_class(self.wire, settings)
+        with self.wire.time():
+            self.link.open()
+        self.link.use_probes(UNIT, probes)
+
+    def read(self, address: Address, unit: int = UNIT) -> Reply:
+        with self.wire.time():
+            return self.link.read(unit, address)
+
+    def write(self, address: Address, *words: int, unit: int = UNIT) -> Reply:
+        with self.wire.time():
+            return self.link.write(unit, address, words)
+
+    def expect(self, error: type[LinkError], action: Callable[[], object]) -> LinkError:
+        with pytest.raises(error) as raised:
+            action()
+        assert type(raised.value) is error
+        return raised.value
+
+    def write_and_read(
+        self, address: Address, words: tuple[int, ...], source: Address
+    ) -> Reply:
+        with self.wire.time():
+            return self.link.write_and_read(UNIT, address, words, source)
+
+    @property
+    def asked(self) -> list[int]:
+        """The registers of all requests so far."""
+        return [register for _, _, register, _ in self.slave.requests]
+
+    def answer_of(self, number: int) -> tuple[int, ...]:
+        """What the slave says to the request with this number."""
+        _, _, register, count = self.slave.requests[number]
+        return self.slave.words(register, count, number)

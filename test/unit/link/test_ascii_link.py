@@ -1,0 +1,157 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Modbus ASCII, one transaction after the other, on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from link_bench import TIMEOUT
+from link_bench import UNIT
+from link_bench import A
+from link_bench import B
+from link_bench import Bench
+from link_bench import C
+import pymodbus_opinion as opinion
+import pytest
+
+# what holds for RTU holds for ASCII, unless it is about the silence between frames
+from test_rtu_link import test_babbling_line_is_no_reason_to_hang  # noqa: F401
+from test_rtu_link import test_closing_forgets_all_doubts  # noqa: F401
+from test_rtu_link import test_damaged_answer  # noqa: F401
+from test_rtu_link import test_doubled_answer_is_noticed  # noqa: F401
+from test_rtu_link import test_doubt_of_one_unit_is_not_that_of_another  # noqa: F401
+from test_rtu_link import test_every_answer_belongs_to_its_request  # noqa: F401
+from test_rtu_link import test_late_answer_before_a_write_is_passed_over  # noqa: F401
+from test_rtu_link import test_late_answer_is_not_taken_for_the_next_one  # noqa: F401
+from test_rtu_link import test_late_answer_to_a_write_does_not_end_the_doubt  # noqa: F401
+from test_rtu_link import test_line_that_begins_to_babble_is_no_reason_to_hang  # noqa: F401
+from test_rtu_link import test_lost_port_is_passed_on  # noqa: F401
+from test_rtu_link import test_nothing_is_sent_while_both_probes_are_in_doubt  # noqa: F401
+from test_rtu_link import test_probe_has_another_shape  # noqa: F401
+from test_rtu_link import test_read_and_write  # noqa: F401
+from test_rtu_link import test_refusal  # noqa: F401
+from test_rtu_link import test_refusal_is_not_taken_for_that_of_another_request  # noqa: F401
+from test_rtu_link import test_refusal_of_another_function_is_believed_in_doubt  # noqa: F401
+from test_rtu_link import test_refused_probe_is_an_answer  # noqa: F401
+from test_rtu_link import test_reply_says_when_its_last_byte_came  # noqa: F401
+from test_rtu_link import test_unit_without_probes_is_left_alone  # noqa: F401
+from test_rtu_link import test_write_goes_out_at_once_even_in_doubt  # noqa: F401
+from virtual_wire import AsciiWire
+from virtual_wire import Fate
+
+from nfo_sinus_driver.link.ascii_link import AsciiLink
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.settings import LineSettings
+
+
+@pytest.fixture(autouse=True, scope='module')
+def ascii_bench() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Bench, 'link_class', AsciiLink)
+        patch.setattr(Bench, 'wire_class', AsciiWire)
+        yield
+
+
+def test_what_goes_over_the_line() -> None:
+    bench = Bench()
+    bench.read(A)
+    bench.write(C, 5, 0xABCD)
+    assert [frame for _, frame in bench.wire.sent] == [
+        b':010304000001F7\r\n',
+        b':011003EC0002040005ABCD7D\r\n',
+    ]
+    bench.wire.check_gaps()
+
+
+def in_parts(bench: Bench, frame: bytes, cuts: list[int], pause: float) -> None:
+    """Answer every request with a frame that pauses at some places."""
+
+    def far_end(request: bytes, end: float) -> None:
+        for start, stop in zip([0, *cuts], [*cuts, len(frame)], strict=True):
+            end = bench.wire.arrive(end, frame[start:stop]) + pause
+
+    bench.wire.far_end = far_end
+
+
+@pytest.mark.parametrize('cuts', [[1], [2], [5], [13], [14], [1, 7, 14]])
+def test_frame_may_pause_for_a_second(cuts: list[int]) -> None:
+    bench = Bench()
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), cuts, 0.95)
+    assert bench.read(A).words == (77,)
+
+
+def test_frame_that_pauses_longer_is_given_up() -> None:
+    bench = Bench()
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), [7], 1.1)
+    error = bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert error.maybe_done
+    assert '7 bytes' in str(error)
+
+
+def test_lower_case_is_read() -> None:
+    bench = Bench()
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\xab\xcd').lower(), [], 0.0)
+    assert bench.read(A).words == (0xABCD,)
+
+
+def test_noise_costs_no_second() -> None:
+    bench = Bench()
+    in_parts(bench, b'\x00:x\xff', [], 0.0)
+    bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert bench.wire.now - bench.wire.sent[0][0] < 2 * TIMEOUT
+
+
+@pytest.mark.parametrize('babble', [b':', b':0', b':010302', b'0'])
+def test_frame_that_never_ends_is_given_up(babble: bytes) -> None:
+    bench = Bench()
+    in_parts(bench, babble * 100, list(range(1, 100 * len(babble))), 0.2)
+    start = bench.wire.now
+    bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert bench.wire.now - start < TIMEOUT + 3.5
+
+
+def test_frame_begun_again_is_found() -> None:
+    bench = Bench()
+    frame = opinion.ascii_frame(b'\x01\x03\x02\x00\x4d')
+    in_parts(bench, frame[:9] + frame, [9], 0.3)
+    assert bench.read(A).words == (77,)
+
+
+@pytest.mark.parametrize('baud', [1200, 57600])
+def test_answer_takes_as_long_as_it_is(baud: int) -> None:
+    line = LineSettings(baud_rate=baud, char_format='7E1', response_timeout=0.02)
+    bench = Bench([Fate(0.5)] * 2, line)
+    assert bench.read(C).words == bench.answer_of(0)
+    assert bench.read(B).words == bench.answer_of(1)
+    bench.wire.check_gaps()
+
+
+def test_a_unit_tells_who_it_is() -> None:
+    bench = Bench()
+    texts = {17: b'\x01\x11\x10' + b'0123456789ABCDEF'}
+    objects = b'\x01\x2b\x0e\x02\x02\x00\x00\x02\x04\x09NFO Sinus\x05\x081.50/400'
+
+    def far_end(request: bytes, end: float) -> None:
+        bench.wire.arrive(end, opinion.ascii_frame(texts.get(request[1], objects)))
+
+    bench.wire.far_end = far_end
+    inquiry = bench.link.identify(UNIT)
+    with bench.wire.time():
+        while not inquiry.done:
+            inquiry.ask()
+    assert inquiry.found.product == 'NFO Sinus'
+    assert inquiry.found.model == '1.50/400'
+    assert inquiry.found.serial == '0123456789ABCDEF'

@@ -1,0 +1,278 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Classic link on real ports: pseudo-terminals, with a drive in a thread at the other end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import os
+import select
+import threading
+import time
+import tty
+
+import classic_far_end as far
+import pytest
+
+from nfo_sinus_driver.link.classic_link import CHAR_FORMATS
+from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.open import line_settings
+from nfo_sinus_driver.link.open import open_link
+
+#: Longer than any drive here takes to answer, on any machine, s.
+PATIENT = 10.0
+#: For those that never answer, s.
+SHORT = 0.05
+
+SPEED = Address((0x94,), 1)
+SETPOINT = Address((0x1E,), 1)
+OP_TIME = Address((0x27, 0x127), 2)
+INV_ST = Address((far.INV_ST,), 1)
+MODE = Address((0x29,), 1)
+
+
+class PtyDrive:
+    """
+    A drive with address 1 at the far end of a pseudo-terminal.
+
+    :ivar values: its parameters.
+    :ivar limits: the greatest value that it takes.
+    :ivar serial_control: what is wrong with a request is a serial fault.
+    :ivar answer: how it sends an answer; to be replaced.
+    :ivar asked: what it was asked, and what it was told.
+    """
+
+    def __init__(self) -> None:
+        self.end, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.path = os.ttyname(self._near)
+        self.values = {0x94: 1450, 0x1E: 0, 0x27: 0xFFFE, 0x127: 2, far.INV_ST: 37, 0x29: 3}
+        self.limit = 1500
+        self.serial_control = False
+        self.flags = 0
+        self.echo = False
+        self.answer: Callable[[bytes], None] = self.send
+        self.asked: list[tuple[int, int | None]] = []
+        self._thread = threading.Thread(target=self._work)
+        self._stop, self._stopped = os.pipe()
+        self._thread.start()
+
+    def close(self) -> None:
+        os.write(self._stopped, b'x')
+        self._thread.join()
+        for fd in (self.end, self._near, self._stop, self._stopped):
+            os.close(fd)
+
+    def send(self, data: bytes) -> None:
+        os.write(self.end, data)
+
+    def _work(self) -> None:
+        buffer = b''
+        while self._stop not in (ready := select.select([self.end, self._stop], [], [])[0]):
+            assert ready
+            data = os.read(self.end, 100)
+            if self.echo:
+                self.send(data)
+            buffer += data
+            while match := far.REQUEST.search(buffer):
+                buffer = buffer[match.end() :]
+                self._obey(*far.parsed(match[0]))
+
+    def _obey(self, unit: int, number: int, word: int | None) -> None:
+        self.asked.append((number, word))
+        if unit not in (0, 1, 95):
+            return
+        if word is None:
+            answer = self._told(number)
+        elif self._takes(number, word):
+            self.values[number] = word
+            answer = far.verdict(1, True)
+        else:
+            answer = far.verdict(1, False)
+            if self.serial_control:
+                self.flags |= 1 << 10
+                self.values[far.INV_ST] = 14
+        if unit != 95:
+            self.answer(answer)
+
+    def _told(self, number: int) -> bytes:
+        if number == far.SIO_ERR:
+            word, self.flags = self.flags, 0
+            self.values[far.INV_ST] = 24
+            return far.reply(1, number, word)
+        known = number in self.values
+        return far.reply(1, number, self.values[number]) if known else far.verdict(1, False)
+
+    def _takes(self, number: int, word: int) -> bool:
+        return number in self.values and word <= self.limit and self.values[far.INV_ST] > 23
+
+
+@pytest.fixture
+def drive() -> Iterator[PtyDrive]:
+    drive = PtyDrive()
+    yield drive
+    drive.close()
+
+
+def connect(drive: PtyDrive, timeout: float = PATIENT, char_format: str = '') -> ClassicLink:
+    settings = line_settings('classic', response_timeout=timeout, char_format=char_format)
+    link = open_link('classic', drive.path, settings)
+    assert isinstance(link, ClassicLink)
+    link.open()
+    return link
+
+
+@pytest.fixture
+def link(drive: PtyDrive) -> Iterator[ClassicLink]:
+    link = connect(drive)
+    yield link
+    link.close()
+
+
+@pytest.fixture
+def hasty(drive: PtyDrive) -> Iterator[ClassicLink]:
+    link = connect(drive, SHORT)
+    yield link
+    link.close()
+
+
+def test_the_factory_setting_is_that_of_the_drive() -> None:
+    settings = line_settings('classic')
+    assert (settings.baud_rate, settings.char_format) == (9600, '7E1')
+
+
+@pytest.mark.parametrize('unit', [0, 1])
+def test_read_and_write(drive: PtyDrive, link: ClassicLink, unit: int) -> None:
+    assert link.read(unit, SPEED).words == (1450,)
+    assert link.write(unit, SETPOINT, (500,)).words == ()
+    assert link.read(unit, SETPOINT).words == (500,)
+    assert link.read(unit, OP_TIME).words == (0xFFFE, 2)
+    assert drive.asked[-3:] == [(0x127, None), (0x27, None), (0x127, None)]
+
+
+@pytest.mark.parametrize('char_format', CHAR_FORMATS)
+def test_every_format(drive: PtyDrive, char_format: str) -> None:
+    link = connect(drive, char_format=char_format)
+    assert link.read(1, SPEED).words == (1450,)
+    link.close()
+
+
+def test_refused_value(drive: PtyDrive, link: ClassicLink) -> None:
+    with pytest.raises(Refused, match='does not accept this value') as raised:
+        link.write(1, SETPOINT, (1501,))
+    assert raised.value.code == Refused.ILLEGAL_VALUE
+    assert [number for number, _ in drive.asked] == [0x1E, far.INV_ST]
+    assert link.read(1, SPEED).words == (1450,)
+
+
+def test_refused_value_under_serial_control(drive: PtyDrive, link: ClassicLink) -> None:
+    drive.serial_control = True
+    link.read(1, INV_ST)
+    with pytest.raises(Refused, match='out of range') as raised:
+        link.write(1, SETPOINT, (1501,))
+    assert (raised.value.code, raised.value.inv_st) == (Refused.ILLEGAL_VALUE, 14)
+    assert link.read(1, INV_ST).words == (24,)
+
+
+def test_a_standing_fault_stays(drive: PtyDrive, link: ClassicLink) -> None:
+    drive.values[far.INV_ST] = 14
+    link.read(1, INV_ST)
+    with pytest.raises(Refused, match='a serial fault') as raised:
+        link.write(1, SETPOINT, (1,))
+    assert raised.value.code == Refused.DEVICE_FAILURE
+    assert drive.values[far.INV_ST] == 14
+
+
+def test_no_such_parameter(drive: PtyDrive, link: ClassicLink) -> None:
+    with pytest.raises(Refused) as raised:
+        link.read(1, Address((0x1234,), 1))
+    assert raised.value.code == Refused.ILLEGAL_ADDRESS
+
+
+def test_broadcast(drive: PtyDrive, link: ClassicLink) -> None:
+    link.write(95, MODE, (1,))
+    assert link.read(1, MODE).words == (1,)
+
+
+def test_echo(drive: PtyDrive, link: ClassicLink) -> None:
+    drive.echo = True
+    test_read_and_write(drive, link, 1)
+    test_broadcast(drive, link)
+
+
+def test_answer_byte_by_byte(drive: PtyDrive, link: ClassicLink) -> None:
+    drive.answer = lambda data: [drive.send(bytes((byte,))) for byte in data] and None
+    assert link.read(1, OP_TIME).words == (0xFFFE, 2)
+    link.write(1, SETPOINT, (5,))
+
+
+def test_nobody_there(hasty: ClassicLink) -> None:
+    with pytest.raises(NoAnswer):
+        hasty.read(2, SPEED)
+    with pytest.raises(NoAnswer):
+        hasty.write(2, SETPOINT, (1,))
+
+
+@pytest.mark.parametrize('late', [1.5, 3.0])
+def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
+    timers: list[threading.Timer] = []
+
+    def hold_back(data: bytes) -> None:
+        drive.answer = drive.send
+        timers.append(threading.Timer(late * SHORT, drive.send, (data,)))
+        timers[0].start()
+
+    drive.answer = hold_back
+    with pytest.raises(NoAnswer):
+        hasty.read(1, SPEED)
+    drive.values[0x94] = 7
+    deadline = time.monotonic() + PATIENT
+    words: tuple[int, ...] = ()
+    while not words:
+        assert time.monotonic() < deadline
+        try:
+            words = hasty.read(1, SPEED).words
+        except LinkError as error:
+            assert not isinstance(error, (PortError, Refused))
+    assert words == (7,)
+    timers[0].join()
+
+
+def test_answer_of_another(drive: PtyDrive, hasty: ClassicLink) -> None:
+    drive.answer = lambda data: drive.send(b'"' + data[1:])
+    with pytest.raises(DamagedAnswer):
+        hasty.read(1, SPEED)
+
+
+def test_noise_and_doubled_answers(drive: PtyDrive, link: ClassicLink) -> None:
+    drive.answer = lambda data: drive.send(b'\x00!\x02E' + data + data)
+    for speed in range(20):
+        drive.values[0x94] = speed
+        assert link.read(1, SPEED).words == (speed,)
+        assert link.read(1, OP_TIME).words == (0xFFFE, 2)
+
+
+def test_hang_up(drive: PtyDrive) -> None:
+    link = connect(drive)
+    link.close()
+    with pytest.raises(PortError):
+        link.read(1, SPEED)

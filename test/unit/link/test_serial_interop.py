@@ -1,0 +1,82 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Our serial links talk to pymodbus's own server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+
+from pymodbus_server import REGISTERS
+from pymodbus_server import serial_server
+import pytest
+
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Link
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link.open import line_settings
+
+ONE = Address((0x2A5,), 1)
+TWO = Address((0x258,), 2)
+
+
+@pytest.fixture(scope='module', params=['rtu', 'ascii'])
+def link(request: pytest.FixtureRequest) -> Iterator[Link]:
+    protocol = f'modbus_{request.param}'
+    with serial_server(request.param) as path:
+        link = open_link(protocol, path, line_settings(protocol, response_timeout=5.0))
+        link.use_probes(1, (ONE, TWO))
+        link.open()
+        yield link
+        link.close()
+
+
+def test_read(link: Link) -> None:
+    assert link.read(1, ONE).words == (0x2A5,)
+    assert link.read(1, TWO).words == (0x258, 0x259)
+    assert link.read(2, TWO).words == (0x258, 0x259)
+
+
+def test_write_and_read_back(link: Link) -> None:
+    assert link.write(1, Address((0x400,), 1), (0xABCD,)).words == ()
+    assert link.write(1, Address((0x410,), 2), (0x3A0D, 0x0A3A)).words == ()
+    assert link.read(1, Address((0x400,), 1)).words == (0xABCD,)
+    assert link.read(1, Address((0x410,), 2)).words == (0x3A0D, 0x0A3A)
+    # and one drive is not another
+    assert link.read(2, Address((0x400,), 1)).words == (0x400,)
+
+
+def test_write_and_read_at_once(link: Link) -> None:
+    words = link.write_and_read(1, Address((0x420,), 1), (7,), Address((0x420,), 2)).words
+    assert words == (7, 0x421)
+
+
+def test_refusal(link: Link) -> None:
+    with pytest.raises(Refused) as refusal:
+        link.read(1, Address((REGISTERS[-1] + 1,), 1))
+    assert refusal.value.code == Refused.ILLEGAL_ADDRESS
+
+
+def test_identification(link: Link) -> None:
+    inquiry = link.identify(1)
+    while not inquiry.done:
+        # not every version has function 17
+        with contextlib.suppress(LinkError):
+            inquiry.ask()
+    assert inquiry.found.product == 'NFO Sinus'
+    assert inquiry.found.model == '1.50/400'
+    assert inquiry.found.revision == '4.30 / 4018'
