@@ -45,6 +45,7 @@ from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
 
@@ -252,7 +253,13 @@ class Drive:
         if not patient:
             # a silent drive costs its neighbours one time-out
             await inverter.look(Priority.POLL, once=True)
-        await inverter.identify()
+        try:
+            await inverter.identify()
+        except Refused as error:
+            raise DriveError(
+                f'{error}: every {inverter.model.name} has SWVer; is this another model? '
+                'set model to auto or to what it is'
+            ) from error
         await inverter.read_control_mode()
         await inverter.read_timeout()
         await inverter.look(Priority.SERVICE)
@@ -264,6 +271,12 @@ class Drive:
         self._watch.connected()
         inverter.connected = inverter.answering = True
         name = '' if identity.model else inverter.model.name
+        if identity.model and inverter.model.name == 'sinus_optimal':
+            inverter.tell(
+                Severity.WARNING,
+                f'this drive says that it is a {identity.model}; no Optimal says anything: '
+                'set model to auto or sinus_g2',
+            )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')
         self._warn_of_missing_timeout()

@@ -21,6 +21,8 @@ import math
 
 from nfo_sinus_driver.catalog import MODELS
 
+#: The model that is found out at the first configure.
+AUTO = 'auto'
 CLASSIC_DIALECTS = ('', 'v2.03', 'v5.0')
 CONTROL_METHODS = ('mode_scmd', 'drive_control', 'monitor')
 #: The fixed references of the drive, forward and reverse.
@@ -46,6 +48,7 @@ class DriveSettings:
     How one drive is to be treated; the fields are the parameters of its node.
 
     :ivar address: Modbus 1 to 247 [M0 §6.2.2].
+    :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
@@ -80,7 +83,7 @@ class DriveSettings:
         return self.reference == 'fieldbus'
 
     def __post_init__(self) -> None:
-        _one_of('model', self.model, MODELS)
+        _one_of('model', self.model, (*MODELS, AUTO))
         _one_of('control_method', self.control_method, CONTROL_METHODS)
         _one_of('reference', self.reference, REFERENCES)
         kind = f'{self.control_method} on {self.model}'

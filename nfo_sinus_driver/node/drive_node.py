@@ -34,10 +34,13 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
@@ -94,7 +97,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         values = declare(self, DRIVE_SETTINGS)
         self.settings = self._drive_settings(values)
         self._reporter = Reporter(self, line)
-        self._drive = Drive(line.bus, self.settings, self._reporter)
+        #: What ``model: auto`` stands for, as far as it is known.
+        self._found_model = MODELS[0]
+        self._drive = Drive(line.bus, self._concrete, self._reporter)
         self.drive_parameters = DriveParameters(self)
         self._wanted = wanted_state(self, self._drive)
         self._reporter.start(lambda: self._drive)
@@ -160,18 +165,21 @@ class DriveNode(LifecycleNodeMixin, Node):
             address = self._drive.settings.address
             self._complain_of_start(f'the stop of the drive at {address} is not confirmed yet')
             return TransitionCallbackReturn.FAILURE
-        if self._drive.settings != self.settings:
-            self._drive = Drive(self._line.bus, self.settings, self._reporter)
         try:
+            if self.settings.model == AUTO:
+                detection = detect_model(self._line.bus, self.settings.address)
+                self._found_model = self._line.bus.run(detection).result()
+            if self._drive.settings != self._concrete:
+                self._drive = Drive(self._line.bus, self._concrete, self._reporter)
             self._drive.connect(patient=not self._autostarting, parameters=True).result()
-        except DriveError as error:
+        except (DriveError, ValueError) as error:
             self._complain_of_start(str(error))
             return TransitionCallbackReturn.FAILURE
         if not self._is_for(self._drive.settings):
             self.get_logger().info('the settings were changed meanwhile: beginning anew')
             self._stop_for('let go', self._disconnect)
             return TransitionCallbackReturn.FAILURE
-        self._drive.settings = self.settings
+        self._drive.settings = self._concrete
         self.drive_parameters.declare(self._drive)
         self._apply_wanted_state()
         self._autostart_complaint = ''
@@ -349,7 +357,18 @@ class DriveNode(LifecycleNodeMixin, Node):
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.settings = self._settings_with(parameters)
         if not self._is_loose:
-            self._drive.settings = self.settings
+            self._drive.settings = self._concrete
+
+    @property
+    def _concrete(self) -> DriveSettings:
+        """
+        The settings with a model that is one.
+
+        :raises ValueError: the model that was found has not all that is set.
+        """
+        if self.settings.model != AUTO:
+            return self.settings
+        return dataclasses.replace(self.settings, model=self._found_model)
 
     @property
     def _is_loose(self) -> bool:
@@ -358,5 +377,6 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _is_for(self, settings: DriveSettings) -> bool:
         return all(
-            getattr(settings, name) == getattr(self.settings, name) for name in _ONLY_UNCONFIGURED
+            getattr(settings, name) == getattr(self._concrete, name)
+            for name in _ONLY_UNCONFIGURED
         )

@@ -26,6 +26,7 @@ from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.drive import CONTROL_METHODS
+from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link.open import PROTOCOLS
@@ -164,7 +165,12 @@ BUS_SETTINGS = (
 
 DRIVE_SETTINGS = (
     Setting('address', 1, "The drive's address on the bus; Modbus 1 to 247", 1, 247),
-    Setting('model', 'sinus_g2', 'The drive family', constraints=f'one of {", ".join(MODELS)}'),
+    Setting(
+        'model',
+        'sinus_g2',
+        'The drive family; auto: find out',
+        constraints=f'one of {", ".join((*MODELS, AUTO))}',
+    ),
     Setting(
         'control_method',
         'mode_scmd',
