@@ -83,6 +83,8 @@ class SerialLink(ModbusLink):
         self._repeats: Request[Any] | None = None
         #: What each unit was asked twice and answered in the same words.
         self._asked_twice: dict[int, Request[Any]] = {}
+        #: The probe on its way is only about that.
+        self._confirming = False
         #: Other bytes came with the last answer.
         self._stray = False
         #: When the last byte was on the line, as far as we know.
@@ -173,6 +175,7 @@ class SerialLink(ModbusLink):
         stray = self._stray
         self._doubts.add(request)
         stray |= self._await_silence()
+        self._confirming = True
         try:
             self._probe(request)
             if not stray and not self._stray:
@@ -183,6 +186,8 @@ class SerialLink(ModbusLink):
             # the right answer may be as late as that to the probe
             self._doubts.add(request)
             raise
+        finally:
+            self._confirming = False
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _await_silence(self) -> bool:
@@ -247,21 +252,24 @@ class SerialLink(ModbusLink):
         before = self._told.get(request.unit)
         if before is not None and before[0] == frame and now < before[2]:
             self._repeats = before[1]
-        until = now + self._settings.response_timeout
-        self._told[request.unit] = frame, request, until
+        again = self._settings.response_timeout + len(frame) * self._settings.char_time
+        self._told[request.unit] = frame, request, now + again
 
     def _receive(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes
     ) -> tuple[_T, float]:
         char_time = self._settings.char_time
         # an exception names neither register nor length: it may belong to the earlier request
-        doubt = self._doubts.of(request.unit)
-        believe_refusal = all(head[1] != request.function for head in doubt)
+        pending = {head[1] for head in self._doubts.of(request.unit)}
+        if request.unit in self._asked_twice:
+            pending.add(self._asked_twice[request.unit].function)
+        believe_refusal = request.function not in pending
         first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         length = self._frame_length(request.answer_length)
         last_chance = first + 2 * length * char_time
         came = 0
+        refusals: list[Refused] = []
         while True:
             data = self._port.read(deadline)
             now = time.monotonic()
@@ -273,18 +281,21 @@ class SerialLink(ModbusLink):
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
             came += len(data)
-            answer = _feed(reader, data, believe_refusal)
+            answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
                 return answer, now
             rest = (self._echo.missing + reader.missing) * char_time + reader.patience
             deadline = min(max(first, now + rest), last_chance + _PAUSES * reader.patience)
         held = self._echo.give_up()
         if held and not isinstance(request, Write):
-            answer = _feed(reader, held, False)
+            answer = _feed(reader, held, refusals)
             if answer is not None and not reader.other:
                 # an answer and nothing else: the adapter echoes no more
                 self._echo.present = False
                 return answer, now
+        if self._confirming and len(refusals) == 1 and not held and came == len(reader.frame):
+            # had there been another answer to come, it would be here, too
+            raise refusals[0]
         if held or (came and reader.other != frame):
             raise DamagedAnswer(
                 f'unit {request.unit}: {came + len(held)} bytes came that are no answer'
@@ -292,11 +303,13 @@ class SerialLink(ModbusLink):
         raise NoAnswer(f'unit {request.unit} did not answer')
 
 
-def _feed(reader: AnswerReader[_T], data: bytes, believe_refusal: bool) -> _T | None:
+def _feed(reader: AnswerReader[_T], data: bytes, refusals: list[Refused] | None) -> _T | None:
+    """Return the answer in what came so far; add the refusals before it, or raise the first."""
     while True:
         try:
             return reader.feed(data)
-        except Refused:
-            if believe_refusal:
+        except Refused as refusal:
+            if refusals is None:
                 raise
+            refusals.append(refusal)
             data = b''

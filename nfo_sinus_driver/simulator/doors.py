@@ -35,7 +35,7 @@ from nfo_sinus_driver.simulator.timing import FORMAT_CODES
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long a gateway waits for a drive by default (s).
-GATEWAY_TIMEOUT = 0.2
+GATEWAY_TIMEOUT = 0.1
 
 
 @dataclass(frozen=True)

@@ -168,11 +168,10 @@ def _line_dead(target: Target, given: dict[str, Any]) -> None:
 
 
 def _sio_error(target: Target, given: dict[str, Any]) -> None:
-    try:
-        flag = SioErr(1 << given['bit'])
-    except ValueError:
-        raise ValueError(f'SioErr has no bit {given["bit"]}') from None
-    target.one.serial_error(flag)
+    flags = {flag.bit_length() - 1: flag for flag in SioErr}
+    if given['bit'] not in flags:
+        raise ValueError(f'SioErr has no bit {given["bit"]}, only {", ".join(map(str, flags))}')
+    target.one.serial_error(flags[given['bit']])
 
 
 def _torn(target: Target, given: dict[str, Any]) -> None:

@@ -136,11 +136,11 @@ class ModbusAscii(_OnSerialLine):
     @staticmethod
     def cut(buffer: bytes) -> int:
         """Return what lies before the next colon, or up to the end of the line."""
-        end = buffer.find(b'\r\n') + 2
         colon = buffer.find(b':', 1)
-        if colon > 0 and not 1 < end <= colon:
+        end = buffer.find(b'\r\n')
+        if colon > 0 and (buffer[:1] != b':' or not 0 < end < colon):
             return colon
-        return end if end > 1 and buffer[:1] == b':' else 0
+        return end + 2 if end > 0 and buffer[:1] == b':' else 0
 
     @staticmethod
     def unwrap(frame: bytes) -> Request | None:

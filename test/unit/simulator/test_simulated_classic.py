@@ -1,0 +1,539 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a drive answers over Classic, and why it says no ([M0 §6.1], [M2])."""
+
+from classic_bench import ACK
+from classic_bench import NAK
+from classic_bench import RUN
+from classic_bench import SIO_FAIL
+from classic_bench import ClassicBench
+from classic_bench import bcc
+from classic_bench import enquiry
+from classic_bench import reply
+from classic_bench import select
+import pytest
+
+from nfo_sinus_driver.catalog import Protocol
+
+BLOCKED, CHECK_SUM, STRUCTURE, TIMEOUT, PREFIX = 0x1, 0x4, 0x8, 0x10, 0x20
+NOT_PERMITTED, UNKNOWN, UNREADABLE, UNWRITABLE, OUT_OF_RANGE = 0x40, 0x80, 0x100, 0x200, 0x400
+
+both = pytest.mark.parametrize('dialect', ['2.03', '5.0'])
+
+
+# ---- whom it is for ----
+
+
+@both
+def test_its_own_address_and_no_other(dialect):
+    bench = ClassicBench(dialect, address=7)
+    assert bench.say(enquiry('E0029', 7)) == reply('E0029', 1, 7)
+    for other in (1, 6, 8, 94):
+        assert bench.say(enquiry('E0029', other)) == b''
+        assert bench.say(select('E0029', 3, other)) == b''
+    assert bench.drive.runner.mode == 1
+
+
+def test_the_answer_to_address_0_comes_from_there_or_from_the_drives_own():
+    new, old = ClassicBench('2.03', address=7), ClassicBench('5.0', address=7)
+    assert new.say(enquiry('E0029', 0)) == reply('E0029', 1, 0)
+    assert old.say(enquiry('E0029', 0)) == reply('E0029', 1, 7)
+    assert new.say(select('E0029', 3, 0)) == b' \x06'
+    assert old.say(select('E0029', 3, 0)) == b"'\x06"
+    assert old.say(enquiry('EFFFF', 0)) == b"'\x15"
+
+
+@both
+def test_a_select_to_all_is_obeyed_and_not_answered(dialect):
+    bench = ClassicBench(dialect, address=7)
+    assert bench.say(select('E0029', 3, 95)) == b''
+    assert bench.drive.runner.mode == 3
+    assert bench.say(select('EFFFF', 3, 95)) == b''
+    assert bench.say(enquiry('E0029', 95)) == b''
+    assert bench.flags & UNKNOWN
+
+
+def test_an_address_left_from_modbus_cannot_be_reached():
+    bench = ClassicBench(address=247)
+    assert bench.read('E0029', 0) == 1
+    assert all(not bench.say(enquiry('E0029', address)) for address in range(1, 95))
+
+
+# ---- values ----
+
+
+def test_upper_and_lower_case():
+    new, old = ClassicBench('2.03'), ClassicBench('5.0')
+    assert new.say(b'\x04!E00AB\x05') == reply('E00AB', 0)
+    assert old.say(b'\x04!E00AB\x05') == b'!\x02E00ab=0000\x03' + bcc(b'E00ab=0000\x03')
+    assert old.say(b'\x04!E00ab\x05') == b'!\x02E00ab=0000\x03' + bcc(b'E00ab=0000\x03')
+    assert new.say(b'\x04!E00ab\x05') == b''
+    assert new.flags == STRUCTURE
+
+
+@pytest.mark.parametrize(
+    ('id_', 'key', 'coarse', 'value'),
+    [
+        ('E0008', 'motor.p_nom', 75, 0.75),
+        ('E0011', 'motor.i_nom', 21, 2.1),
+        ('E0015', 'motor.cos_phi', 77, 0.77),
+        ('E0002', 'motor.r_stat', 1234, 12.34),
+        ('E0004', 'motor.l_main', 4321, 0.4321),
+        ('E0005', 'motor.i_magn', 123, 1.23),
+        ('E001D', 'control.accel', 123, 12.3),
+        ('E001C', 'control.retard', 5000, 500),
+        ('E0049', 'pi_reg.t_min', -100, -100),
+        ('E0052', 'pi_reg.reg_amp', -1, -1),
+        ('E000A', 'pi_reg.unit', 3, 'bar'),
+        ('E005E', 'output.f_max', 32000, 32000),
+    ],
+)
+def test_a_coarse_value_is_kept_and_read_back(id_, key, coarse, value):
+    bench = ClassicBench()
+    assert bench.write(id_, coarse) == ACK
+    assert bench.read(id_) == coarse & 0xFFFF
+    assert bench.drive.peek(key) == pytest.approx(value)
+    assert bench.drive.writes[key] == 1
+
+
+@pytest.mark.parametrize(('fine', 'coarse'), [(5.004, 50), (5.05, 51), (5.149, 51), (4.951, 50)])
+def test_a_finer_value_is_rounded(fine, coarse):
+    bench = ClassicBench(settings={'control.accel': fine})
+    assert bench.read('E001D') == coarse
+    assert bench.drive.peek('control.accel') == fine
+
+
+def test_every_parameter_agrees_with_the_catalog():
+    bench = ClassicBench()
+    for key, parameter in bench.drive.model.items():
+        if Protocol.CLASSIC not in parameter.places or parameter.access.value not in ('r', 'rw'):
+            continue
+        place = parameter.place(Protocol.CLASSIC)
+        words = [bench.read(f'E{id_:04X}') for id_ in place.addresses]
+        value = bench.drive.peek(key)
+        if isinstance(value, float):
+            step = float(parameter.factor(Protocol.CLASSIC)) + 1e-9
+            if Protocol.MODBUS in parameter.places:
+                step = max(step, float(parameter.factor(Protocol.MODBUS)))
+            assert parameter.decode(words, Protocol.CLASSIC) == pytest.approx(value, abs=step), key
+        else:
+            assert parameter.decode(words, Protocol.CLASSIC) == value, key
+
+
+def test_what_is_measured_is_as_fine_as_classic_is():
+    bench = ClassicBench()
+    bench.drive.motor.dc_link = 543.21
+    assert bench.read('E0014') == 5432
+    assert bench.drive.read(0x3F8, 1) == (543,)
+
+
+def test_what_does_not_fit_is_the_most_that_does():
+    bench = ClassicBench(settings={'motor.r_stat': 1000})
+    assert bench.read('E0002') == 0x7FFF
+
+
+def test_firmware():
+    assert ClassicBench().read('E0075') == 438
+    assert ClassicBench().read('E0076') == 4018
+
+
+# ---- two words ----
+
+
+def test_a_counter_is_two_parameters():
+    bench = ClassicBench()
+    bench.drive.counters.op_time = 20000.05
+    assert (bench.read('E0027'), bench.read('E0127')) == (200000 & 0xFFFF, 200000 >> 16)
+
+
+def test_its_halves_can_be_torn():
+    bench = ClassicBench()
+    bench.drive.counters.op_time = 6553.5
+    low = bench.read('E0027')
+    bench.drive.advance(400)
+    assert (low, bench.read('E0127')) == (0xFFFF, 1)
+
+
+@pytest.mark.parametrize(
+    ('low', 'high'),
+    [('E0027', 'E0127'), ('E0028', 'E0128'), ('E00DD', 'E00DE'), ('E00FA', 'E00FB')],
+)
+def test_they_are_torn_on_request(low, high):
+    bench = ClassicBench()
+    true = bench.read(high) << 16 | bench.read(low)
+    bench.drive.tears = 1
+    first, torn, second = bench.read(high), bench.read(low), bench.read(high)
+    assert (first, torn, second) == (true >> 16, 0, (true >> 16) + 1)
+    assert bench.read(high) == second, 'once was asked for'
+    bench.drive.tears = 1
+    bench.read('E0029')
+    bench.read('E00E2')
+    assert bench.drive.tears == 1, 'only counters go on'
+
+
+def test_older_firmware_counts_in_24_bits():
+    new, old = ClassicBench('2.03'), ClassicBench('5.0')
+    for bench in (new, old):
+        bench.drive.counters.op_time = 0x1234567 / 10
+    assert (new.read('E0127'), old.read('E0127')) == (0x123, 0x23)
+
+
+# ---- no ----
+
+
+@both
+@pytest.mark.parametrize(
+    ('frame', 'flag'),
+    [
+        (enquiry('E0019'), UNKNOWN),
+        (select('E0019', 100), UNKNOWN),
+        (enquiry('E0240'), UNKNOWN),
+        (enquiry('E00AD'), UNREADABLE),
+        (select('E00E9', 0), UNWRITABLE),
+        (select('E00AC', 0), UNWRITABLE),
+        (select('E0027', 0), UNWRITABLE),
+        (select('E00DA', 0), UNWRITABLE),
+        (select('E0200', 0), UNKNOWN),
+        (select('E001D', 1), OUT_OF_RANGE),
+        (select('E001D', 5001), OUT_OF_RANGE),
+        (select('E002C', -1), OUT_OF_RANGE),
+        (select('E0030', 4), OUT_OF_RANGE),
+        (select('E0029', 0), OUT_OF_RANGE),
+        (select('E001E', 1501), OUT_OF_RANGE),
+        (select('E00A9', 96), OUT_OF_RANGE),
+        (select('E00AD', RUN), NOT_PERMITTED),
+        (b'\x04!F0029\x05', PREFIX),
+    ],
+)
+def test_a_refusal_has_its_reason(dialect, frame, flag):
+    bench = ClassicBench(dialect)
+    if frame == enquiry('E0240') and dialect == '5.0':
+        assert bench.read('E0240') == 0
+        return
+    assert bench.say(frame) == NAK
+    assert bench.flags == flag
+    assert bench.drive.inv_st == 24, 'nobody has control, so it is no fault'
+    assert bench.read('E00AC') == flag
+    assert bench.read('E00AC') == 0
+    assert bench.drive.sio_err_reads == 2
+
+
+def test_not_while_it_runs():
+    bench = ClassicBench(lenient=True)
+    bench.run()
+    assert bench.write('E0008', 200) == NAK
+    assert bench.flags == NOT_PERMITTED
+    assert bench.write('E001D', 20) == ACK
+    assert bench.running
+
+
+@both
+def test_a_damaged_message(dialect):
+    bench = ClassicBench(dialect)
+    answer = bench.say(select('E0029', 3)[:-1] + b'\x00')
+    assert answer == {'2.03': b'', '5.0': NAK}[dialect]
+    assert bench.flags == CHECK_SUM
+    assert bench.drive.runner.mode == 1
+    assert bench.say(b'\x04!E0029\x06') == b''
+    assert bench.flags == CHECK_SUM | STRUCTURE
+    assert bench.say(select('E0029', 3, 95)[:-1] + b'\x00') == b''
+
+
+def test_a_damaged_message_to_another_is_not_its_business():
+    bench = ClassicBench()
+    bench.say(select('E0029', 3, 2)[:-1] + b'\x00')
+    assert bench.flags == 0
+
+
+# ---- faults ----
+
+
+def test_a_fault_blocks_every_select_and_no_enquiry():
+    bench = ClassicBench()
+    bench.run()
+    bench.drive.trip(5)
+    for frame in [select('E0029', 1), select('E0029', 3), select('E00AD', 0), select('E001D', 20)]:
+        assert bench.say(frame) == NAK
+    assert bench.flags == BLOCKED
+    assert bench.read('E00E9') == 5
+    assert bench.drive.ack_reads == 0
+    assert bench.read('E00E8') == 5
+    assert bench.drive.ack_reads == 1
+    assert bench.read('E00E9') not in (5, SIO_FAIL)
+    assert bench.write('E0029', 1) == ACK
+
+
+@pytest.mark.parametrize(
+    ('frame', 'flag'),
+    [
+        (select('E001E', 2000), OUT_OF_RANGE),
+        (enquiry('E0019'), UNKNOWN),
+        (select('E0008', 100), NOT_PERMITTED),
+        (select('E0029', 3)[:-1] + b'\x00', CHECK_SUM),
+        (b'\x04!E0029\x06', STRUCTURE),
+    ],
+)
+@both
+def test_under_bus_control_it_is_a_serial_fault(dialect, frame, flag):
+    bench = ClassicBench(dialect)
+    bench.run()
+    bench.drive.advance(1)
+    assert bench.running
+    bench.say(frame)
+    assert not bench.running, 'the motor coasts'
+    assert bench.read('E00E9') == SIO_FAIL
+    assert bench.read('E0029') == 1, 'MODE is Stop'
+    assert bench.read('E00E8') == SIO_FAIL
+    assert bench.read('E00E9') == SIO_FAIL, 'not to be acknowledged by InvSt'
+    assert bench.write('E00AD', 0) == NAK
+    assert bench.read('E00AC') == flag | BLOCKED
+    assert bench.read('E00E9') == 24
+    assert bench.read('E00AC') == 0
+    bench.run()
+
+
+@pytest.mark.parametrize('frame', [select('E001E', 2000), enquiry('E0019'), select('E00E9', 0)])
+def test_a_lenient_drive_only_notes_refusals(frame):
+    bench = ClassicBench(lenient=True)
+    bench.run()
+    assert bench.say(frame) == NAK
+    assert bench.running
+    assert bench.flags
+    bench.say(b'\x04!E0029\x06')
+    assert bench.read('E00E9') == SIO_FAIL
+
+
+def test_stop_in_spite_of_a_serial_fault():
+    bench = ClassicBench('2.03')
+    bench.run()
+    bench.write('E001E', 2000)
+    assert bench.write('E0029', 3) == NAK
+    assert bench.write('E0029', 1) == ACK
+    assert bench.read('E00E9') == 24
+    assert bench.flags == 0
+
+
+def test_older_firmware_obeys_only_a_stop_to_all():
+    bench = ClassicBench('5.0')
+    bench.run()
+    bench.write('E001E', 2000)
+    assert bench.write('E0029', 1) == NAK
+    assert bench.read('E00E9') == SIO_FAIL
+    assert bench.write('E0029', 3, 95) == b''
+    assert bench.read('E00E9') == SIO_FAIL
+    assert bench.write('E0029', 1, 95) == b''
+    assert bench.read('E00E9') == 24
+    assert bench.flags == 0
+
+
+@both
+def test_silence_is_a_serial_fault(dialect):
+    bench = ClassicBench(dialect, settings={'serial.sio_tot': 1.0, 'serial.auto_stop': True})
+    bench.run()
+    for _ in range(4):
+        bench.drive.advance(0.6)
+        assert bench.read('E00E9') in (38, 39)
+    bench.drive.advance(1.1)
+    assert bench.read('E00E9') == SIO_FAIL
+    assert bench.read('E0029') == 1
+    assert bench.read('E00AC') == TIMEOUT
+    assert bench.read('E00E9') == 24
+
+
+def test_a_damaged_message_does_not_count_as_heard():
+    bench = ClassicBench(settings={'serial.sio_tot': 1.0, 'serial.auto_stop': True})
+    for frame, flags in [(select('E0029', 1), 0), (select('E0029', 1)[:-1] + b'\0', TIMEOUT)]:
+        bench.read('E00AC')
+        bench.drive.advance(0.9)
+        bench.say(frame)
+        bench.drive.faults.take_sio_err()
+        bench.drive.advance(0.2)
+        assert bench.flags == flags
+
+
+def test_the_keypad_takes_over():
+    bench = ClassicBench()
+    bench.run()
+    bench.drive.press_stop()
+    assert bench.read('E0029') == 1
+    assert bench.write('E00AD', RUN) == NAK
+    assert bench.flags == NOT_PERMITTED
+
+
+def test_a_power_cycle_forgets_the_flags():
+    bench = ClassicBench()
+    bench.say(enquiry('E0019'))
+    bench.drive.power_cycle(0.0)
+    assert bench.flags == 0
+
+
+def test_a_lasting_cause_of_sio_fail():
+    bench = ClassicBench()
+    bench.drive.trip(SIO_FAIL, cause_present=True)
+    bench.read('E00AC')
+    assert bench.read('E00E9') == SIO_FAIL
+    bench.drive.end_fault_causes()
+    bench.read('E00AC')
+    assert bench.read('E00E9') == 24
+
+
+# ---- set-points and commands ----
+
+
+@pytest.mark.parametrize(
+    ('mode', 'id_', 'raw'),
+    [(0, 'E0020', 250), (1, 'E004E', -250), (2, 'E0021', 50), (3, 'E0096', -1440)],
+)
+def test_the_setpoint_is_that_of_the_control_mode(mode, id_, raw):
+    bench = ClassicBench()
+    assert bench.write('E0030', mode) == ACK
+    assert bench.write('E001E', raw) == ACK
+    assert bench.read('E001E') == bench.read(id_) == raw & 0xFFFF
+    assert bench.write(id_, 7) == ACK
+    assert bench.read('E001E') == 7
+    old = ClassicBench('5.0')
+    old.write('E0030', mode)
+    old.write('E001E', raw)
+    assert old.read(id_) == raw & 0xFFFF
+    assert old.write(id_, 7) == NAK
+    assert old.flags == UNWRITABLE
+
+
+@both
+def test_a_ride(dialect):
+    bench = ClassicBench(dialect)
+    assert bench.read('E00E9') == 24
+    bench.run(250)
+    bench.drive.advance(1)
+    assert bench.read('E00E9') == 39
+    bench.drive.advance(10)
+    assert bench.read('E00E9') == 38
+    assert bench.read('E00B6') == 250
+    assert bench.write('E00AD', 0) == ACK
+    bench.drive.advance(10)
+    assert bench.read('E00E9') == 37
+    assert bench.drive.inv_st_text == {'2.03': 'Bus Stby', '5.0': 'Sio Stby'}[dialect]
+    assert bench.write('E0029', 1) == ACK
+    assert bench.read('E00E9') == 24
+
+
+def test_older_firmware_takes_every_even_command_for_stop():
+    for command in (0x02, 0x100, 0x40):
+        new, old = ClassicBench('2.03', lenient=True), ClassicBench('5.0', lenient=True)
+        for bench in (new, old):
+            bench.run()
+            bench.drive.advance(1)
+        assert new.write('E00AD', command) == NAK
+        assert old.write('E00AD', command) == ACK
+        assert new.drive.runner.scmd == RUN
+        assert old.drive.runner.scmd == 0
+
+
+def test_the_energy_counter_is_reset_by_newer_firmware():
+    new, old = ClassicBench('2.03', lenient=True), ClassicBench('5.0', lenient=True)
+    for bench, answer in [(new, ACK), (old, NAK)]:
+        bench.write('E0029', 3)
+        assert bench.write('E00AD', 0x900) == answer
+
+
+def test_drive_control_acknowledges_in_spite_of_a_fault():
+    bench = ClassicBench()
+    bench.drive.trip(5)
+    bench.drive.advance(1)
+    assert bench.write('E007C', 0x4006) == ACK
+    assert bench.write('E007C', 0x4086) == ACK
+    assert bench.read('E00E9') != 5
+    assert bench.read('E007D') & 8 == 0
+
+
+# ---- older firmware ----
+
+
+@pytest.mark.parametrize(
+    'id_',
+    ['E0075', 'E0076', 'E007A', 'E00DC', 'E00FA', 'E00FC', 'E00F9', 'E007C', 'E007D', 'E00E1'],
+)
+def test_older_firmware_does_not_know_it(id_):
+    new, old = ClassicBench('2.03'), ClassicBench('5.0')
+    new.read(id_)
+    assert old.say(enquiry(id_)) == NAK
+    assert old.flags == UNKNOWN
+
+
+def test_a_parameter_that_came_later():
+    bench = ClassicBench(settings={'fieldbus.sw_ver': 4.3})
+    assert bench.read('E0075') == 430
+    assert bench.say(enquiry('E00F9')) == NAK
+    assert bench.flags == UNKNOWN
+
+
+def test_line_settings_of_older_firmware():
+    new, old = ClassicBench('2.03'), ClassicBench('5.0')
+    for id_, code, of_new, of_old in [
+        ('E00A8', 256, ACK, NAK),
+        ('E00A8', 64, ACK, ACK),
+        ('E00AA', 4, ACK, NAK),
+        ('E00AA', 1, ACK, ACK),
+        ('E00A9', 95, NAK, ACK),
+        ('E00A9', 94, ACK, ACK),
+        ('E000A', 12, ACK, NAK),
+    ]:
+        assert new.say(select(id_, code, 0)) == of_new.replace(b'!', b' ')
+        assert old.say(select(id_, code, 0))[1:] == of_old[1:]
+    assert (new.drive.address, new.drive.serial.baud, new.drive.serial.char_format) == (1, 256, 4)
+    assert (old.drive.address, old.drive.serial.baud, old.drive.serial.char_format) == (94, 64, 1)
+
+
+def test_the_answer_to_a_new_address_comes_from_the_old_one():
+    bench = ClassicBench('5.0')
+    assert bench.write('E00A9', 9) == ACK
+    assert bench.read('E0029', 9) == 1
+
+
+def test_who_controls_an_older_drive():
+    bench = ClassicBench('5.0')
+    bench.drive.write(0x294, [3])
+    assert bench.read('E00E9') == 41
+    assert bench.drive.inv_st_text == 'Bus Stby'
+    bench.write('E0029', 3)
+    assert bench.read('E00E9') == 37
+    assert bench.drive.inv_st_text == 'Sio Stby'
+
+
+# ---- error log ----
+
+
+@both
+def test_the_error_log(dialect):
+    bench = ClassicBench(dialect)
+    assert bench.read('E0200') == bench.read('E0201') == 0
+    for code in (7, 5):
+        bench.drive.trip(code)
+        bench.read('E00E8')
+    bench.drive.counters.op_time = 0x1ABCD / 10
+    bench.drive.trip(8)
+    assert (bench.read('E0200'), bench.read('E0201')) == (0xABCD, 0x0801)
+    assert [bench.read(f'E{0x201 + 2 * entry:04X}') >> 8 for entry in range(4)] == [8, 5, 7, 0]
+    size = {'2.03': 32, '5.0': 128}[dialect]
+    assert bench.read(f'E{0x200 + 2 * size - 1:04X}') == 0
+    assert bench.say(enquiry(f'E{0x200 + 2 * size:04X}')) == NAK
+
+
+def test_the_same_log_over_modbus():
+    bench = ClassicBench()
+    bench.drive.counters.op_time = 0x1ABCD / 10
+    bench.drive.trip(8)
+    assert bench.drive.read(0xC000, 2) == (0xABCD, 0x0801)
+    assert bench.drive.read(0xC07C, 2) == (0, 0)
