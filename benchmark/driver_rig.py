@@ -35,6 +35,7 @@ from std_srvs.srv import SetBool
 
 #: Unlike any other drive's name: what is said to these must never reach a motor.
 NAMES = [f'simulated_for_bench_{number}' for number in range(1, 9)]
+_FORMATS = {'modbus_rtu': '8E1', 'classic': '7E1'}
 #: From the moment that every drive is polled until nothing is special any more, s.
 _SETTLE = 2.0
 
@@ -91,12 +92,23 @@ class DriverRig(Rig):
     :param settings: ROS parameters for all drives.
     """
 
-    def __init__(self, baud_rate: int, drives: int, **settings: float) -> None:
-        super().__init__(baud_rate, drives, '8E1')
+    def __init__(
+        self,
+        baud_rate: int,
+        drives: int,
+        protocol: str = 'modbus_rtu',
+        **settings: float,
+    ) -> None:
+        super().__init__(baud_rate, drives, _FORMATS[protocol], protocol)
         self.names = NAMES[:drives]
         with contextlib.ExitStack() as failing:
             failing.push(self)
-            parameters = {'port': self.port, 'baud_rate': baud_rate, **settings}
+            parameters = {
+                'port': self.port,
+                'protocol': protocol,
+                'baud_rate': baud_rate,
+                **settings,
+            }
             parameters['drives'] = f'[{",".join(self.names)}]'
             for address, name in enumerate(self.names, start=1):
                 parameters[f'{name}:address'] = address

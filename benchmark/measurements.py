@@ -84,6 +84,11 @@ def all_measurements() -> Iterator[Measurement]:
         for baud_rate, drives in lines:
             measure = _bound(_driver_cycle, baud_rate, drives, settings)
             yield Measurement('driver', title, baud_rate, drives, aims, measure)
+    for baud_rate, drives in ((57600, 8), (57600, 1), (9600, 1)):
+        measure = _bound(_classic_cycle, baud_rate, drives)
+        yield Measurement(
+            'classic', 'driver, Classic', baud_rate, drives, {'ratio': 1.05, 'cpu': 10}, measure
+        )
     for name in masters.MASTERS:
         for baud_rate, drives in lines:
             measure = _bound(_other_cycle, name, baud_rate, drives)
@@ -112,6 +117,14 @@ def _driver_cycle(baud_rate: int, drives: int, settings: Figures, effort: Effort
         }
 
 
+def _classic_cycle(baud_rate: int, drives: int, effort: Effort) -> Figures:
+    with DriverRig(baud_rate, drives, 'classic') as rig:
+        with rig.listener.cycle_times() as told:
+            window = rig.watch(rig.driver, effort.window)
+        place = load_model('sinus_g2')[masters.STATUS].place(Protocol.CLASSIC).address
+        return {**_cycles(window, rig, place), 'driver_says': 1e3 * statistics.median(told)}
+
+
 def _other_cycle(name: str, baud_rate: int, drives: int, effort: Effort) -> Figures:
     with Rig(baud_rate, drives, masters.CHAR_FORMAT) as rig:
         process = rig.start_script('masters.py', name, rig.port, str(baud_rate), str(drives))
@@ -122,9 +135,10 @@ def _other_cycle(name: str, baud_rate: int, drives: int, effort: Effort) -> Figu
         return {**_cycles(window, rig), 'short_gaps': short}
 
 
-def _cycles(window: Window, rig: Rig) -> Figures:
-    register, _ = masters.place(masters.STATUS)
-    figures = trace_file.cycles(window.frames, rig.line, register)
+def _cycles(window: Window, rig: Rig, place: int | None = None) -> Figures:
+    if place is None:
+        place, _ = masters.place(masters.STATUS)
+    figures = trace_file.cycles(window.frames, rig.line, place)
     if figures.pop('units') != rig.drives:
         raise RuntimeError(f'not every drive was polled twice:\n{rig.log}')
     return {**figures, **trace_file.additions(window.frames, rig.line), **window.figures()}

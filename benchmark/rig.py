@@ -62,10 +62,12 @@ class Window:
 class Rig(contextlib.ExitStack):
     """A simulated line, paced and traced; ends all that it started."""
 
-    def __init__(self, baud_rate: int, drives: int, char_format: str) -> None:
+    def __init__(
+        self, baud_rate: int, drives: int, char_format: str, protocol: str = 'modbus_rtu'
+    ) -> None:
         super().__init__()
         folder = self.enter_context(tempfile.TemporaryDirectory(prefix='nfo_sinus_bench_'))
-        self.line = Line(baud_rate)
+        self.line = Line(baud_rate, protocol)
         self.drives = drives
         self.port = str(Path(folder, 'line'))
         self._trace = Path(folder, 'trace')
@@ -77,7 +79,7 @@ class Rig(contextlib.ExitStack):
             simulator = self.start(
                 *(executable('simulator'), '--link', self.port, '--baud', str(baud_rate)),
                 *('--char-format', char_format, '--paced', '--trace', str(self._trace)),
-                *('--boot-time', '0', *addresses),
+                *('--protocol', protocol, '--boot-time', '0', *addresses),
             )
             self.wait_for(lambda: 'serving' in self.log, simulator)
             failing.pop_all()

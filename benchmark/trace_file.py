@@ -24,9 +24,12 @@ from pathlib import Path
 import statistics
 import struct
 
-#: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU.
-_BITS = 11
+#: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU;
+#: and with seven data bits: Classic.
+_BITS = {'modbus_rtu': 11, 'classic': 10}
 _READ = 3
+#: How a Classic ENQUIRY begins and ends; the address is a character from here on [M0 §6.1].
+_EOT, _ENQ, _ADDRESS_ZERO = 4, 5, 0x20
 #: Less than this is what floating point makes of a time since the machine started, s.
 _ROUNDING = 1e-7
 
@@ -52,15 +55,18 @@ class Line:
     """How fast a line is: what nobody can beat."""
 
     baud_rate: int
+    protocol: str = 'modbus_rtu'
 
     @property
     def character(self) -> float:
         """The time of one character, s."""
-        return _BITS / self.baud_rate
+        return _BITS[self.protocol] / self.baud_rate
 
     @property
     def gap(self) -> float:
-        """The silence that must be before each frame, t3.5, s; fixed above 19200 bit/s."""
+        """The silence before each frame, s: t3.5, fixed above 19200 bit/s; none for Classic."""
+        if self.protocol == 'classic':
+            return 0.0
         return 0.00175 if self.baud_rate > 19200 else 3.5 * self.character
 
     def limit(self, frames: Sequence[Frame]) -> float:
@@ -96,16 +102,20 @@ def short_gaps(frames: Sequence[Frame], line: Line) -> int:
     return sum(frame.gap < line.gap - _ROUNDING for frame in requests)
 
 
-def cycles(frames: Sequence[Frame], line: Line, register: int) -> dict[str, float]:
+def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
     """
-    Return the cycles of all units: from one read of a register to the next, of the same unit.
+    Return the cycles of all units: from one read of a parameter to the next, of the same unit.
+
+    :param place: the register or the Classic id of the parameter.
 
     :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio.
     """
     begins: dict[int, list[int]] = {}
     for number, frame in enumerate(frames):
-        if frame.is_request and read_register(frame) == register:
-            begins.setdefault(frame.data[0], []).append(number)
+        if frame.is_request:
+            unit, what = _asks(frame, line.protocol)
+            if what == place:
+                begins.setdefault(unit, []).append(number)
     times, limits = [], []
     for numbers in begins.values():
         for begin, end in pairwise(numbers):
@@ -118,6 +128,15 @@ def cycles(frames: Sequence[Frame], line: Line, register: int) -> dict[str, floa
         'ratio': statistics.median(a / b for a, b in zip(times, limits, strict=True)),
         'units': len(begins),
     }
+
+
+def _asks(frame: Frame, protocol: str) -> tuple[int, int | None]:
+    """Return whom a request asks, and for which register or id, if it reads one."""
+    data = frame.data
+    if protocol == 'modbus_rtu':
+        return data[0], read_register(frame)
+    enquires = data[0] == _EOT and data[-1] == _ENQ
+    return data[1] - _ADDRESS_ZERO, int(data[3:-1], 16) if enquires else None
 
 
 def read_register(frame: Frame) -> int | None:

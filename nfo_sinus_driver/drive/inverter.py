@@ -114,8 +114,9 @@ class Inverter:
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
         seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
-        if seen.listed.kind is Kind.FAULT and not seen.faulted:
-            # either the fault came between the two, or the drive treats it as an alarm [C95]
+        says_fault = seen.listed.kind is Kind.FAULT
+        if says_fault != seen.faulted and seen.listed.kind is not Kind.ALARM:
+            # a fault came or went between the two, or the drive treats it as an alarm [C95]
             word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
             assert isinstance(word, int)
             seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
