@@ -42,6 +42,8 @@ class Doubts:
         self._response_timeout = response_timeout
         self._probes: dict[int, tuple[Address, ...]] = {}
         self._of: dict[int, Doubt] = {}
+        #: Of answers that were right, and yet may come once more.
+        self._repeated: dict[int, Doubt] = {}
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
@@ -49,14 +51,23 @@ class Doubts:
 
     def add(self, request: Request[Any]) -> None:
         """Expect an answer to a request, one more than has come."""
-        until = time.monotonic() + (LATEST_ANSWER - 1) * self._response_timeout
-        self._of.setdefault(request.unit, {})[request.answer_head] = until
+        self._of.setdefault(request.unit, {})[request.answer_head] = self._latest()
+
+    def repeated(self, request: Request[Any]) -> None:
+        """Expect that the answer just got comes once more; what it says is right all the same."""
+        self._repeated[request.unit] = {request.answer_head: self._latest()}
+
+    def may_repeat(self, request: Request[Any]) -> bool:
+        """Tell whether an answer of this shape may come once more."""
+        return request.answer_head in _without_past(self._repeated.get(request.unit, {}))
+
+    def answered(self, unit: int) -> None:
+        """Forget which answer may come once more, for another has come."""
+        self._repeated.pop(unit, None)
 
     def of(self, unit: int) -> Doubt:
         """Return what may still come from a unit, without what is too late by now."""
-        now = time.monotonic()
-        doubt = {head: until for head, until in self._of.get(unit, {}).items() if until > now}
-        self._of[unit] = doubt
+        doubt = self._of[unit] = _without_past(self._of.get(unit, {}))
         return doubt
 
     def end(self, unit: int) -> None:
@@ -66,6 +77,10 @@ class Doubts:
     def clear(self) -> None:
         """Forget everything but the probes."""
         self._of.clear()
+        self._repeated.clear()
+
+    def _latest(self) -> float:
+        return time.monotonic() + (LATEST_ANSWER - 1) * self._response_timeout
 
     def probe(self, unit: int) -> tuple[Read | None, float]:
         """
@@ -73,7 +88,7 @@ class Doubts:
 
         :returns: ``None`` if there is none yet, and when there will be (``time.monotonic``).
         """
-        doubt = self.of(unit)
+        doubt = _without_past(self._repeated.get(unit, {})) | self.of(unit)
         probes = [
             Read(unit, address.numbers[0], address.words)
             for address in self._probes.get(unit, ())
@@ -84,3 +99,8 @@ class Doubts:
         # not until nothing is in doubt: a write that fails again and again must not keep reads out
         ends = [doubt[probe.answer_head] for probe in probes] or doubt.values()
         return None, max(ends)
+
+
+def _without_past(doubt: Doubt) -> Doubt:
+    now = time.monotonic()
+    return {head: until for head, until in doubt.items() if until > now}

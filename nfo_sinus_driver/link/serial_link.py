@@ -39,6 +39,10 @@ from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
 
+#: How long a line is not trusted that has told something nobody asked for, s.
+DISTRUST = 60.0
+#: What is left of the memory of a slow answer with each of the next.
+_DECAY = 0.95
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
 
@@ -66,9 +70,12 @@ class SerialLink(ModbusLink):
     confused with one still on its way is only sent after a request of another shape has been
     answered (units answer in order), or after :data:`LATEST_ANSWER` time-outs of silence.
 
-    For the same reason an answer with the very bytes of the one before is believed only after a
-    request of another shape: it may be the one before, told twice. If it answers the same question
-    too, what it says is right, but one more may come: the next request of its shape waits for that.
+    For the same reason an answer with the very bytes of the one before is not believed at once: it
+    may be the one before, told twice. The right one would come when a unit answers, so until then
+    the line is listened to. A line that has told something nobody asked for is not trusted so far
+    for a while: there it is believed only after a request of another shape. If it answers the same
+    question too, what it says is right, but one more may come: the next request of its shape waits
+    for that.
     """
 
     def __init__(self, port: Port, settings: LineSettings) -> None:
@@ -81,8 +88,11 @@ class SerialLink(ModbusLink):
         self._told: dict[int, tuple[bytes, Request[Any], float]] = {}
         #: The last answer repeats the one before it, to this request.
         self._repeats: Request[Any] | None = None
-        #: What each unit was asked twice and answered in the same words.
-        self._asked_twice: dict[int, Request[Any]] = {}
+        #: Until when an answer may well come twice.
+        self._distrust_until = 0.0
+        #: How long a unit has taken at most to answer, s, and when the last request had left.
+        self._slowest: dict[int, float] = {}
+        self._sent_at = 0.0
         #: The probe on its way is only about that.
         self._confirming = False
         #: Other bytes came with the last answer.
@@ -105,8 +115,11 @@ class SerialLink(ModbusLink):
         self._doubts.clear()
         self._echo = Echo()
         self._told.clear()
-        self._asked_twice.clear()
         self._last = None
+
+    def distrust(self) -> None:
+        """Expect answers that come twice: it has been heard that they do."""
+        self._distrust_until = time.monotonic() + DISTRUST
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
@@ -136,14 +149,14 @@ class SerialLink(ModbusLink):
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when its last byte came."""
         self._await_silence()
-        before = self._asked_twice.get(request.unit)
-        if before is not None and before.answer_head == request.answer_head:
-            self._doubts.add(before)
         doubt = self._doubts.of(request.unit)
+        again = self._doubts.may_repeat(request)
         # a write answer names what was written, and nobody believes it without reading back
-        if not isinstance(request, Write) and doubt:
+        if not isinstance(request, Write) and (doubt or again):
             self._probe(request)
             self._await_silence()
+        elif again:
+            self._doubts.add(request)
         try:
             answer = self._transact(request)
         except Refused:
@@ -169,8 +182,12 @@ class SerialLink(ModbusLink):
         """
         if self._repeats is None:
             return
+        if time.monotonic() > self._distrust_until:
+            if not names_it and self._repeats != request:
+                self._listen(request)
+            return
         if names_it or self._repeats == request:
-            self._asked_twice[request.unit] = request
+            self._doubts.repeated(request)
             return
         stray = self._stray
         self._doubts.add(request)
@@ -190,6 +207,21 @@ class SerialLink(ModbusLink):
             self._confirming = False
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
+    def _listen(self, request: Request[Any]) -> None:
+        """
+        Wait as long as the right answer may take, if this was the one before, told twice.
+
+        :raises DamagedAnswer: it came.
+        """
+        length = self._frame_length(request.answer_length) * self._settings.char_time
+        until = self._sent_at + 2 * self._slowest.get(request.unit, 0.0) + length
+        while (now := time.monotonic()) < until:
+            if self._port.read(until):
+                self._line_end = max(self._line_end, now)
+                self._doubts.add(request)
+                self.distrust()
+                raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
+
     def _await_silence(self) -> bool:
         """Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for."""
         give_up = time.monotonic() + self._settings.response_timeout
@@ -202,6 +234,7 @@ class SerialLink(ModbusLink):
                     return came
                 continue
             came = True
+            self.distrust()
             self._line_end = max(self._line_end, now)
             if self._last is not None:
                 self._doubts.add(self._last)
@@ -216,7 +249,8 @@ class SerialLink(ModbusLink):
         self._repeats = None
         self._echo.sent(frame)
         self._port.write(frame)
-        self._line_end = time.monotonic() + len(frame) * self._settings.char_time
+        self._sent_at = time.monotonic() + len(frame) * self._settings.char_time
+        self._line_end = self._sent_at
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
@@ -240,7 +274,11 @@ class SerialLink(ModbusLink):
         if not late and self._repeats is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
+        took = arrived - self._sent_at - len(reader.frame) * self._settings.char_time
+        # one slow answer is remembered for some dozens
+        self._slowest[request.unit] = max(took, _DECAY * self._slowest.get(request.unit, 0.0))
         if late or reader.received:
+            self.distrust()
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._doubts.add(request)
         return answer, arrived
@@ -248,7 +286,7 @@ class SerialLink(ModbusLink):
     def _remember(self, request: Request[Any], frame: bytes) -> None:
         """Note what a unit told, and whether it told just that a moment ago."""
         now = time.monotonic()
-        self._asked_twice.pop(request.unit, None)
+        self._doubts.answered(request.unit)
         before = self._told.get(request.unit)
         if before is not None and before[0] == frame and now < before[2]:
             self._repeats = before[1]
@@ -260,10 +298,8 @@ class SerialLink(ModbusLink):
     ) -> tuple[_T, float]:
         char_time = self._settings.char_time
         # an exception names neither register nor length: it may belong to the earlier request
-        pending = {head[1] for head in self._doubts.of(request.unit)}
-        if request.unit in self._asked_twice:
-            pending.add(self._asked_twice[request.unit].function)
-        believe_refusal = request.function not in pending
+        doubt = self._doubts.of(request.unit)
+        believe_refusal = all(head[1] != request.function for head in doubt)
         first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         length = self._frame_length(request.answer_length)

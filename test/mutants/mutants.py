@@ -28,6 +28,8 @@ _ECHO = 'test/unit/link/test_echo.py'
 _MOTION = 'nfo_sinus_driver/drive/motion.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
 _DRIVE = 'nfo_sinus_driver/drive/drive.py'
+_WATCH = 'nfo_sinus_driver/drive/watch.py'
+_WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
 _METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
@@ -59,8 +61,8 @@ MUTANTS = (
         1,
         'polling acknowledges faults',
         'nfo_sinus_driver/drive/inverter.py',
-        "'fieldbus.inv_st', priority, once=once",
-        "'fieldbus.inv_st_with_ack', priority, once=once",
+        "read_number('fieldbus.inv_st', priority, once=once",
+        "read_number('fieldbus.inv_st_with_ack', priority, once=once",
         (_TRACE,),
     ),
     Mutant(
@@ -90,7 +92,7 @@ MUTANTS = (
     Mutant(
         2,
         'a lost line does not disarm',
-        _DRIVE,
+        _WATCH,
         '                self._motion.lost()',
         '                pass',
         (_NO_RESTART, '-k', 'line_gone'),
@@ -107,7 +109,7 @@ MUTANTS = (
         2,
         'the run command is not taken back before an acknowledgement',
         _METHOD,
-        "await self._registers.write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)",
+        'await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)',
         'pass',
         (_NO_RESTART, '-k', 'fault_and_ack'),
     ),
@@ -196,17 +198,33 @@ MUTANTS = (
         3,
         'a stop waits behind everything else',
         _METHOD,
-        "write('fieldbus.scmd', Scmd.STOP, Priority.STOP, once=True)",
+        'write(self._command, Scmd.STOP, Priority.STOP, once=True)',
         "write('fieldbus.scmd', Scmd.STOP, Priority.REFRESH, once=True)",
         ('test/unit/drive/test_stop_first.py',),
     ),
     Mutant(
         4,
         'parameters are written although they do not change',
-        'nfo_sinus_driver/drive/drive_timeout.py',
-        '        if before[key] != registers.number(key, registers.words(key, value))',
-        '        if True',
+        _WRITER,
+        '        if before == words:',
+        '        if False:',
         (_INTERFACE, '-k', 'has_already'),
+    ),
+    Mutant(
+        4,
+        'declaring or following a parameter writes it',
+        'nfo_sinus_driver/node/drive_parameters.py',
+        'if drive is None or self._outside != threading.get_ident():',
+        'if drive is None:',
+        ('test/ros/test_parameters_follow.py',),
+    ),
+    Mutant(
+        7,
+        'what was written is believed without reading it back',
+        _WRITER,
+        '        if kept == words:',
+        '        if True:',
+        ('test/unit/drive/test_parameters_change.py',),
     ),
     Mutant(
         4,
@@ -246,7 +264,7 @@ MUTANTS = (
         8,
         'a late answer is believed',
         'nfo_sinus_driver/link/serial_link.py',
-        '        if not isinstance(request, Write) and doubt:',
+        '        if not isinstance(request, Write) and (doubt or again):',
         '        if False:',
         (_RTU_LINK,),
     ),
@@ -301,7 +319,7 @@ MUTANTS = (
     Mutant(
         9,
         'an idle bus is silent longer than the time-out of the drive',
-        _DRIVE,
+        _WATCH,
         '            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)',
         '            pass',
         (_WAYS_OUT, '-k', 'kept_alive'),

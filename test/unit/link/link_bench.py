@@ -64,6 +64,8 @@ class Bench:
         self.link = self.link_class(self.wire, settings)
         with self.wire.time():
             self.link.open()
+            # as behind a line that has told something twice before
+            self.link.distrust()
         self.link.use_probes(UNIT, probes)
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:

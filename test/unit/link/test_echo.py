@@ -52,6 +52,7 @@ from nfo_sinus_driver.link.echo import Echo
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.open import line_settings
@@ -321,6 +322,14 @@ def test_same_refusals_are_believed_even_where_the_probes_are_refused() -> None:
         bench.expect(Refused, lambda address=address: bench.read(address))
 
 
+def test_refusal_behind_the_same_question_twice_is_believed() -> None:
+    bench = Bench([Fate(), Fate(), Fate(what='refuse')])
+    bench.slave.words = SameWords.words  # type: ignore[method-assign]
+    bench.read(A)
+    bench.read(A)
+    bench.expect(Refused, lambda: bench.read(C))
+
+
 def test_second_refusal_is_noticed_even_where_the_probes_are_refused() -> None:
     bench = Bench()
     fates = [Fate(what='refuse twice', again=0.2), Fate(), *[Fate(what='refuse')] * 9]
@@ -334,6 +343,20 @@ def test_same_words_of_a_unit_without_probes_wait() -> None:
     bench.slave = SameWords(bench.wire)
     bench.read(A)
     bench.expect(DamagedAnswer, lambda: bench.read(B))
+    # not for ever
+    bench.wire.now = until(bench, B)
+    bench.read(B)
+    bench.read(B)
+    bench.wire.now = until(bench, B)
+    bench.read(B)
+
+
+def until(bench: Bench, address: Address) -> float:
+    """When a unit that is left alone may be asked again."""
+    error = bench.expect(NotReady, lambda: bench.read(address))
+    assert isinstance(error, NotReady)
+    assert error.until > bench.wire.now
+    return error.until
 
 
 AGAIN = st.lists(
@@ -349,11 +372,11 @@ AGAIN = st.lists(
 
 
 def one_thing_at_a_time(fates: list[Fate]) -> Iterator[Fate]:
-    """Lose no answer right behind one that comes twice: who counts answers would be misled."""
+    """Answer the request behind one that is answered twice: who counts would be misled."""
     twice = False
     for fate in fates:
-        yield replace(fate, what='answer') if twice and fate.what == 'drop' else fate
-        twice = fate.what in ('double', 'refuse twice')
+        yield replace(fate, what='answer') if twice else fate
+        twice = not twice and fate.what in ('double', 'refuse twice')
 
 
 @hypothesis_settings(max_examples=300)

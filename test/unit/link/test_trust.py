@@ -1,0 +1,85 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An answer that repeats the one before, on a line that has given no cause for doubt yet."""
+
+from __future__ import annotations
+
+from link_bench import UNIT
+from link_bench import A
+from link_bench import B
+from link_bench import Bench
+from link_bench import D
+import pytest
+from test_echo import SameWords
+from virtual_wire import Fate
+
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import serial_link
+
+
+def trusting(fates: list[Fate] | None = None) -> Bench:
+    """Return a bench whose link has heard nothing twice yet."""
+    bench = Bench(fates)
+    bench.link._distrust_until = 0.0
+    return bench
+
+
+def test_same_words_cost_no_request_and_hardly_any_time() -> None:
+    bench = trusting()
+    bench.slave = SameWords(bench.wire)
+    bench.read(A)
+    began = bench.wire.now
+    bench.read(B)
+    first = bench.wire.now - began
+    began = bench.wire.now
+    bench.read(A)
+    assert bench.asked == [A.numbers[0], B.numbers[0], A.numbers[0]]
+    assert bench.wire.now - began == pytest.approx(first, rel=0.1)
+
+
+@pytest.mark.parametrize('again', [0.05, 0.1, 0.15])
+def test_answer_told_twice_is_not_taken_for_the_next(again: float) -> None:
+    # the unit takes as long as it does, and the second copy comes within that
+    bench = trusting([Fate(delay=0.2), Fate(0.2, 'double', again=again), Fate(delay=0.2)])
+    bench.read(D)
+    first = bench.read(A).words
+    error = bench.expect(DamagedAnswer, lambda: bench.read(B))
+    assert 'came twice' in str(error)
+    # from now on nothing is believed that could be told twice
+    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1) != first
+
+
+def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
+    bench = trusting([Fate(what='double')])
+    bench.read(A)
+    bench.wire.now += 0.01
+    bench.read(D)
+    bench.slave = SameWords(bench.wire)
+    bench.read(A)
+    bench.read(B)
+    assert bench.asked[-1] not in (A.numbers[0], B.numbers[0]), 'nothing confirmed it'
+    bench.wire.now += serial_link.DISTRUST + 1.0
+    bench.read(A)
+    bench.read(B)
+    assert bench.asked[-2:] == [A.numbers[0], B.numbers[0]]
+
+
+def test_one_slow_answer_does_not_slow_the_others_for_ever() -> None:
+    bench = trusting([Fate(delay=0.9)])
+    bench.read(D)
+    slow = bench.link._slowest[UNIT]
+    for _ in range(60):
+        bench.read(D)
+    assert bench.link._slowest[UNIT] < slow / 10
