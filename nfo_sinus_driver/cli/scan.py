@@ -84,11 +84,12 @@ def scan(options: argparse.Namespace) -> int:
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
     factory = PROTOCOLS[options.protocol]
-    if factory.data_bits is None:
+    if options.protocol == 'modbus_tcp':
         # the line is that of the gateway
         return [(0, '')]
     if options.all_settings:
-        formats = [f'{factory.data_bits}{parity}' for parity in _PARITIES]
+        bits = (7, 8) if factory.data_bits is None else (factory.data_bits,)
+        formats = [f'{data_bits}{parity}' for data_bits in bits for parity in _PARITIES]
         return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in formats]
     return [
         (options.baud_rate or factory.baud_rate, options.char_format or factory.char_format)

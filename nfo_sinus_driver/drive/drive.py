@@ -250,11 +250,8 @@ class Drive:
 
     async def _connect(self, patient: bool) -> None:
         inverter = self._inverter
-        if not patient:
-            # a silent drive costs its neighbours one time-out
-            await inverter.look(Priority.POLL, once=True)
         try:
-            await inverter.identify()
+            await inverter.identify(patient=patient)
         except Refused as error:
             raise DriveError(
                 f'{error}: every {inverter.model.name} has SWVer; is this another model? '

@@ -148,14 +148,16 @@ class Inverter:
         # a code that means neither ON nor OFF is not relied upon
         self.auto_stop = words == self._registers.words('serial.auto_stop', True)
 
-    async def identify(self) -> Identity:
+    async def identify(self, *, patient: bool = True) -> Identity:
         """
         Find out whether somebody answers, and with which firmware.
 
+        :param patient: ask again if nobody does; a silent drive costs its neighbours time-outs.
         :raises LinkError: nobody does.
         """
-        # anything will do that every drive answers
-        await self._registers.read('fieldbus.inv_st', Priority.SERVICE)
+        # anything will do that every drive answers, whichever dialect it knows
+        priority = Priority.SERVICE if patient else Priority.POLL
+        await self._registers.read('fieldbus.inv_st', priority, once=not patient)
         classic = self._registers.protocol is Protocol.CLASSIC
         self._older = classic and self.settings.classic_dialect == 'v5.0'
         if self._older or not self._registers.reaches('fieldbus.sw_ver'):
