@@ -57,9 +57,9 @@ unit: setup ## tests without ROS, with the current and with the oldest pymodbus
 	@echo '== unit again: without rclpy, with the oldest pymodbus'
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto test/unit
 
-ros: setup ## end-to-end tests with rclpy
+ros: setup ## end-to-end tests with rclpy (all of them over another way: WAY=classic_v2)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
-	@tools/run python $(PYTEST) -n 2 test/ros
+	@tools/run python $(PYTEST) -n 2 $(if $(WAY),--way $(WAY)) test/ros
 
 mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
 	@tools/run python test/mutants/run.py

@@ -50,5 +50,7 @@ BUS_RUNNING = frozenset({38, 39, 40, 42, 43, 44})
 LOCAL = frozenset({24, 29, 30, 31, 32, 33, 34, 35, 36})
 START_DELAY = 25
 TUNING = 28
+#: A tuning of any kind is finished ([M0 table 19], [M1]).
+TUNED = frozenset({44, 45, 46, 47})
 SIO_FAIL = 14
 BUS_FAIL = 15

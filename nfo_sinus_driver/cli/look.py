@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The verbs that read one drive: ``info``, ``list`` and ``get``."""
+"""The verbs that read one drive: ``info``, ``list``, ``get`` and ``errors``."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Iterable
 from collections.abc import Mapping
 import json
+import math
 
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
@@ -112,6 +113,38 @@ def get(options: argparse.Namespace) -> int:
     for line in columns([(key, shown(values[key], wanted[key].unit)) for key in wanted]):
         put(line)
     return 0
+
+
+def errors(options: argparse.Namespace) -> int:
+    """Show the error log."""
+    with Session(options) as session:
+        drive = session.drive()
+        drive.identify(thoroughly=False)
+        entries = drive.error_log(options.count)
+    if options.json:
+        # JSON has no NaN
+        rows = [{**vars(entry), 'age': _known(entry.age)} for entry in entries]
+        put(json.dumps(rows, ensure_ascii=False, indent=2))
+        return 0
+    for line in columns(
+        [
+            (f'{entry.operating_time:.1f} h', str(entry.code), entry.text, _ago(entry.age))
+            for entry in entries
+        ],
+        right=(0, 1),
+    ):
+        put(line)
+    if not entries:
+        put('the error log is empty')
+    return 0
+
+
+def _known(number: float) -> float | None:
+    return None if math.isnan(number) else round(number, 1)
+
+
+def _ago(hours: float) -> str:
+    return '-' if math.isnan(hours) else f'{hours:.1f} operating hours ago'
 
 
 def as_json(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> str:

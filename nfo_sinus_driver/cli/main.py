@@ -28,6 +28,7 @@ import threading
 
 from nfo_sinus_driver.cli.change import set_
 from nfo_sinus_driver.cli.compare import diff
+from nfo_sinus_driver.cli.look import errors
 from nfo_sinus_driver.cli.look import get
 from nfo_sinus_driver.cli.look import info
 from nfo_sinus_driver.cli.look import list_
@@ -50,6 +51,7 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     'dump': dump,
     'load': load,
     'diff': diff,
+    'errors': errors,
     'monitor': monitor,
 }
 

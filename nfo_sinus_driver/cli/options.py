@@ -166,6 +166,15 @@ def _parser() -> argparse.ArgumentParser:
     diff.add_argument(
         '--against', type=_address, metavar='N', help='compare with the drive at this address'
     )
+    errors = verb('errors', 'show the error log, newest entry first', json=True)
+    errors.add_argument(
+        '--count',
+        type=_count,
+        default=0,
+        metavar='TIMES',
+        help='at most so many entries; more than 32 where a drive has them (default: 0, which is '
+        'all, or 32)',
+    )
     monitor = verb('monitor', 'show what the drive does, until Ctrl-C', json=True)
     monitor.add_argument(
         '--period',
@@ -217,6 +226,13 @@ def _seconds(text: str) -> float:
     if not 0.01 <= seconds <= 3600:
         raise argparse.ArgumentTypeError(f'{text} is not possible: 0.01 s at least')
     return seconds
+
+
+def _count(text: str) -> int:
+    count = int(text, 10)
+    if count < 0:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 0 or more')
+    return count
 
 
 def _change(text: str) -> tuple[str, str]:

@@ -43,6 +43,9 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.error_log import ErrorLog
+from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
@@ -110,6 +113,12 @@ class Remote:
         with progress(f'reading {self}', len(keys)) as self._step:
             self.parameters.read(only).result()
         return self.parameters.values
+
+    def error_log(self, most: int) -> tuple[LogEntry, ...]:
+        """Read the error log, newest entry first; at most so many entries, 0: all."""
+        errands = Errands(self._bus, self.inverter, self.registers, None)
+        log = ErrorLog(self.inverter, self.registers, errands)
+        return self.do(lambda: log.read_now(most))
 
     def measure(self, key: str) -> Value:
         """Read one value."""

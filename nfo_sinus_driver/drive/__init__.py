@@ -15,6 +15,7 @@
 """One inverter in engineering units. No ROS."""
 
 from nfo_sinus_driver.drive.drive import Drive
+from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
@@ -25,6 +26,8 @@ from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.snapshot import Telemetry
+from nfo_sinus_driver.drive.tuning import Procedure
+from nfo_sinus_driver.drive.tuning import Tuned
 
 __all__ = [
     'CONTROL_METHODS',
@@ -35,7 +38,10 @@ __all__ = [
     'Identity',
     'InverterStatus',
     'Listener',
+    'LogEntry',
+    'Procedure',
     'Severity',
     'Snapshot',
     'Telemetry',
+    'Tuned',
 ]

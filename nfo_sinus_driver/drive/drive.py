@@ -30,6 +30,9 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.error_log import ErrorLog
+from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -38,18 +41,20 @@ from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
+from nfo_sinus_driver.drive.tuning import Procedure
+from nfo_sinus_driver.drive.tuning import Tuned
+from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
-
-_MONITOR = 'control_method is monitor: this driver only reads; set control_method to mode_scmd'
 
 
 class Drive:
@@ -95,6 +100,9 @@ class Drive:
         self.parameters = Parameters(
             bus, self._inverter, self._registers, self._run, self._take_parameters
         )
+        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
+        self._error_log = ErrorLog(self._inverter, self._registers, errands)
+        self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, errands)
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
 
@@ -185,6 +193,26 @@ class Drive:
         """Acknowledge a fault."""
         return self._run(lambda: self._command(lambda motion: motion.acknowledge(), connected=True))
 
+    def error_log(self, most: int = 0) -> Future[tuple[LogEntry, ...]]:
+        """Read the error log, newest entry first; at most so many entries, 0: all."""
+        return self._run(lambda: self._read_error_log(most))
+
+    def erase_error_log(self) -> Future[str]:
+        """Erase the error log; the motor must stand."""
+        return self._run(lambda: self._unless_barred(self._error_log.erase_now))
+
+    def reset_energy(self) -> Future[str]:
+        """Reset the kWh counter; the motor must stand."""
+        return self._run(lambda: self._unless_barred(self._error_log.reset_energy_now))
+
+    def tune(self, procedure: Procedure) -> Future[Tuned]:
+        """Have the drive measure or calculate its motor; minutes may pass until the result."""
+        return self._run(lambda: self._tune(procedure))
+
+    def cancel_tuning(self) -> Future[str]:
+        """Stop a tuning; does nothing else, and nothing if there is none."""
+        return self._run(self._errands.recall)
+
     def set_drive_timeout(self, seconds: float) -> Future[str]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
         return self._run(lambda: self._set_drive_timeout(seconds))
@@ -221,7 +249,7 @@ class Drive:
 
     async def _command(self, command: Any, *, connected: bool = False) -> str:
         if self._motion is None:
-            raise DriveError(_MONITOR)
+            raise DriveError(MONITOR_REFUSAL)
         if connected and not self._inverter.connected:
             raise DriveError(f'the drive at address {self._unit} is not connected')
         answer: str = await command(self._motion)
@@ -234,6 +262,23 @@ class Drive:
         answer = await self._command(lambda motion: motion.enable(), connected=True)
         self._watch.wake()
         return answer
+
+    async def _read_error_log(self, most: int) -> tuple[LogEntry, ...]:
+        if not self._inverter.connected:
+            raise DriveError(f'the drive at address {self._unit} is not connected')
+        return await self._error_log.read_now(most)
+
+    async def _unless_barred(self, errand: Callable[[], Coroutine[Any, Any, str]]) -> str:
+        # it would take control that nobody gives back any more
+        if self._barred:
+            raise DriveError('the driver is ending')
+        return await errand()
+
+    async def _tune(self, procedure: Procedure) -> Tuned:
+        # as with enable, the motor may turn
+        if self._barred or not self._watch.active:
+            raise DriveError('the drive is not active')
+        return await self._tuning.tune_now(procedure)
 
     async def _connect_first(self, patient: bool, parameters: bool) -> str:
         if not self._watch.begun:
@@ -318,7 +363,7 @@ class Drive:
 
     async def _set_drive_timeout(self, seconds: float) -> str:
         if self._motion is None:
-            raise DriveError(_MONITOR)
+            raise DriveError(MONITOR_REFUSAL)
         if not seconds:
             return ''
         if not self._inverter.can_time_out:

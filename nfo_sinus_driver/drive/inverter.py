@@ -91,6 +91,8 @@ class Inverter:
         #: Hz and rpm, as last polled.
         self.frequency = math.nan
         self.speed = math.nan
+        #: It changes its parameters itself just now.
+        self.tuning = False
         self.control_mode = ''
         self.unit = ''
         #: Its firmware is of those that do not know every parameter ([M2], [C21]).
@@ -238,11 +240,15 @@ class Inverter:
     @property
     def text(self) -> str:
         """The inverter status as on the display."""
-        if self.seen is None:
-            return ''
+        return '' if self.seen is None else self.text_of(self.seen.code)
+
+    def text_of(self, code: int) -> str:
+        """Return what the display of this firmware says for a code."""
         told = self.identity is not None and not math.isnan(self.identity.firmware)
         firmware = Fraction(self.identity.firmware) if told and self.identity else None
-        return self.model.inv_st_text(self.seen.code, firmware)
+        if self._older and firmware is None:
+            firmware = Fraction(0)
+        return self.model.inv_st_text(code, firmware)
 
     def describe(self) -> str:
         """Return the inverter status for a message: code and text."""

@@ -111,6 +111,9 @@ class ModeScmd:
         """Acknowledge a fault; a serial fault is ended by MODE = Stop [M0 §6.1.5], [C42]."""
         await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
         if code == SIO_FAIL:
+            if self._registers.reaches('fieldbus.sio_err'):
+                # older firmware obeys no MODE while the fault stands [C9]
+                await self._registers.acknowledge('fieldbus.sio_err', Priority.SERVICE)
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
 

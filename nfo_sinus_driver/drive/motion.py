@@ -47,6 +47,19 @@ _NO_RUN = (
 )
 
 
+class Loan:
+    """
+    The drive in the hands of somebody else, such as a tuning.
+
+    :param what: what for.
+    """
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        #: The drive shall stop what it does.
+        self.recalled = False
+
+
 class Motion:
     """Arms, stops and watches one drive."""
 
@@ -58,6 +71,8 @@ class Motion:
         self._method = method
         self._setpoint = setpoint
         self._arming: Task | None = None
+        #: Who has the drive instead, and commands it by :attr:`method`.
+        self.loan: Loan | None = None
         self._withdrawal = Withdrawal(bus, inverter, method, self._note_change)
         #: When the run command was last given or taken back: an older status says nothing.
         self._changed_at = 0.0
@@ -75,6 +90,21 @@ class Motion:
         """A stop is not confirmed yet."""
         return self._withdrawal.going_on
 
+    @property
+    def held_by_fault(self) -> bool:
+        """The drive takes no command until its fault is acknowledged."""
+        return self._withdrawal.held_by_fault
+
+    @property
+    def method(self) -> ControlMethod:
+        """How the drive is commanded, for who has it on loan."""
+        return self._method
+
+    @property
+    def ours(self) -> bool:
+        """Something that we have begun may drive the motor."""
+        return self.armed or self._arming is not None or self.loan is not None
+
     # --- what a person asks for ---------------------------------------------------------------
 
     async def enable(self) -> str:
@@ -88,6 +118,8 @@ class Motion:
             return 'is enabled already'
         if self._arming is not None:
             raise DriveError('it is being enabled already')
+        if self.loan is not None:
+            raise DriveError(f'{self.loan.what} is going on: wait for its end, or stop it')
         self._arming = self._bus.current
         try:
             await self._arm()
@@ -124,6 +156,15 @@ class Motion:
             return f'stopped ({text})'
         coasts = await self._inverter.coasts_to_stop()
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
+
+    async def take_back(self) -> None:
+        """
+        Take back what was commanded on loan; control is kept.
+
+        :raises DriveError: the drive does not confirm that it stops; it is tried on and on.
+        """
+        self._withdrawal.begin()
+        await self._withdrawal.finish()
 
     async def quick_stop(self) -> str:
         """
@@ -191,7 +232,7 @@ class Motion:
         :raises DriveError: the drive does not confirm that it stops.
         """
         # a run command may be on its way, whoever has control at this moment
-        ours = self.armed or self.stopping or self._arming is not None
+        ours = self.ours or self.stopping
         stopped = await self.stop() if ours else ''
         if not await self._method.in_control(Priority.SERVICE):
             return stopped or 'control is not ours'
@@ -215,7 +256,7 @@ class Motion:
     def concerned(self) -> bool:
         """The motor runs by us, or may do so, or at least the bus has control of it."""
         seen = self._inverter.seen
-        ours = self.armed or self.stopping or self._arming is not None
+        ours = self.ours or self.stopping
         return ours or seen is None or seen.from_bus
 
     # --- what happens by itself ---------------------------------------------------------------
@@ -234,7 +275,7 @@ class Motion:
 
     def lost(self) -> None:
         """Take note that the drive does not answer any more."""
-        ours = self.armed or self._arming is not None
+        ours = self.ours
         self.disarm()
         if ours:
             self._withdrawal.begin()
@@ -250,7 +291,7 @@ class Motion:
             reason = self._why_disarmed(seen)
             if reason:
                 self.secure(reason)
-        elif self._arming is None and not self.stopping and seen.runs_by_bus:
+        elif not self.ours and not self.stopping and seen.runs_by_bus:
             self.secure('it runs under bus control although nobody enabled it')
 
     def secure(self, reason: str) -> None:
@@ -265,10 +306,12 @@ class Motion:
             self._tell(Severity.WARNING, f'stopped: {reason}; call ~/enable to go on')
 
     def disarm(self) -> None:
-        """Follow set-points no more; end an enable that is on its way."""
+        """Follow set-points no more; end an enable that is on its way, and a loan."""
         self._setpoint.disarm()
         if self._arming is not None and self._arming is not self._bus.current_or_none:
             self._bus.cancel(self._arming)
+        if self.loan is not None:
+            self.loan.recalled = True
 
     # --- how --------------------------------------------------------------------------------
 

@@ -38,6 +38,8 @@ def why_not(key: str, inverter: Inverter) -> str:
     settings = inverter.settings
     if settings.control_method == 'monitor':
         return 'control_method is monitor: this driver only reads'
+    if inverter.tuning:
+        return 'the drive is tuning: wait for its end, or stop it'
     if not key.startswith('serial.'):
         return ''
     if not settings.allow_communication_changes:

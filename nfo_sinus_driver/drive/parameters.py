@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
@@ -347,6 +348,36 @@ class Parameters:
         async with self._alone(wanted):
             await self._require_standstill(wanted)
             await self._writer.write_each(wanted, learn)
+
+    @contextlib.asynccontextmanager
+    async def left_to_the_drive(
+        self, keys: Collection[str]
+    ) -> AsyncIterator[Callable[[], Awaitable[tuple[Change, ...]]]]:
+        """
+        Let the drive change parameters itself while nobody else does.
+
+        :returns: what reads them again, and returns what has changed.
+        :raises LinkError: they cannot be read.
+        """
+        before = {key: await self._registers.read_words(key, Priority.SERVICE) for key in keys}
+
+        async def changes() -> tuple[Change, ...]:
+            found: list[Change] = []
+            for key, old in before.items():
+                words = await self._registers.read_words(key, Priority.SERVICE)
+                if key in self._words:
+                    self._learn(key, words, quiet=True)
+                if words != old:
+                    found.append(self.describe(key, self._writer.value(key, old), words))
+            self._wanted.follow({change.key: change.new for change in found})
+            return tuple(found)
+
+        async with self._alone(keys):
+            self._inverter.tuning = True
+            try:
+                yield changes
+            finally:
+                self._inverter.tuning = False
 
     @contextlib.asynccontextmanager
     async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:

@@ -151,6 +151,10 @@ class Registers:
         """Write a parameter as it shall stand in the drive, whatever its range."""
         await self._ask(self.address(key), priority, words, once)
 
+    async def read_from(self, address: Address, priority: Priority) -> Words:
+        """Read words from an address."""
+        return (await self._ask(address, priority, None, once=False)).words
+
     async def write_at(
         self, address: Address, words: Words, priority: Priority, *, once: bool = False
     ) -> None:

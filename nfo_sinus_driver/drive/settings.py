@@ -38,6 +38,11 @@ _REFERENCES = {
 #: The control modes by the names that ``expected_control_mode`` takes.
 CONTROL_MODES = ('Freque', 'PI-Reg', 'Torque', 'Speed')
 
+#: Why nothing is written in ``monitor``.
+MONITOR_REFUSAL = (
+    'control_method is monitor: this driver only reads; set control_method to mode_scmd'
+)
+
 _LONGEST_DRIVE_TIMEOUT = 25.0
 _MODBUS_ADDRESSES = range(1, 248)
 

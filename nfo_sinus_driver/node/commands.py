@@ -59,10 +59,10 @@ class Commands:
         # reentrant, for to disable must not wait for an enable that waits for a start delay
         group = ReentrantCallbackGroup()
         node.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
-        self._offer('~/stop', Drive.stop, _LONGEST_STOP)
-        self._offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
-        self._offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
-        self._offer(
+        self.offer('~/stop', Drive.stop, _LONGEST_STOP)
+        self.offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
+        self.offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
+        self.offer(
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
@@ -70,7 +70,9 @@ class Commands:
         """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
         self._told_idle_setpoint = quiet
 
-    def _offer(self, name: str, command: _Command, timeout: float) -> None:
+    def offer(self, name: str, command: _Command, timeout: float) -> None:
+        """Offer a service that answers when a command is done, or after a time-out, s."""
+
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             return self._answer(response, command, timeout)
 

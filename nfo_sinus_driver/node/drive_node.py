@@ -44,11 +44,13 @@ from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
+from nfo_sinus_driver.node.error_log import ErrorLogServices
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.settings import understood
+from nfo_sinus_driver.node.tuning import TuningServices
 
 #: How often autostart looks whether it should try, s.
 _AUTOSTART_PERIOD = 0.25
@@ -106,6 +108,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
         self._commands = Commands(self, line)
+        ErrorLogServices(self, self._commands)
+        self._tuning = TuningServices(self)
         self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
         self._autostarting = False
         self._autostart_complaint = ''

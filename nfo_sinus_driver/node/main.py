@@ -49,7 +49,7 @@ from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
-_GROUPS_OF_A_DRIVE = 10
+_GROUPS_OF_A_DRIVE = 16
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002

@@ -62,8 +62,6 @@ RUNNING = (
 
 #: SCMD codes that run the motor.
 RUN_COMMANDS = frozenset(code for code in Scmd if code & 1 and code < Scmd.FULL_TUNING)
-#: SCMD codes that tune: refused until tuning is simulated.
-TUNING_COMMANDS = frozenset({Scmd.FULL_TUNING, Scmd.BASIC_TUNING, Scmd.RS_MEASURE, Scmd.PAR_CALC})
 
 #: The references that do not come over the bus, as shares of the nominal value.
 TERMINAL_SHARE = 0.5

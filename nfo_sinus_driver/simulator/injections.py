@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 
 #: Stands for an argument that must be given.
 _REQUIRED: Any = object()
@@ -178,6 +179,13 @@ def _torn(target: Target, given: dict[str, Any]) -> None:
     target.one.tears += given['times']
 
 
+def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
+    runner = target.one.runner
+    if not isinstance(runner, G2Runner):
+        raise ValueError(f'{target.one.model.name} does not tune over the bus')
+    runner.fail_tuning(given['code'])
+
+
 def _load(target: Target, given: dict[str, Any]) -> None:
     target.one.motor.load = given['share']
 
@@ -243,6 +251,11 @@ VERBS: Mapping[str, Verb] = {
         'change the load of the motor',
         _load,
         (Argument('share', float, 'torque at nominal speed, 1 is the nominal torque'),),
+    ),
+    'tuning-fails': Verb(
+        'let the next tuning end with a fault',
+        _fail_tuning,
+        (Argument('code', int, 'InvSt code: 16 (TunFailP) or 17 (TunFailM)'),),
     ),
     'power-cycle': Verb(
         'take the mains away and give them back',

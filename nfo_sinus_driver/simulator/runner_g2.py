@@ -28,12 +28,12 @@ from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.catalog.inv_st import START_DELAY
+from nfo_sinus_driver.catalog.inv_st import TUNING
 from nfo_sinus_driver.simulator.control_source import RELEASED
 from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
 from nfo_sinus_driver.simulator.control_source import RUNNING
 from nfo_sinus_driver.simulator.control_source import STANDBY
 from nfo_sinus_driver.simulator.control_source import TERMINAL_SHARE
-from nfo_sinus_driver.simulator.control_source import TUNING_COMMANDS
 from nfo_sinus_driver.simulator.control_source import Source
 from nfo_sinus_driver.simulator.control_source import local_share
 from nfo_sinus_driver.simulator.faults import Faults
@@ -44,9 +44,13 @@ from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.runner import Runner
+from nfo_sinus_driver.simulator.runner import nameplate
 from nfo_sinus_driver.simulator.state_machine import Conditions
 from nfo_sinus_driver.simulator.state_machine import Phase
 from nfo_sinus_driver.simulator.state_machine import StateMachine
+from nfo_sinus_driver.simulator.tuning import FAILURES
+from nfo_sinus_driver.simulator.tuning import PROCEDURES
+from nfo_sinus_driver.simulator.tuning import Tuning
 
 #: The regulated quantity of each control mode; PI-Reg regulates the process by the frequency.
 _REGULATION_OF = {
@@ -67,8 +71,23 @@ _SOURCES: Mapping[int, Source] = {
 }
 
 
+#: What DriveStatus adds while it tunes: the motor has current, and nobody says what that shows as.
+_TUNING_STATUS = (
+    Status.READY_TO_SWITCH_ON
+    | Status.SWITCHED_ON
+    | Status.OP_ENABLED
+    | Status.VOLTAGE_ENABLED
+    | Status.QUICK_STOP_DISABLED
+    | Status.CTRL_FROM_NET
+)
+
+
 class G2Runner(Runner):
-    """Runs the motor of a G2."""
+    """
+    Runs the motor of a G2, and tunes it.
+
+    :ivar tuning: the procedure that is going on.
+    """
 
     # [M0 §8.3]
     setpoint_of: ClassVar[Mapping[int, str]] = {
@@ -86,6 +105,10 @@ class G2Runner(Runner):
         self.word = RELEASED
         self.refuses_writes_when_faulted = True  # [M0 §6.1.5]
         self._dc_brake_left = 0.0
+        self.tuning: Tuning | None = None
+        #: What InvSt says of the tuning that was finished, until the next command.
+        self._tuned = 0
+        self._next_failure = 0
 
     def restart(self) -> None:
         """Begin as after power-on."""
@@ -98,6 +121,18 @@ class G2Runner(Runner):
         self.scmd = Scmd.STOP
         self.word = RELEASED
         self._delay_left = None
+        self.tuning = None
+        self._tuned = 0
+
+    def fail_tuning(self, code: int) -> None:
+        """
+        Let the next tuning end with a fault.
+
+        :raises ValueError: none that a tuning ends with.
+        """
+        if code not in FAILURES:
+            raise ValueError(f'a tuning fails with {sorted(FAILURES)}, not with {code}')
+        self._next_failure = code
 
     def write(self, key: str, raw: int) -> bool:
         """Carry out MODE, SCMD, DriveControl or its mask."""
@@ -142,6 +177,7 @@ class G2Runner(Runner):
         source = _SOURCES.get(raw)
         if source is None:
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
+        self._refuse_when_tuning()
         if raw == Mode.STOP and self._faults.serial:
             self._faults.acknowledge_serial()
         else:
@@ -154,16 +190,51 @@ class G2Runner(Runner):
         self.refuse_when_faulted()
         if self.source.mode is not Mode.BUS:
             raise Refused(Reason.STATE, 'SCMD needs MODE = Bus')
-        if raw in TUNING_COMMANDS:
-            raise Refused(Reason.STATE, 'tuning is not simulated')
-        if raw == Scmd.ERASE_E_LOG:
+        if raw != Scmd.STOP:
+            self._refuse_when_tuning()
+        self.tuning, self._tuned = None, 0
+        if raw in PROCEDURES:
+            self._tune(raw)
+        elif raw == Scmd.ERASE_E_LOG:
             self._faults.log.clear()
         elif raw == Scmd.RESET_E_OUT:
             self._counters.e_out = 0.0
         elif raw in RUN_COMMANDS or raw == Scmd.STOP:
             self.command(Scmd(raw))
 
+    def _tune(self, raw: int) -> None:
+        if self._motor.driven or self._motor.turning:
+            raise Refused(Reason.STATE, 'tuning needs a motor that stands')
+        self.command(Scmd.STOP)
+        # as a run command without RUN, it leads to nothing
+        if self.run_input or not PROCEDURES[raw].measures:
+            self.tuning = Tuning.begun(raw)
+
+    def _refuse_when_tuning(self) -> None:
+        if self.tuning is not None:
+            raise Refused(Reason.STATE, 'tuning: MODE is Inhibit')
+
+    def _go_on_tuning(self, dt: float) -> None:
+        tuning = self.tuning
+        if tuning is None:
+            return
+        if self._faults or (tuning.procedure.measures and not self.run_input):
+            self.tuning = None
+            return
+        tuning.left -= dt
+        if tuning.left > 1e-9:
+            return
+        self.tuning = None
+        if self._next_failure:
+            code, self._next_failure = self._next_failure, 0
+            self._faults.trip(code, self._counters.op_time, cause_present=False)
+            return
+        self._tuned = tuning.procedure.done
+        tuning.store(self._memory)
+        self._motor.plate = nameplate(self._memory)
+
     def _write_control(self, word: Control) -> None:
+        self._refuse_when_tuning()
         # acknowledging goes this way, so a fault does not refuse it [M0 table 16, FAULTED]
         if self.machine.asks_reset(word):
             self._faults.acknowledge()
@@ -172,14 +243,20 @@ class G2Runner(Runner):
     def wait(self, dt: float) -> None:
         """Let the start delay and the DC braking before the start run."""
         super().wait(dt)
+        self._go_on_tuning(dt)
         if self.machine.phase is Phase.OPERATION_ENABLED:
             self._dc_brake_left = max(0.0, self._dc_brake_left - dt)
 
     @property
     def waiting(self) -> bool:
-        """Whether a start delay or DC braking runs."""
+        """Whether a start delay, DC braking or a tuning runs."""
         braking = self._dc_brake_left > 0 and self.machine.phase is Phase.OPERATION_ENABLED
-        return braking or super().waiting
+        return braking or self.tuning is not None or super().waiting
+
+    @property
+    def mode(self) -> int:
+        """What MODE reads."""
+        return super().mode if self.tuning is None else Mode.INHIBIT
 
     @property
     def settled(self) -> bool:
@@ -231,6 +308,10 @@ class G2Runner(Runner):
     @property
     def inv_st(self) -> int:
         """The inverter status while no fault stands [M0 table 19]."""
+        if self.tuning is not None:
+            return TUNING
+        if self._tuned:
+            return self._tuned
         code = super().inv_st
         still = code == _KEYPAD_RUNNING and self._motor.at_zero
         return _KEYPAD_STILL if still else code
@@ -243,6 +324,8 @@ class G2Runner(Runner):
     @property
     def status_word(self) -> Status:
         """DriveStatus [M0 table 15]."""
+        if self.tuning is not None:
+            return _TUNING_STATUS
         status = self.machine.status()
         if self.source in (Source.SCMD, Source.CONTROL_WORD):
             status |= Status.CTRL_FROM_NET

@@ -30,6 +30,7 @@ _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
 _DRIVE = 'nfo_sinus_driver/drive/drive.py'
 _WATCH = 'nfo_sinus_driver/drive/watch.py'
 _WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
+_TUNING = 'test/unit/drive/test_tuning.py'
 _METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
@@ -96,6 +97,22 @@ MUTANTS = (
         '                self._motion.lost()',
         '                pass',
         (_NO_RESTART, '-k', 'line_gone'),
+    ),
+    Mutant(
+        2,
+        'the motor is enabled while it is being tuned',
+        _MOTION,
+        '        if self.loan is not None:\n            raise',
+        '        if False:\n            raise',
+        (_TUNING, '-k', 'two_at_a_time'),
+    ),
+    Mutant(
+        2,
+        'a tuning is taken for a motor that nobody enabled',
+        _MOTION,
+        'self._arming is not None or self.loan is not None',
+        'self._arming is not None',
+        (_TUNING, '-k', 'take_over'),
     ),
     Mutant(
         2,

@@ -24,6 +24,7 @@ import os
 from pathlib import Path
 import shutil
 import signal
+import socket
 import subprocess
 import threading
 import time
@@ -53,6 +54,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
+from ways import Way
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
@@ -60,7 +62,6 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 PATIENCE = 40.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
-BAUD_RATE = 57600
 
 TOPICS = {
     'status': (DriveStatus, 10),
@@ -156,10 +157,18 @@ _watched: list[Process] = []
 class Bench(contextlib.ExitStack):
     """A simulated line, drivers on it and a client, all in one ROS domain."""
 
-    def __init__(self, domain: int, folder: Path) -> None:
+    def __init__(self, domain: int, folder: Path, way: Way) -> None:
         super().__init__()
         self.folder = folder
-        self.port = str(folder / 'line')
+        self.way = way
+        #: What `Simulator` is told of the line, by the names of its arguments.
+        self.line: dict[str, Any] = {**way.simulator, 'control': str(folder / 'control')}
+        if way.protocol == 'modbus_tcp':
+            number = self.enter_context(_reserved())
+            self.port = f'127.0.0.1:{number}'
+            self.line['tcp'] = number
+        else:
+            self.port = self.line['link'] = str(folder / 'line')
         self.trace = folder / 'trace.jsonl'
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
         self.domain = domain
@@ -167,17 +176,19 @@ class Bench(contextlib.ExitStack):
 
     def simulator(self, *arguments: str, paced: bool = True) -> Simulated:
         """Start a simulated line, as slow as a real one if paced; return what looks into it."""
-        command = [_executable('simulator'), '--link', self.port, '--baud', str(BAUD_RATE)]
-        command += ['--trace', str(self.trace), *(['--paced'] if paced else []), *arguments]
+        command = [_executable('simulator'), '--trace', str(self.trace)]
+        command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
+        command += [*(['--paced'] if paced else []), *arguments]
         process = Process(command, self._environment, self.folder / 'simulator.log')
         self.callback(process.end)
         wait_until(lambda: 'serving' in process.text or not process.running, 'the simulator')
         assert process.running, process.text
-        return self.enter_context(Simulated.at_link(self.port))
+        return self.enter_context(Simulated(self.line['control']))
 
     def driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
         """Start a driver on the line; ``-p name:=value`` arguments may follow."""
-        settings = ('-p', f'port:={self.port}', '-p', f'baud_rate:={BAUD_RATE}')
+        given = {'port': self.port, **self.way.driver}
+        settings = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
         return self.bare_driver(*settings, *arguments, through=through)
 
     def bare_driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
@@ -357,6 +368,15 @@ class Client(contextlib.ExitStack):
 def seconds(stamp: Time) -> float:
     """Return a time stamp as a number."""
     return stamp.sec + stamp.nanosec * 1e-9
+
+
+@contextlib.contextmanager
+def _reserved() -> Iterator[int]:
+    """Have the number of a TCP port that nobody else is given, and that can yet be served."""
+    with socket.socket() as claim:
+        claim.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        claim.bind(('127.0.0.1', 0))
+        yield claim.getsockname()[1]
 
 
 def _no_traceback(process: Process) -> None:

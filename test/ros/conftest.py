@@ -22,6 +22,10 @@ from pathlib import Path
 
 from bench import Bench
 import pytest
+from ways import DEFAULT
+from ways import WAYS
+from ways import Way
+from ways import why_not
 
 from nfo_sinus_driver.node.domain import own_domain
 
@@ -29,6 +33,32 @@ from nfo_sinus_driver.node.domain import own_domain
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # a field of a wrong type is an exception then, and not the end of the process
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        '--way', default=DEFAULT, choices=WAYS, help='into the drive, for the tests of test/ros'
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line('markers', 'needs(*features): of the way in, see ways.py')
+
+
+@pytest.fixture(scope='session')
+def way(request: pytest.FixtureRequest) -> Way:
+    """Return the way in that the tests are run over."""
+    # the option is not there where the folder above is given
+    return WAYS[request.config.getoption('--way', DEFAULT)]
+
+
+@pytest.fixture(autouse=True)
+def _makes_sense(request: pytest.FixtureRequest, way: Way) -> None:
+    """Skip a test that the way has nothing for."""
+    for marker in request.node.iter_markers('needs'):
+        reason = why_not(way, marker.args)
+        if reason:
+            pytest.skip(reason)
 
 
 @pytest.fixture
@@ -39,7 +69,7 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def bench(domain: int, tmp_path: Path) -> Iterator[Bench]:
+def bench(domain: int, tmp_path: Path, way: Way) -> Iterator[Bench]:
     """Return a bench on which nothing runs yet."""
-    with Bench(domain, tmp_path) as bench:
+    with Bench(domain, tmp_path, way) as bench:
         yield bench

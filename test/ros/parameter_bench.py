@@ -18,14 +18,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping
 import contextlib
+from dataclasses import dataclass
 import json
-from pathlib import Path
+import re
 from typing import Any
-from typing import NamedTuple
 from typing import TypeAlias
 
-from bench import BAUD_RATE
 from bench import Bench
 from bench import Client
 from bench import Process
@@ -43,6 +43,15 @@ Value: TypeAlias = float | int | str | bool
 
 #: Every setting that has a register, by the name of its ROS parameter.
 SETTINGS = {ends.name: ends for ends in ENDS if ends.register is not None}
+#: Those whose ends or steps are others on Classic, and those that the older firmware has not.
+OTHER_ON_CLASSIC = frozenset({
+    'motor.p_nom', 'motor.i_nom', 'motor.cos_phi', 'motor.r_stat', 'motor.r_rot', 'motor.l_main',
+    'motor.i_magn', 'motor.i_limt', 'control.accel', 'control.retard', 'control.kp_spd',
+    'control.f_sleep', 'serial.address', 'error.short_c_err_cnt', 'serial.bus_type',
+    'serial.si_prot',
+})
+#: The one setting that has no register: Classic alone reaches it.
+ANY_BUS = 'control.any_bus'
 #: Little else is on the line, so that it is quick.
 QUIET = ('-p', 'poll_rate:=10', '-p', 'telemetry_rate:=0')
 
@@ -51,21 +60,39 @@ _PERIOD = 0.001
 _READING = (3, 17, 43)
 _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
+#: MODE, SCMD and the set-point: their Classic names [M0 §6.1], and their registers.
+_COMMANDS = {'E0029': 0x0294, 'E00AD': 0x0298, 'E001E': 0x03FC}
 
 
-class Write(NamedTuple):
-    """A request to write that arrived at a drive; its words as on the line, the low one first."""
+@dataclass(frozen=True, eq=False)
+class Write:
+    """
+    A request to write that arrived at a drive; its words as on Modbus, the low one first.
+
+    Of a setting that came by Classic the words are not told: its steps are others. Such a write is
+    like any to the same register.
+    """
 
     unit: int
     register: int
-    words: tuple[int, ...]
+    words: tuple[int, ...] | None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Write):
+            return NotImplemented
+        same = (self.unit, self.register) == (other.unit, other.register)
+        return same and (None in (self.words, other.words) or self.words == other.words)
+
+    def __lt__(self, other: Write) -> bool:
+        return (self.unit, self.register) < (other.unit, other.register)
 
 
 class Wire:
     """Reads what a trace has of requests to write, by hand and without the catalog."""
 
-    def __init__(self, trace: Path) -> None:
-        self._trace = trace
+    def __init__(self, bench: Bench) -> None:
+        self._trace = bench.trace
+        self._written = _WRITTEN[bench.way.protocol]
         self._read = 0
 
     def writes(self) -> list[Write]:
@@ -77,11 +104,11 @@ class Wire:
         text = text[: text.rfind(b'\n') + 1]
         self._read += len(text)
         frames = (json.loads(line) for line in text.splitlines() if b'"request"' in line)
-        writes = (_written(bytes.fromhex(frame['hex'])) for frame in frames)
+        writes = (self._written(bytes.fromhex(frame['hex'])) for frame in frames)
         return [write for write in writes if write is not None]
 
 
-def _written(data: bytes) -> Write | None:
+def _modbus(data: bytes) -> Write | None:
     unit, function = data[:2]
     if function in _READING:
         return None
@@ -94,6 +121,26 @@ def _written(data: bytes) -> Write | None:
         assert len(payload) == data[6] == 2 * (data[4] << 8 | data[5]), data.hex()
     words = (payload[at] << 8 | payload[at + 1] for at in range(0, len(payload), 2))
     return Write(unit, register, tuple(words))
+
+
+def _classic(data: bytes) -> Write | None:
+    select = re.fullmatch(rb'\x04(.)\x02(E....)=(....)\x03.', data, re.DOTALL)
+    if select is None:
+        return None
+    unit, name, word = select[1][0] - 0x20, select[2].decode(), int(select[3], 16)
+    if name in _COMMANDS:
+        return Write(unit, _COMMANDS[name], (word,))
+    # of two words the first stands for both
+    registers = [ends.register for ends in SETTINGS.values() if ends.classic[0] == name]
+    return Write(unit, registers[0], None) if registers else None
+
+
+_WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
+    'modbus_rtu': _modbus,
+    'modbus_ascii': lambda data: _modbus(bytes.fromhex(data[1:].decode())),
+    'modbus_tcp': lambda data: _modbus(data[6:]),
+    'classic': _classic,
+}
 
 
 def written(name: str, words: tuple[int, ...], unit: int = 1) -> Write:
@@ -153,9 +200,7 @@ class Stubborn(contextlib.ExitStack):
 
     def __init__(self, bench: Bench, **settings: Value) -> None:
         super().__init__()
-        self.simulator = Simulator(
-            link=bench.port, baud=BAUD_RATE, trace=str(bench.trace), settings=settings
-        )
+        self.simulator = Simulator(**bench.line, trace=str(bench.trace), settings=settings)
         self.drive: SimulatedDrive = self.simulator.drives[1]
 
     def __enter__(self) -> Stubborn:

@@ -68,7 +68,7 @@ def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -
         answer = everybody.call('disable_all')
     assert not answer.success
     assert answer.message.startswith('right: the stop is NOT confirmed'), answer.message
-    assert 'left: stopping' in answer.message
+    assert 'left: stop' in answer.message
     wait_until(lambda: not simulator.state(1)['turning'], 'it stands')
     answer = everybody.call('enable_all')
     assert not answer.success

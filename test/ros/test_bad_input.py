@@ -26,7 +26,6 @@ import sys
 import time
 
 from bench import A_WHILE
-from bench import BAUD_RATE
 from bench import PATIENCE
 from bench import Bench
 from bench import Client
@@ -330,18 +329,19 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     bench: Bench, section: str, renames: list[str], namespace: str
 ) -> None:
     drive = bench.simulator('--address', '3')
+    baud_rate = bench.way.baud_rate
     parameters = bench.folder / 'named.yaml'
     parameters.write_text(
         '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
         '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
-        f'{section}: {{ros__parameters: {{port: {bench.port}, baud_rate: {BAUD_RATE}, '
+        f'{section}: {{ros__parameters: {{port: {bench.port}, baud_rate: {baud_rate}, '
         'address: 3, response_timeout: 0.5}}\n'
     )
     driver = bench.bare_driver(*renames, '--params-file', str(parameters))
     client = bench.client(f'{namespace}/belt').connected()
     assert client.parameter('address') == 3
     bus_node = bench.client(f'{namespace}/nfo_sinus_bus')
-    wanted = {'port': bench.port, 'baud_rate': BAUD_RATE, 'response_timeout': 0.5, 'retries': 4}
+    wanted = {'port': bench.port, 'baud_rate': baud_rate, 'response_timeout': 0.5, 'retries': 4}
     assert {name: bus_node.parameter(name) for name in wanted} == wanted
     assert 'was given to' not in driver.text, 'nothing was given in vain'
     assert client.enable().success

@@ -25,6 +25,9 @@ from bench import wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 import pytest
+from ways import needs
+
+pytestmark = needs('rtu')
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 _SERIAL = '0123456789ABCDEF'

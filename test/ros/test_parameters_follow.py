@@ -24,6 +24,7 @@ from bench import Bench
 from bench import Client
 from bench import holds_for
 from bench import wait_until
+from parameter_bench import ANY_BUS
 from parameter_bench import QUIET
 from parameter_bench import SETTINGS
 from parameter_bench import Stubborn
@@ -34,6 +35,7 @@ from parameter_bench import set_one
 from parameter_bench import values
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
+from ways import needs
 
 
 def _listening(bench: Bench, name: str = '/nfo_sinus') -> Client:
@@ -57,7 +59,7 @@ def test_a_change_at_the_keypad_shows_and_is_told_once(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
     driver = bench.driver(*QUIET)
     client = _listening(bench)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     drive.inject('set', 'control.retard', 7.5)
     drive.inject('set', 'error.cur_low_mode', 'Alarm')
     wait_until(
@@ -79,10 +81,11 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
     bench.driver(*QUIET)
     client = _listening(bench)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     unchanged = client.call('refresh_parameters')
     assert unchanged.success
-    assert unchanged.message == '119 parameters read, changed: none'
+    count = len(client.parameter_names() & {*SETTINGS, ANY_BUS})
+    assert unchanged.message == f'{count} parameters read, changed: none'
     drive.inject('set', 'freque.f_fix7', 44.5)
     drive.inject('set', 'control.auto_start', True)
     answer = client.call('refresh_parameters')
@@ -102,6 +105,7 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     assert wire.writes() == []
 
 
+@needs('fine')
 def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     stubborn = bench.enter_context(Stubborn(bench))
     memory = stubborn.drive.memory
@@ -111,7 +115,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     memory.put('speed.op_mode', 193)
     driver = bench.driver(*QUIET)
     client = _listening(bench)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     shown = values(client, 'freque.f_fix1', 'control.accel', 'speed.op_mode')
     assert shown == {
         'freque.f_fix1': 200.0, 'control.accel': 0.0, 'speed.op_mode': '193'

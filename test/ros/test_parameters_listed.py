@@ -31,6 +31,7 @@ import pytest
 from rcl_interfaces.srv import DescribeParameters
 from support.parameter_ends import Ends
 from unit.catalog import setting_names
+from ways import needs
 
 ROWS = [line.split(',') for line in setting_names.SETTINGS.splitlines() if line]
 #: The name in the manual, by the name of the ROS parameter.
@@ -59,11 +60,12 @@ def _listed(client: Client) -> set[str]:
     return {name for name in names if name.partition('.')[0] in GROUPS and '.' in name}
 
 
+@needs('modbus')
 def test_every_setting_that_modbus_reaches_is_there_and_described(bench: Bench) -> None:
     bench.simulator(paced=False)
     bench.driver(*QUIET)
     client = bench.client().connected()
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     assert len(MANUAL) == 120
     assert len(SETTINGS) == 119
     assert _listed(client) == set(SETTINGS) == set(MANUAL) - {'control.any_bus'}
@@ -80,13 +82,14 @@ def test_every_setting_that_modbus_reaches_is_there_and_described(bench: Bench) 
     assert wire.writes() == [], 'listing them is no reason to write'
 
 
+@needs('modbus')
 def test_any_bus_has_no_register_and_is_not_there(bench: Bench) -> None:
     bench.simulator(paced=False)
     driver = bench.driver(*QUIET, '-p', 'control.any_bus:=PPO3')
     client = bench.client().connected()
     assert 'control.any_bus' not in _listed(client)
     says_once(driver, 'this drive has no control.any_bus: not applied')
-    assert Wire(bench.trace).writes() == []
+    assert Wire(bench).writes() == []
 
 
 def _complaints(shown: Any, ends: Ends) -> Iterator[str]:

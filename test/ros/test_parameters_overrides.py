@@ -75,7 +75,7 @@ def _again(client: Client) -> None:
 
 def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     driver = bench.driver(
         *QUIET,
         *_given(
@@ -146,14 +146,14 @@ def test_apply_parameters_false_only_reports(bench: Bench) -> None:
     assert client.parameter('control.accel') == 5.0
     _again(client)
     assert client.parameter('control.accel') == 5.0
-    assert Wire(bench.trace).writes() == []
+    assert Wire(bench).writes() == []
 
 
 def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     # it runs by its terminals from power-up on
     drive = bench.simulator('--set', 'control.auto_start=ON', paced=False)
     drive.wait_for(lambda state: state['turning'], 20.0)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     driver = bench.driver(*QUIET, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
     client = bench.client().connected()
     assert wire.writes() == [written('control.accel', (6000, 0))]
@@ -169,7 +169,7 @@ def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -
     wait_until(lambda: 'does not exist' in driver.text, 'there is nobody yet')
     bench.simulator(paced=False)
     client = bench.client().connected()
-    assert Wire(bench.trace).writes() == [written('control.accel', (6000, 0))]
+    assert Wire(bench).writes() == [written('control.accel', (6000, 0))]
     assert client.parameter('control.accel') == 6.0
     says_once(driver, 'control.acel was given')
     assert 'did you mean control.accel' in driver.text
@@ -178,7 +178,7 @@ def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -
 @pytest.mark.parametrize('allowed', [False, True])
 def test_communication_settings_need_permission_in_a_file_too(bench: Bench, allowed: bool) -> None:
     bench.simulator(paced=False)
-    wire = Wire(bench.trace)
+    wire = Wire(bench)
     driver = bench.driver(
         *QUIET,
         *_given(

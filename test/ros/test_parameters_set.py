@@ -22,6 +22,7 @@ from typing import Any
 
 from bench import Bench
 from bench import Client
+from parameter_bench import ANY_BUS
 from parameter_bench import QUIET
 from parameter_bench import SETTINGS
 from parameter_bench import Value
@@ -33,6 +34,8 @@ from parameter_bench import set_one
 from parameter_bench import values
 from parameter_bench import written
 import pytest
+from ways import Way
+from ways import needs
 
 from nfo_sinus_driver.node.domain import own_domain
 
@@ -48,7 +51,7 @@ class Rig:
         self.drive = bench.simulator(paced=False)
         self.driver = bench.driver(*QUIET)
         self.client: Client = bench.client().connected()
-        self.wire = Wire(bench.trace)
+        self.wire = Wire(bench)
 
     def begin(self) -> None:
         """Have the drive and the driver as they were at first."""
@@ -70,8 +73,8 @@ class Rig:
 
 
 @pytest.fixture(scope='module')
-def the_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('set')) as bench:
+def the_rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('set'), way) as bench:
         yield Rig(bench)
 
 
@@ -164,7 +167,10 @@ def test_what_cannot_be_meant_is_refused_and_nothing_moves(
     assert rig.both() == before
 
 
-@pytest.mark.parametrize('name', ['control.acel', 'control.any_bus', 'status.frq_act', 'accel'])
+@pytest.mark.parametrize(
+    'name',
+    ['control.acel', pytest.param(ANY_BUS, marks=needs('modbus')), 'status.frq_act', 'accel'],
+)
 def test_a_name_that_is_none_is_refused(rig: Rig, name: str) -> None:
     refused(set_one(rig.client, name, 1.0), f'{name}: there is no such parameter')
     assert rig.wire.writes() == []

@@ -37,6 +37,7 @@ from parameter_bench import values
 from parameter_bench import written
 import pytest
 from std_srvs.srv import Trigger
+from ways import needs
 
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -71,7 +72,7 @@ def client(bench: Bench, stubborn: Stubborn) -> Client:
 
 @pytest.fixture
 def wire(bench: Bench, client: Client) -> Wire:
-    return Wire(bench.trace)
+    return Wire(bench)
 
 
 def _refusing(name: str, reason: Reason) -> Callable[[str, str], None]:
@@ -85,7 +86,13 @@ def _refusing(name: str, reason: Reason) -> Callable[[str, str], None]:
 # --- what the drive says ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('reason', list(Reason))
+@pytest.mark.parametrize(
+    'reason',
+    [
+        pytest.param(reason, marks=needs('modbus') if reason is Reason.FUNCTION else ())
+        for reason in Reason
+    ],
+)
 def test_what_was_written_before_a_refusal_is_put_back(
     stubborn: Stubborn, client: Client, wire: Wire, reason: Reason
 ) -> None:
@@ -131,6 +138,7 @@ def test_what_cannot_be_put_back_is_named_and_shown(stubborn: Stubborn, client: 
     assert client.parameter('control.accel') == 6.0
 
 
+@needs('fine')
 def test_a_value_that_the_drive_alters_is_put_back(
     stubborn: Stubborn, client: Client, wire: Wire
 ) -> None:

@@ -21,10 +21,13 @@ import signal
 from bench import Bench
 from lifecycle_msgs.msg import Transition
 from support.trace_laws import violations
+from ways import needs
 
 from nfo_sinus_driver.link import LineSettings
 
 _BAUD_RATE = 19200
+
+pytestmark = needs('rtu')
 
 
 def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:

@@ -22,6 +22,9 @@ from bench import Bench
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from ways import needs
+
+pytestmark = needs('rtu')
 
 _STOP = bytes.fromhex('010602980000')
 _RESPONSE_TIMEOUT = 0.2

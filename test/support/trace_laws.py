@@ -20,6 +20,7 @@ from collections.abc import Iterator
 import struct
 from typing import Any
 
+from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import Mode
@@ -135,6 +136,10 @@ def _parameters(model: str) -> Iterator[tuple[int, int]]:
         if Protocol.MODBUS in parameter.places:
             place = parameter.place(Protocol.MODBUS)
             yield place.address, place.words
+    if model == 'sinus_g2':
+        area = ERROR_LOG[Protocol.MODBUS]
+        for entry in range(area.entries):
+            yield area.address(entry), area.TYPE.words
 
 
 _PARAMETERS = {model: frozenset(_parameters(model)) for model in MODELS}

@@ -99,6 +99,27 @@ def test_get_names_what_is_not_there(nfo: Nfo) -> None:
     assert 'control.retard' not in done.err.split('did you mean')[0]
 
 
+def test_errors(nfo: Nfo, bench: Bench) -> None:
+    assert nfo('errors').out == 'the error log is empty\n'
+    for code in (5, 12):
+        bench.simulator.inject('fault', code, address=1)
+    done = nfo('errors')
+    assert done.status == 0 and done.err == ''
+    assert [line.split(maxsplit=3) for line in done.out.splitlines()] == [
+        ['1234.5', 'h', '12', 'Cur High  0.0 operating hours ago'],
+        ['1234.5', 'h', '5', 'Overload  0.0 operating hours ago'],
+    ]
+    (newest,) = json.loads(nfo('errors', '--count', 1, '--json').out)
+    assert newest == {'code': 12, 'text': 'Cur High', 'operating_time': 1234.5, 'age': 0.0}
+    assert bench.writes() == []
+
+
+def test_errors_of_a_model_that_tells_none(nfo: Nfo) -> None:
+    done = nfo('errors', '--model', 'sinus_optimal')
+    assert done.status == 1 and done.out == ''
+    assert 'not documented' in done.err
+
+
 def test_options_stand_before_and_behind_the_verb(nfo: Nfo, bench: Bench) -> None:
     bench.set('control.accel', 7.5, address=2)
     assert '7.5' in nfo('--address', 2, 'get', 'control.accel').out

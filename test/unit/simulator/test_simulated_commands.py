@@ -18,7 +18,6 @@ import pytest
 
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
-from nfo_sinus_driver.simulator.control_source import TUNING_COMMANDS
 from nfo_sinus_driver.simulator.refusal import Reason
 
 # ---- MODE ----
@@ -161,13 +160,6 @@ def test_every_run_command_has_its_reference(bench, code, frequency):
 
 def test_all_run_commands_are_known():
     assert len(RUN_COMMANDS) == 19
-
-
-@pytest.mark.parametrize('code', sorted(TUNING_COMMANDS))
-def test_tuning_is_refused_for_now(bench, code):
-    bench.mode(3)
-    with bench.refuses(Reason.STATE):
-        bench.scmd(code)
 
 
 def test_erasing_the_error_log_and_resetting_the_energy(bench):

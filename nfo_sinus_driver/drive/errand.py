@@ -1,0 +1,163 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a drive does on an SCMD while its motor stands: tune, erase, reset [M0 table 18]."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+import contextlib
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.motion import Loan
+from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
+from nfo_sinus_driver.link import LinkError
+
+
+class Errands:
+    """
+    Sends one drive on errands; used on the bus alone.
+
+    :param motion: who commands the drive else; ``None`` if this driver only reads.
+    """
+
+    def __init__(
+        self, bus: Bus, inverter: Inverter, registers: Registers, motion: Motion | None
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._registers = registers
+        self._motion = motion
+
+    def require(self, what: str) -> Motion:
+        """
+        Return who lends the drive for an errand.
+
+        :param what: the errand, in words that go before "needs SCMD".
+        :raises DriveError: the drive has no such errand, or its control method is another.
+        """
+        if self._motion is None:
+            raise DriveError(MONITOR_REFUSAL)
+        inverter = self._inverter
+        if not inverter.connected:
+            raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
+        if not inverter.has('fieldbus.scmd'):
+            raise DriveError(
+                f'{what} is not known of this model ({inverter.model.name}): [M1] lists no command '
+                'for it; do it at the keypad'
+            )
+        if inverter.settings.control_method != 'mode_scmd':
+            raise DriveError(
+                f'{what} needs SCMD, and one session does not mix control methods: '
+                'clean up, set control_method to mode_scmd and configure again'
+            )
+        self._require_idle(what, self._motion)
+        return self._motion
+
+    @contextlib.asynccontextmanager
+    async def sent(self, what: str) -> AsyncIterator[Loan]:
+        """
+        Take control of a drive whose motor stands, and give it back as it was found.
+
+        A drive that its keypad or terminals control is not taken: giving it back to them could
+        start the motor [C43].
+
+        :raises DriveError: it cannot be had, and why.
+        """
+        motion = self.require(what)
+        motion.loan = loan = Loan(what)
+        try:
+            found = await self._take(what, motion)
+            try:
+                yield loan
+            except Exception:
+                # who asked is told what went wrong first; what comes of it is logged
+                with contextlib.suppress(DriveError, LinkError):
+                    await self._give_back(motion, found)
+                raise
+            await self._give_back(motion, found)
+        finally:
+            motion.loan = None
+
+    async def recall(self) -> str:
+        """
+        End what the drive does on an errand; anything else goes on.
+
+        :raises DriveError: the drive does not confirm it; it is tried on and on.
+        """
+        if self._motion is None or self._motion.loan is None:
+            return ''
+        return await self._motion.stop()
+
+    async def tell(self, command: Scmd) -> None:
+        """Write SCMD; once, for nobody knows what has happened before a second one."""
+        await self._registers.write('fieldbus.scmd', command, Priority.SERVICE, once=True)
+
+    @staticmethod
+    def _require_idle(what: str, motion: Motion) -> None:
+        if motion.loan is not None:
+            raise DriveError(f'{what}: {motion.loan.what} is going on already')
+        if motion.ours:
+            raise DriveError(f'{what}: the motor is enabled: stop it first')
+        # a fault that holds the stop is told of later, with what to do
+        if motion.stopping and not motion.held_by_fault:
+            raise DriveError(f'{what}: a stop is not confirmed yet')
+
+    async def _take(self, what: str, motion: Motion) -> Mode:
+        inverter = self._inverter
+        seen = await inverter.look(Priority.SERVICE)
+        if seen.faulted:
+            fault = inverter.model.inv_st(seen.code)
+            raise DriveError(
+                f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
+                'then call ~/fault_ack'
+            )
+        mode = int(await self._registers.read_number('fieldbus.mode', Priority.SERVICE))
+        if mode == Mode.INHIBIT:
+            raise DriveError(
+                f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
+                'Inhibit)'
+            )
+        if seen.driven:
+            raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')
+        if mode not in (Mode.STOP, Mode.BUS):
+            raise DriveError(
+                f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
+                'back to them could start the motor: press STOP at the drive first'
+            )
+        await motion.method.take_control()
+        deadline = time.monotonic() + withdrawal.PATIENCE
+        while not (await inverter.look(Priority.SERVICE)).standby:
+            if time.monotonic() > deadline:
+                with contextlib.suppress(DriveError, LinkError):
+                    await self._give_back(motion, Mode(mode))
+                raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
+            await self._bus.sleep(withdrawal.LOOK_PERIOD)
+        return Mode(mode)
+
+    async def _give_back(self, motion: Motion, found: Mode) -> None:
+        """Take the command back, and control too where nobody had it; not while a fault stands."""
+        await motion.take_back()
+        if found is Mode.STOP and not motion.held_by_fault:
+            await motion.method.release()

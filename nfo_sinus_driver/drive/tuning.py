@@ -1,0 +1,158 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Tuning: the drive measures its motor, or calculates what it should be [M0 table 18]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import enum
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog.inv_st import TUNED
+from nfo_sinus_driver.catalog.inv_st import TUNING
+from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.motion import Loan
+from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.snapshot import Severity
+
+#: How often the drive is asked how far it is; the polls go on beside it, s.
+_LOOK_PERIOD = 0.05
+#: Longer than any tuning takes; a drive that is still at it then is stopped, s.
+_LONGEST = 900.0
+#: What the motor plate says; a drive cannot tune without.
+_PLATE = ('p_nom', 'u_nom', 'f_nom', 'n_nom', 'i_nom', 'cos_phi')
+
+
+class Procedure(enum.Enum):
+    """What can be tuned; the order is that of the action Tune."""
+
+    FULL = 'full tuning'
+    BASIC = 'basic tuning'
+    STATOR_RESISTANCE = 'stator resistance measurement'
+    CALCULATE = 'parameter calculation'
+
+
+_COMMANDS = {
+    Procedure.FULL: Scmd.FULL_TUNING,
+    Procedure.BASIC: Scmd.BASIC_TUNING,
+    Procedure.STATOR_RESISTANCE: Scmd.RS_MEASURE,
+    Procedure.CALCULATE: Scmd.PAR_CALC,
+}
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """
+    How a procedure ended.
+
+    :ivar success: the drive says that it has finished.
+    :ivar text: what the drive says, or what went wrong and what to do.
+    :ivar changes: the parameters that are others now, whether it has finished or not.
+    """
+
+    success: bool
+    text: str
+    changes: tuple[Change, ...]
+
+    def __str__(self) -> str:
+        changed = ', '.join(str(change) for change in self.changes) or 'no parameter'
+        return f'{self.text}; changed: {changed}'
+
+
+class Tuning:
+    """Has one drive tune; used on the bus alone."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        inverter: Inverter,
+        registers: Registers,
+        parameters: Parameters,
+        errands: Errands,
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._registers = registers
+        self._parameters = parameters
+        self._errands = errands
+
+    async def tune_now(self, procedure: Procedure) -> Tuned:
+        """
+        Have the drive tune, wait for the end, and read what it changed.
+
+        The motor gets current and may turn, whatever the set-point is.
+
+        :raises DriveError: it was not begun, and why; or nobody knows how it ended.
+        """
+        what = procedure.value
+        self._errands.require(what)
+        await self._require_motor_plate(what)
+        keys = [key for key in self._parameters.available() if key.startswith('motor.')]
+        async with self._parameters.left_to_the_drive(keys) as changes:
+            async with self._errands.sent(what) as loan:
+                self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
+                await self._errands.tell(_COMMANDS[procedure])
+                success, text = await self._outcome(what, loan)
+            result = Tuned(success, text, await changes())
+        grave = Severity.INFO if success else Severity.ERROR
+        self._inverter.tell(grave, str(result))
+        return result
+
+    async def _require_motor_plate(self, what: str) -> None:
+        for name in _PLATE:
+            key = f'motor.{name}'
+            if not await self._registers.read_number(key, Priority.SERVICE) > 0:
+                raise DriveError(f'{what} needs {key}: set it as the motor plate says')
+
+    async def _outcome(self, what: str, loan: Loan) -> tuple[bool, str]:
+        """Wait until the drive says how it ended."""
+        inverter = self._inverter
+        started = time.monotonic()
+        begun = False
+        while True:
+            seen = await inverter.look(Priority.POLL)
+            elapsed = time.monotonic() - started
+            told = inverter.describe()
+            if seen.faulted:
+                fault = inverter.model.inv_st(seen.code)
+                hint = f'{fault.description}. {fault.remedy}; call ~/fault_ack first'
+                return False, f'{what} failed, {told}: {hint}'
+            if seen.code in TUNED:
+                return True, f'{what} finished ({told})'
+            if seen.code == TUNING:
+                begun = True
+            elif loan.recalled:
+                return False, f'{what} was stopped before it was finished ({told})'
+            elif begun:
+                return False, (
+                    f'{what} ended, and the drive does not say that it has finished ({told}): '
+                    'was the RUN input lost, or STOP pressed?'
+                )
+            elif elapsed > withdrawal.PATIENCE:
+                return False, (
+                    f'{what} does not begin ({told}): is its RUN input (DIN1) active?'
+                )
+            if elapsed > _LONGEST:
+                raise DriveError(f'{what} has no end ({told}): stopping it')
+            await self._bus.sleep(_LOOK_PERIOD)

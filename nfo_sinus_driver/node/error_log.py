@@ -1,0 +1,77 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The services of one drive that look after its error log and its kWh counter."""
+
+from __future__ import annotations
+
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import TYPE_CHECKING
+
+from nfo_sinus_msgs.msg import ErrorLogEntry
+from nfo_sinus_msgs.srv import GetErrorLog
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.commands import Commands
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: A busy line has many other things to do, s.
+_LONGEST = 60.0
+
+
+class ErrorLogServices:
+    """Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``."""
+
+    def __init__(self, node: DriveNode, commands: Commands) -> None:
+        self._node = node
+        node.create_service(
+            GetErrorLog,
+            '~/get_error_log',
+            self._on_get,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        commands.offer('~/erase_error_log', Drive.erase_error_log, _LONGEST)
+        commands.offer('~/reset_energy', Drive.reset_energy, _LONGEST)
+
+    def _on_get(
+        self, request: GetErrorLog.Request, response: GetErrorLog.Response
+    ) -> GetErrorLog.Response:
+        try:
+            entries = self._node.drive.error_log(request.max_entries).result(_LONGEST)
+        except DriveError as error:
+            response.message = str(error)
+        except FutureTimeoutError:
+            response.message = f'the bus did not get to it within {_LONGEST:g} s'
+        except Exception as error:
+            # an exception that leaves a service callback would end the executor
+            self._node.get_logger().error(f'error in a service: {error!r}')
+            response.message = f'error in the driver: {error}'
+        else:
+            response.entries = [
+                ErrorLogEntry(
+                    code=entry.code,
+                    text=entry.text,
+                    operating_time=entry.operating_time,
+                    age=entry.age,
+                )
+                for entry in entries
+            ]
+            response.message = f'{len(entries)} entries'
+            response.success = True
+        return response

@@ -1,0 +1,142 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Tuning through ROS: four services that answer at the end, and an action."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import time
+from typing import TYPE_CHECKING
+
+from nfo_sinus_msgs.action import Tune
+from rclpy.action import ActionServer
+from rclpy.action import CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.node.messages import inv_st
+
+if TYPE_CHECKING:
+    from rclpy.action.server import ServerGoalHandle
+
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+_SERVICES = {
+    '~/tune_full': Procedure.FULL,
+    '~/tune_basic': Procedure.BASIC,
+    '~/measure_rs': Procedure.STATOR_RESISTANCE,
+    '~/calculate_parameters': Procedure.CALCULATE,
+}
+#: By the codes of the action.
+_PROCEDURES = {
+    Tune.Goal.FULL: Procedure.FULL,
+    Tune.Goal.BASIC: Procedure.BASIC,
+    Tune.Goal.STATOR_RESISTANCE: Procedure.STATOR_RESISTANCE,
+    Tune.Goal.CALCULATE: Procedure.CALCULATE,
+}
+#: How often feedback is sent while nothing new is to be told, s.
+_FEEDBACK_PERIOD = 0.5
+#: How often it is looked whether there is something new, s.
+_LOOK_PERIOD = 0.05
+
+
+class TuningServices:
+    """Offers ``~/tune_full`` and its like, and the action ``~/tune``."""
+
+    def __init__(self, node: DriveNode) -> None:
+        self._node = node
+        # reentrant, so that a second one is refused at once and a cancel need not wait
+        group = ReentrantCallbackGroup()
+        for name, procedure in _SERVICES.items():
+            node.create_service(
+                Trigger, name, self._service_of(procedure), callback_group=group
+            )
+        self._server = ActionServer(
+            node,
+            Tune,
+            '~/tune',
+            self._execute,
+            callback_group=group,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def _service_of(self, procedure: Procedure):  # type: ignore[no-untyped-def]
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            tuned = self._result(lambda: self._begin(procedure).result())
+            response.success, response.message = tuned.success, str(tuned)
+            return response
+
+        return answer
+
+    def _begin(self, procedure: Procedure) -> Future[Tuned]:
+        if self._node.state != 'active':
+            raise DriveError(self._node.why_not_active())
+        return self._node.drive.tune(procedure)
+
+    def _result(self, tune) -> Tuned:  # type: ignore[no-untyped-def]
+        try:
+            tuned: Tuned = tune()
+        except DriveError as error:
+            return Tuned(False, str(error), ())
+        except Exception as error:
+            # an exception that leaves a callback would end the executor
+            self._node.get_logger().error(f'error in a tuning: {error!r}')
+            return Tuned(False, f'error in the driver: {error}', ())
+        return tuned
+
+    def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
+        tuned = self._result(lambda: self._followed(goal))
+        if tuned.success:
+            goal.succeed()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+        return Tune.Result(
+            success=tuned.success,
+            message=tuned.text,
+            changed=[str(change) for change in tuned.changes],
+        )
+
+    def _followed(self, goal: ServerGoalHandle) -> Tuned:
+        procedure = _PROCEDURES.get(goal.request.procedure)
+        if procedure is None:
+            raise DriveError(f'there is no procedure {goal.request.procedure}: 0 to 3')
+        drive = self._node.drive
+        started = time.monotonic()
+        future = self._begin(procedure)
+        told_at, told_code = 0.0, -1
+        cancelling: Future[str] | None = None
+        while True:
+            try:
+                return future.result(_LOOK_PERIOD)
+            except FutureTimeoutError:
+                now = time.monotonic()
+            if goal.is_cancel_requested and cancelling is None:
+                cancelling = drive.cancel_tuning()
+            seen = drive.snapshot
+            if seen.status is None or (
+                seen.status.code == told_code and now < told_at + _FEEDBACK_PERIOD
+            ):
+                continue
+            told_at, told_code = now, seen.status.code
+            stamp = self._node.get_clock().now().to_msg()
+            status = inv_st(seen, stamp, self._node.get_parameter('frame_id').value)
+            goal.publish_feedback(Tune.Feedback(status=status, elapsed=now - started))

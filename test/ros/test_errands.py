@@ -1,0 +1,197 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Error log, kWh counter and tuning, through ROS."""
+
+from __future__ import annotations
+
+import signal
+
+from action_msgs.msg import GoalStatus
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from nfo_sinus_msgs.action import Tune
+from nfo_sinus_msgs.srv import GetErrorLog
+import pytest
+from rclpy.action import ActionClient
+from std_srvs.srv import Trigger
+from ways import needs
+
+#: The other ways in have their tests beside those of the drive, without ROS.
+pytestmark = needs('parameters', 'fine')
+
+_TUNING = 28
+
+
+def start(bench: Bench, *arguments: str) -> tuple:
+    simulator = bench.simulator()
+    bench.driver('-p', 'poll_rate:=50.0', *arguments)
+    return simulator, bench.client().connected()
+
+
+class Tuner:
+    """A client of the action."""
+
+    def __init__(self, client: Client, name: str = '/nfo_sinus') -> None:
+        self._action = ActionClient(client.node, Tune, f'{name}/tune')
+        client.callback(self._action.destroy)
+        wait_until(self._action.server_is_ready, 'there is an action server')
+        self.feedback: list[Tune.Feedback] = []
+
+    def begin(self, procedure: int):
+        """Send a goal, and return its handle when it is accepted."""
+        future = self._action.send_goal_async(
+            Tune.Goal(procedure=procedure),
+            feedback_callback=lambda message: self.feedback.append(message.feedback),
+        )
+        wait_until(future.done, 'the goal is answered')
+        assert future.result().accepted
+        return future.result()
+
+    @staticmethod
+    def result(handle):
+        """Wait for the end; return status and result."""
+        future = handle.get_result_async()
+        wait_until(future.done, 'there is a result')
+        return future.result().status, future.result().result
+
+
+def test_the_error_log_is_read_and_erased(bench: Bench) -> None:
+    simulator, client = start(bench)
+    for code in (5, 12, 3):
+        simulator.inject('fault', code)
+    wait_until(lambda: simulator.state()['fault'] == 5, 'the faults stand')
+    assert client.call('fault_ack').success
+    log = client.call('get_error_log', GetErrorLog, max_entries=0)
+    assert log.success, log.message
+    assert [(entry.code, entry.text) for entry in log.entries] == [
+        (3, 'Temp Hi'),
+        (12, 'Cur High'),
+        (5, 'Overload'),
+    ]
+    assert all(abs(entry.operating_time - 1234.5) < 0.2 for entry in log.entries)
+    assert all(0 <= entry.age < 0.2 for entry in log.entries)
+    assert len(client.call('get_error_log', GetErrorLog, max_entries=2).entries) == 2
+    erased = client.call('erase_error_log')
+    assert erased.success, erased.message
+    assert simulator.state()['error_log'] == []
+    assert simulator.state()['mode'] == 1
+    assert list(client.call('get_error_log', GetErrorLog).entries) == []
+
+
+def test_the_energy_is_reset(bench: Bench) -> None:
+    simulator, client = start(bench)
+    answer = client.call('reset_energy')
+    assert answer.success, answer.message
+    assert answer.message == 'status.e_out: 1.234 -> 0.000 kWh'
+    assert simulator.state()['parameters']['status.e_out'] == 0
+    with client.run_at(10.0):
+        answer = client.call('reset_energy')
+        assert not answer.success and 'stop it first' in answer.message
+
+
+@pytest.mark.parametrize(
+    ('service', 'shown'),
+    [
+        ('tune_full', 'TuningOK'),
+        ('tune_basic', 'TuningOK'),
+        ('measure_rs', 'RsMeasOK'),
+        ('calculate_parameters', 'ParClcOK'),
+    ],
+)
+def test_a_service_answers_at_the_end(bench: Bench, service: str, shown: str) -> None:
+    simulator, client = start(bench)
+    before = simulator.state()['parameters']
+    answer = client.call(service)
+    assert answer.success, answer.message
+    assert shown in answer.message
+    after = simulator.state()['parameters']
+    changed = [key for key in after if key.startswith('motor.') and after[key] != before[key]]
+    assert changed and all(f'{key}: ' in answer.message for key in changed)
+    # the parameters of the node follow
+    wait_until(
+        lambda: all(abs(client.parameter(key) - after[key]) < 1e-6 for key in changed),
+        'the parameters of the node are those of the drive',
+    )
+
+
+def test_the_node_answers_and_the_status_flows_meanwhile(bench: Bench) -> None:
+    _, client = start(bench)
+    future = client.call_async('tune_full', Trigger)
+    client.wait_for('inv_st', lambda status: status.code == _TUNING, 'it tunes')
+    polls = len(client.messages['status'])
+    second = client.call('tune_basic')
+    assert not second.success and 'is going on already' in second.message
+    assert client.state() == 'active'
+    refused = client.set_parameters(**{'control.accel': 9.0})
+    assert not refused.successful and 'tuning' in refused.reason
+    assert client.call('get_error_log', GetErrorLog).success
+    assert len(client.messages['status']) > polls
+    assert not future.done()
+    wait_until(future.done, 'it ends')
+    assert future.result().success, future.result().message
+
+
+def test_the_action_tells_how_it_goes_and_what_changed(bench: Bench) -> None:
+    _, client = start(bench)
+    tuner = Tuner(client)
+    status, result = tuner.result(tuner.begin(Tune.Goal.FULL))
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert result.success and 'TuningOK' in result.message
+    assert {text.split(':')[0] for text in result.changed} >= {'motor.r_stat', 'motor.sigma'}
+    assert all(' -> ' in text for text in result.changed)
+    during = [one for one in tuner.feedback if one.status.code == _TUNING]
+    assert during and during[-1].elapsed > during[0].elapsed >= 0
+    assert during[0].status.text == 'Tuning'
+
+
+def test_the_action_is_cancelled(bench: Bench) -> None:
+    simulator, client = start(bench)
+    tuner = Tuner(client)
+    handle = tuner.begin(Tune.Goal.FULL)
+    simulator.wait_for(lambda state: state['inv_st'] == _TUNING)
+    handle.cancel_goal_async()
+    status, result = tuner.result(handle)
+    assert status == GoalStatus.STATUS_CANCELED
+    assert not result.success and 'was stopped' in result.message
+    assert simulator.state()['inv_st'] == 24
+    # and the next one goes well
+    assert client.call('calculate_parameters').success
+
+
+def test_a_failure_and_a_procedure_that_there_is_not(bench: Bench) -> None:
+    simulator, client = start(bench)
+    tuner = Tuner(client)
+    status, result = tuner.result(tuner.begin(9))
+    assert status == GoalStatus.STATUS_ABORTED and 'procedure 9' in result.message
+    simulator.inject('tuning-fails', 17)
+    status, result = tuner.result(tuner.begin(Tune.Goal.STATOR_RESISTANCE))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert not result.success and '17 TunFailM' in result.message
+    assert client.call('fault_ack').success
+
+
+def test_ctrl_c_ends_a_tuning(bench: Bench) -> None:
+    simulator = bench.simulator()
+    driver = bench.driver()
+    client = bench.client().connected()
+    future = client.call_async('tune_full', Trigger)
+    simulator.wait_for(lambda state: state['inv_st'] == _TUNING)
+    driver.signal(signal.SIGINT)
+    assert driver.wait() == 0
+    state = simulator.state()
+    assert state['inv_st'] == 24 and state['mode'] == 1
+    del future

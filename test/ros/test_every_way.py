@@ -1,0 +1,334 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What matters most, over every way into a drive: the same node, and the same motor at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import signal
+
+from bench import A_WHILE
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from lifecycle_msgs.msg import Transition
+from nfo_sinus_msgs.msg import DriveStatus
+from parameter_bench import refused
+from parameter_bench import set_one
+import pytest
+from unit.catalog import setting_names
+from ways import WAYS
+from ways import Way
+from ways import needs
+
+from nfo_sinus_driver.node.domain import own_domain
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+#: So slow that a motor which is let go stands soon, Hz.
+_SPEED = 8.0
+_QUICK = ('--set', 'control.accel=0.3', '--set', 'control.retard=0.3', '--boot-time', '0.5')
+#: The computer has more to do than this one driver.
+_MODEST = ('-p', 'poll_rate:=50')
+
+_NAMES = {line.split(',')[2] for line in setting_names.SETTINGS.splitlines() if line}
+#: Which settings a way does not reach [M0 table 4], [C21]; the codes of SiProt are others in the
+#: older firmware [C5].
+_BEYOND = {
+    'modbus': {'control.any_bus'},
+    'classic_v2': set(),
+    'classic_v5': {
+        'control.f_sleep', 'error.short_c_err_cnt', 'serial.bus_type', 'serial.si_prot'
+    },
+}
+
+
+@pytest.fixture(scope='module', params=WAYS.values(), ids=WAYS)
+def way(request: pytest.FixtureRequest) -> Way:
+    """Every way, whichever one was asked for."""
+    return request.param
+
+
+def _simulator(bench: Bench) -> Simulated:
+    return bench.simulator(*_QUICK, paced=False)
+
+
+class Rig:
+    """One drive and its driver for the tests that leave both as they were."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.way = bench.way
+        self.drive = _simulator(bench)
+        self.driver = bench.driver(*_MODEST)
+        self.client: Client = bench.client().connected()
+
+    def stands(self) -> None:
+        """Wait until the motor stands and nobody will have it turn."""
+        self.drive.wait_for(_stands, timeout=PATIENCE)
+
+    def stays_still(self) -> None:
+        """Watch the motor for a while of its own time, once it stands."""
+        _stays_still(self.drive)
+
+
+@pytest.fixture(scope='module')
+def the_rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+        yield Rig(bench)
+
+
+@pytest.fixture
+def rig(the_rig: Rig) -> Rig:
+    """The rig, connected and at rest."""
+    the_rig.client.connected()
+    assert the_rig.client.call('stop').success
+    the_rig.stands()
+    return the_rig
+
+
+def _stands(state: dict) -> bool:
+    return not state['turning'] and not state['driven']
+
+
+def _stays_still(drive: Simulated) -> None:
+    began = drive.wait_for(_stands, timeout=PATIENCE)['time']
+    state = drive.wait_for(
+        lambda state: not _stands(state) or state['time'] > began + A_WHILE / 2, timeout=PATIENCE
+    )
+    assert _stands(state), state
+
+
+# --- connected ----------------------------------------------------------------------------------
+
+
+def test_the_drive_is_known(rig: Rig) -> None:
+    (line,) = [line for line in rig.driver.text.splitlines() if 'connected: ' in line]
+    print(line)
+
+
+@needs('parameters')
+def test_every_parameter_that_there_is_over_this_way_is_there(rig: Rig) -> None:
+    has = rig.client.parameter_names() & _NAMES
+    assert _NAMES - has == _BEYOND.get(rig.way.name, _BEYOND['modbus'])
+    parameters = rig.drive.state()['parameters']
+    for name in ('control.accel', 'freque.f_fix1', 'control.st_mode', 'motor.u_nom'):
+        assert rig.client.parameter(name) == parameters[name]
+
+
+@needs('parameters')
+def test_a_parameter_is_set_refused_and_followed(rig: Rig) -> None:
+    writes = sum(rig.drive.state()['writes'].values())
+    assert set_one(rig.client, 'freque.f_fix1', 12.5).successful
+    state = rig.drive.state()
+    assert state['parameters']['freque.f_fix1'] == 12.5
+    assert sum(state['writes'].values()) == writes + 1
+    refused(set_one(rig.client, 'freque.f_fix1', 151.0), 'freque.f_fix1', '0 to 150')
+    assert rig.client.parameter('freque.f_fix1') == 12.5
+    rig.drive.inject('set', 'freque.f_fix1', 17.5)
+    assert rig.client.call('refresh_parameters').success
+    wait_until(lambda: rig.client.parameter('freque.f_fix1') == 17.5, 'it follows')
+    assert sum(rig.drive.state()['writes'].values()) == writes + 1
+
+
+def test_a_drive_without_parameters_refuses_them(rig: Rig) -> None:
+    if 'parameters' in rig.way.features:
+        pytest.skip('it has parameters')
+    assert not rig.client.parameter_names() & _NAMES
+    refused(set_one(rig.client, 'control.accel', 6.0), 'control.accel')
+    refused(rig.client.set_parameters(drive_timeout=2.0), 'drive_timeout')
+
+
+# --- turning ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('frequency', [_SPEED, -_SPEED])
+def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
+    client = rig.client
+    with client.run_at(frequency):
+        state = rig.drive.state()
+        assert state['frequency'] == pytest.approx(frequency, abs=1)
+        status = client.latest('status')
+        assert status.enabled
+        if status.valid & DriveStatus.VALID_SETPOINT_REACHED:
+            status = client.wait_for('status', lambda status: status.setpoint_reached, 'reached')
+            assert status.reverse == (frequency < 0)
+        assert client.latest('inv_st').text == state['inv_st_text']
+        client.wait_for('telemetry', lambda m: abs(m.frequency - frequency) < 1, 'telemetry')
+        answer = client.call('stop')
+        assert answer.success
+        assert answer.message == 'stopping: it ramps down'
+        rig.stays_still()
+    assert rig.drive.state()['scmd'] == 0
+
+
+@pytest.mark.parametrize('frequency', [_SPEED, -_SPEED])
+def test_a_quick_stop_lets_go_where_there_is_one(rig: Rig, frequency: float) -> None:
+    with rig.client.run_at(frequency):
+        answer = rig.client.call('quick_stop')
+        assert answer.success
+        if rig.way.model == 'sinus_g2':
+            assert answer.message == 'released: the motor coasts'
+            assert not rig.drive.state()['driven']
+        else:
+            assert 'this drive has no quick stop' in answer.message
+        rig.stays_still()
+
+
+def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(rig: Rig) -> None:
+    assert rig.client.set_parameters(setpoint_timeout=0.5).successful
+    try:
+        with rig.client.run_at(_SPEED):
+            pass
+        rig.drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+        assert rig.drive.state()['scmd'] == 0x101, 'it is still enabled'
+        with rig.client.setpoints(6.0):
+            rig.client.wait_for('status', lambda status: status.actual > 5, 'it moves again')
+    finally:
+        assert rig.client.set_parameters(setpoint_timeout=2.5).successful
+
+
+# --- stopped by something else ------------------------------------------------------------------
+
+
+def _disarmed(rig: Rig) -> None:
+    rig.client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+
+
+def _back(rig: Rig) -> None:
+    rig.client.wait_for('status', lambda status: not status.connected, 'it is lost')
+    rig.client.wait_for('status', lambda status: status.connected, 'it is back')
+
+
+def _fault(rig: Rig) -> None:
+    rig.drive.inject('fault', 5)
+    rig.client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
+    assert 'Overload' in rig.client.enable().message
+    assert rig.client.call('fault_ack').message == 'acknowledged 5 Overload'
+    assert rig.drive.state()['fault'] == 0
+
+
+def _run_input(rig: Rig) -> None:
+    rig.drive.inject('run', False)
+    _disarmed(rig)
+    rig.drive.inject('run', True)
+
+
+def _keypad_stop(rig: Rig) -> None:
+    rig.drive.inject('keypad', 'stop')
+    _disarmed(rig)
+
+
+def _dead_line(rig: Rig) -> None:
+    rig.drive.inject('line-dead', 2.0)
+    _back(rig)
+    _disarmed(rig)
+
+
+def _lost_port(rig: Rig) -> None:
+    rig.drive.inject('hangup')
+    _back(rig)
+    _disarmed(rig)
+
+
+def _power_cycle(rig: Rig) -> None:
+    rig.drive.inject('power-cycle', 2.0)
+    _back(rig)
+    _disarmed(rig)
+
+
+def _deactivate_and_clean_up(rig: Rig) -> None:
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+        assert rig.client.change_state(transition)
+    state = rig.drive.wait_for(_stands, timeout=PATIENCE)
+    assert state['mode'] == 1
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        assert rig.client.change_state(transition)
+
+
+@pytest.mark.parametrize(
+    'event',
+    [
+        _fault,
+        _run_input,
+        _keypad_stop,
+        _dead_line,
+        _lost_port,
+        _power_cycle,
+        _deactivate_and_clean_up,
+    ],
+    ids=lambda event: event.__name__.strip('_'),
+)
+def test_nothing_turns_again_until_enable(rig: Rig, event) -> None:
+    with rig.client.run_at(_SPEED):
+        event(rig)
+        rig.stays_still()
+        wait_until(lambda: rig.client.enable().success, 'it can be enabled again', period=0.2)
+        rig.drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
+    assert rig.drive.state()['mode_ext_writes'] == 0
+
+
+# --- the way out --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: int) -> None:
+    drive = _simulator(bench)
+    driver = bench.driver(*_MODEST)
+    client = bench.client().connected()
+    with client.run_at(_SPEED):
+        driver.signal(number)
+        assert driver.wait() == 0, driver.text
+        state = drive.wait_for(_stands, timeout=PATIENCE)
+    assert (state['mode'], state['scmd'], state['fault']) == (1, 0, 0)
+    assert state['mode_ext_writes'] == 0
+
+
+@needs('parameters')
+def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
+    drive = _simulator(bench)
+    driver = bench.driver(*_MODEST, '-p', 'drive_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(_SPEED):
+        driver.signal(signal.SIGKILL)
+        assert driver.wait() == -signal.SIGKILL
+        assert drive.state()['driven']
+        state = drive.wait_for(lambda state: not state['driven'], timeout=PATIENCE)
+        assert state['fault'], 'the drive stopped for another reason'
+        # the next one finds the fault, tells it, and lets nothing turn
+        bench.driver(*_MODEST)
+        client.wait_for('status', lambda status: status.connected, 'a new driver')
+        _stays_still(drive)
+        client.wait_for('inv_st', lambda message: message.text == 'Sio Fail', 'the fault')
+        assert client.call('fault_ack').success
+        wait_until(lambda: client.enable().success, 'it can be enabled', period=0.2)
+        drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
+
+
+def test_monitor_writes_nothing(bench: Bench) -> None:
+    drive = _simulator(bench)
+    bench.driver(*_MODEST, '-p', 'control_method:=monitor')
+    client = bench.client().connected()
+    with client.setpoints(_SPEED):
+        for service in ('stop', 'quick_stop', 'fault_ack'):
+            assert 'monitor' in client.call(service).message
+        assert 'monitor' in client.enable().message
+        client.wait_for('telemetry', lambda message: True, 'telemetry flows')
+        for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+            assert client.change_state(transition)
+    state = drive.state()
+    assert not state['writes']
+    assert not state['command_writes']
+    assert (state['ack_reads'], state['sio_err_reads']) == (0, 0)
