@@ -52,10 +52,10 @@ types: setup ## mypy, on all that is not ROS
 	@.venv/bin/mypy
 
 unit: setup ## tests without ROS, with the current and with the oldest pymodbus
-	@echo '== unit: without ROS'
-	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n auto test/unit
-	@echo '== unit again: without rclpy, with the oldest pymodbus'
+	@echo '== unit: without rclpy, with the oldest pymodbus'
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto test/unit
+	@echo '== unit again, what uses pymodbus: the current one'
+	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n auto test/unit/link test/unit/simulator test/unit/cli
 
 ros: setup ## end-to-end tests with rclpy (all of them over another way: WAY=classic_v2)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'

@@ -41,6 +41,8 @@ _T = TypeVar('_T')
 
 #: How long a line is not trusted that has told something nobody asked for, s.
 DISTRUST = 60.0
+#: How much later than its slowest answer of late a unit may answer.
+_LATER = 1.25
 #: What is left of the memory of a slow answer with each of the next.
 _DECAY = 0.95
 #: How many of the longest pauses within an answer there may be.
@@ -214,7 +216,7 @@ class SerialLink(ModbusLink):
         :raises DamagedAnswer: it came.
         """
         length = self._frame_length(request.answer_length) * self._settings.char_time
-        until = self._sent_at + 2 * self._slowest.get(request.unit, 0.0) + length
+        until = self._sent_at + _LATER * self._slowest.get(request.unit, 0.0) + length
         while (now := time.monotonic()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)

@@ -33,6 +33,7 @@ from bench import Process
 from bench import holds_for
 from bench import wait_until
 import pytest
+from ways import needs
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
@@ -247,7 +248,9 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
         (['-p', 'port:=foo://x'], ['port', 'there is no foo://', 'socket://host:port', 'rfc2217']),
         (['-p', 'port:=10.0.0.1:502'], ['port', 'no device', 'write socket://10.0.0.1:502']),
         (['-p', 'port:=""'], ['port is empty']),
-        (['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1']),
+        pytest.param(
+            ['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1'], marks=needs('rtu')
+        ),
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
         (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
@@ -280,6 +283,7 @@ def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
     _untouched(drive)
 
 
+@needs('rtu')
 def test_a_character_format_needs_no_quotes(bench: Bench) -> None:
     bench.simulator()
     bench.driver('-p', 'char_format:=8E1')
@@ -329,13 +333,13 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     bench: Bench, section: str, renames: list[str], namespace: str
 ) -> None:
     drive = bench.simulator('--address', '3')
-    baud_rate = bench.way.baud_rate
+    baud_rate, protocol = bench.way.baud_rate, bench.way.protocol
     parameters = bench.folder / 'named.yaml'
     parameters.write_text(
         '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
         '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
         f'{section}: {{ros__parameters: {{port: {bench.port}, baud_rate: {baud_rate}, '
-        'address: 3, response_timeout: 0.5}}\n'
+        f'protocol: {protocol}, address: 3, response_timeout: 0.5}}}}\n'
     )
     driver = bench.bare_driver(*renames, '--params-file', str(parameters))
     client = bench.client(f'{namespace}/belt').connected()

@@ -163,7 +163,7 @@ def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
 
 def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
     # slow answers keep the enable long enough on its way
-    drive = bench.simulator('--turnaround', '0.2', '--set', 'control.accel=1')
+    drive = bench.simulator('--turnaround', '0.1', '--set', 'control.accel=1')
     driver = bench.driver('-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     with client.setpoints(20.0):
