@@ -165,11 +165,15 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
         if status.valid & DriveStatus.VALID_SETPOINT_REACHED:
             status = client.wait_for('status', lambda status: status.setpoint_reached, 'reached')
             assert status.reverse == (frequency < 0)
-        assert client.latest('inv_st').text == state['inv_st_text']
+        wait_until(
+            lambda: client.latest('inv_st').text == rig.drive.state()['inv_st_text'],
+            'the text on the display',
+        )
         client.wait_for('telemetry', lambda m: abs(m.frequency - frequency) < 1, 'telemetry')
         answer = client.call('stop')
         assert answer.success
-        assert answer.message == 'stopping: it ramps down'
+        # so short a ramp may be over by then
+        assert answer.message.startswith(('stopping: it ramps down', 'stopped')), answer.message
         rig.stays_still()
     assert rig.drive.state()['scmd'] == 0
 

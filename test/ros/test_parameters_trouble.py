@@ -192,6 +192,7 @@ def test_what_a_running_motor_forbids_keeps_the_others_from_being_written(
     _agree(client, stubborn)
 
 
+@needs('modbus')
 def test_every_third_request_for_a_setting_refused_leaves_ros_and_the_drive_the_same(
     stubborn: Stubborn, client: Client
 ) -> None:
