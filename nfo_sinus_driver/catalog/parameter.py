@@ -284,6 +284,11 @@ class Parameter:
         low = low if self.minimum is None else max(low, self.minimum)
         return low, high if self.maximum is None else min(high, self.maximum)
 
+    @property
+    def never_negative(self) -> bool:
+        """It is unsigned on some bus; Classic has signed types for nearly everything [C23]."""
+        return any(not place.type.signed for place in self.places.values())
+
     def quantise(
         self,
         value: float,

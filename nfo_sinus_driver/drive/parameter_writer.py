@@ -289,7 +289,7 @@ class ParameterWriter:
         inverter = self._inverter
         text = f'{error}'
         if error.code == Refused.ILLEGAL_VALUE:
-            text = f'the drive does not accept {self._show(key, words)} (exception {error.code})'
+            text = f'the drive does not accept {self._show(key, words)}{error.behind}'
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
             await inverter.look(_SERVICE)
@@ -297,5 +297,5 @@ class ParameterWriter:
         if seen is not None and seen.driven and self._registers.model[key].stopped:
             return f'{text}: the motor must be stopped for this, and it runs'
         if seen is not None and seen.faulted:
-            return f'{text}; fault {inverter.describe()} stands: call ~/fault_ack first'
+            return f'{text}; fault {inverter.describe()} stands: acknowledge it first (~/fault_ack)'
         return text

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access
@@ -61,7 +63,10 @@ class Registers:
 
         :raises ValueError: out of range, between two steps, or an unknown label.
         """
-        return self.model[key].encode(value, self.protocol)
+        parameter = self.model[key]
+        if parameter.never_negative and not isinstance(value, str) and value < 0:
+            raise ValueError(f'{key}: {value:g} is out of range, at least 0 {parameter.unit}')
+        return parameter.encode(value, self.protocol)
 
     def nearest_words(self, key: str, value: float) -> Words:
         """
@@ -87,6 +92,7 @@ class Registers:
         """Return the least value of a number, the greatest, and the step between two."""
         parameter = self.model[key]
         low, high = parameter.span(self.protocol)
+        low = max(low, Fraction(0)) if parameter.never_negative else low
         return float(low), float(high), float(parameter.factor(self.protocol))
 
     def number(self, key: str, words: Words) -> float:

@@ -69,6 +69,8 @@ class Refused(LinkError):
     def __init__(self, code: int, reason: str = '', inv_st: int | None = None) -> None:
         self.code = code
         self.inv_st = inv_st
+        #: What a person may look up, to stand behind a sentence.
+        self.behind = f': {reason}' if reason else f' (exception {code})'
         text = _REFUSALS.get(code, 'the drive refused')
         super().__init__(reason or f'{text} (exception {code})')
 

@@ -56,6 +56,8 @@ _SHORT = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
 _24_BITS = 0xFFFFFF
 _REFERENCES = frozenset({'status.frq_set', 'status.spd_set', 'status.trq_set', 'status.reg_set'})
 _FLAGS: Mapping[Reason, SioErr] = {
+    # there are no functions here, only parameters
+    Reason.FUNCTION: SioErr.UNKNOWN,
     Reason.ADDRESS: SioErr.UNKNOWN,
     Reason.VALUE: SioErr.OUT_OF_RANGE,
     Reason.STATE: SioErr.NOT_PERMITTED,
@@ -152,7 +154,10 @@ class Classic:
         parameter, position = self._find(drive, id_)
         if parameter.access is Access.WRITE:
             raise _Wrong(SioErr.UNREADABLE)
-        raw = _read(drive, parameter.key)
+        try:
+            raw = _read(drive, parameter.key)
+        except Refused as refused:
+            raise _Wrong(_FLAGS[refused.reason]) from refused
         if parameter.key in _SHORT and drive.firmware.short_counters:
             raw &= _24_BITS
         words = parameter.place(Protocol.CLASSIC).type.to_words(raw)

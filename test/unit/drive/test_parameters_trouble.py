@@ -68,7 +68,7 @@ def test_refusal(
         says += f'; fault {OVERLOAD} '
     error = error_of(parameters.change({'control.accel': 7}))
     assert str(error).startswith(f'control.accel: {says}')
-    assert str(error).endswith('stands: call ~/fault_ack first') is faulted
+    assert str(error).endswith('stands: acknowledge it first (~/fault_ack)') is faulted
     assert error.left == ()
     assert parameters.values['control.accel'] == ACCEL
     assert written(rig) == {}
