@@ -12,26 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of one drive: its services, and the set-points that it follows."""
+"""The services of one drive."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-import math
 from typing import TYPE_CHECKING
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.callback_groups import ReentrantCallbackGroup
-from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import Line
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.node.drive_node import DriveNode
@@ -52,10 +48,8 @@ class Commands:
     Each kind has a callback group of its own, so that none waits for another.
     """
 
-    def __init__(self, node: DriveNode, line: Line) -> None:
+    def __init__(self, node: DriveNode) -> None:
         self._node = node
-        self._told_idle_setpoint = False
-        line.listener.listen(node, Float32, '~/setpoint', self._on_setpoint, NEWEST)
         # reentrant, for to disable must not wait for an enable that waits for a start delay
         group = ReentrantCallbackGroup()
         node.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
@@ -66,10 +60,6 @@ class Commands:
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def be_quiet_about_setpoints(self, quiet: bool) -> None:
-        """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
-        self._told_idle_setpoint = quiet
-
     def offer(self, name: str, command: _Command, timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
@@ -78,29 +68,6 @@ class Commands:
 
         group = MutuallyExclusiveCallbackGroup()
         self._node.create_service(Trigger, name, answer, callback_group=group)
-
-    def _on_setpoint(self, message: Float32) -> None:
-        node = self._node
-        if node.state != 'active':
-            return
-        if not math.isfinite(message.data):
-            node.get_logger().warning(
-                f'set-point {message.data} ignored: it is not a finite number',
-                throttle_duration_sec=10.0,
-            )
-            return
-        try:
-            node.drive.set_setpoint(message.data)
-        except DriveError as error:
-            node.get_logger().warning(str(error), throttle_duration_sec=10.0)
-            return
-        if node.drive.armed:
-            self._told_idle_setpoint = False
-        elif not self._told_idle_setpoint:
-            self._told_idle_setpoint = True
-            node.get_logger().info(
-                'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
-            )
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response

@@ -45,8 +45,10 @@ from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
 from nfo_sinus_driver.node.error_log import ErrorLogServices
+from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.reporter import Reporter
+from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.settings import understood
@@ -97,8 +99,14 @@ class DriveNode(LifecycleNodeMixin, Node):
         LifecycleNodeMixin.__init__(self, callback_group=lifecycle_group)
         self._line = line
         values = declare(self, DRIVE_SETTINGS)
+        if not values['gear_ratio']:
+            raise ValueError('gear_ratio 0: motor turns per turn of the shaft, never 0')
         self.settings = self._drive_settings(values)
-        self._reporter = Reporter(self, line)
+        joint = Joint(
+            lambda: self.get_parameter('joint_name').value or self.get_name(),
+            lambda: self.get_parameter('gear_ratio').value,
+        )
+        self._reporter = Reporter(self, line, joint)
         #: What ``model: auto`` stands for, as far as it is known.
         self._found_model = MODELS[0]
         self._drive = Drive(line.bus, self._concrete, self._reporter)
@@ -107,7 +115,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._reporter.start(lambda: self._drive)
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
-        self._commands = Commands(self, line)
+        self._commands = Commands(self)
+        self._setpoints = Setpoints(self, line, joint)
         ErrorLogServices(self, self._commands)
         self._tuning = TuningServices(self)
         self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
@@ -145,7 +154,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         """
         self._barred = True
         self._autostart_tries = False
-        self._commands.be_quiet_about_setpoints(True)
+        self._setpoints.be_quiet(True)
         return self._drive.stop_for_good(patience)
 
     @property
@@ -197,7 +206,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             return TransitionCallbackReturn.FAILURE
         self._note_person()
         self._drive.activate()
-        self._commands.be_quiet_about_setpoints(False)
+        self._setpoints.be_quiet(False)
         return super().on_activate(state)
 
     @_guarded
@@ -334,6 +343,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         values = dataclasses.asdict(self.settings)
         del values['retries']
         changed = {parameter.name: parameter.value for parameter in parameters}
+        if changed.get('gear_ratio') == 0:
+            raise ValueError('gear_ratio 0: motor turns per turn of the shaft, never 0')
         # not read_only for rclpy, so that what was dumped can be loaded
         if changed.get('autostart', self._autostart_wanted) != self._autostart_wanted:
             raise ValueError('autostart is read when the driver starts: give it then')

@@ -29,6 +29,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
@@ -38,6 +39,7 @@ from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.line import LATCHED
 from nfo_sinus_driver.node.line import RELIABLE
 from nfo_sinus_driver.node.line import Line
@@ -57,9 +59,10 @@ class Reporter:
     else runs on the outbox's thread.
     """
 
-    def __init__(self, node: DriveNode, line: Line) -> None:
+    def __init__(self, node: DriveNode, line: Line, joint: Joint) -> None:
         self._node = node
         self._line = line
+        self._joint = joint
         self._log = node.get_logger()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._drive: Callable[[], Drive] | None = None
@@ -72,6 +75,7 @@ class Reporter:
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self._speed = create(Float32, '~/actual_speed', RELIABLE)
         self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
+        self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
 
     def start(self, drive: Callable[[], Drive]) -> None:
@@ -132,6 +136,7 @@ class Reporter:
             return
         self._frequency.publish(Float32(data=snapshot.frequency))
         self._speed.publish(Float32(data=snapshot.speed))
+        self._joint_states.publish(self._joint.state(snapshot, stamp, frame_id))
         inv_st = (snapshot.status.code, snapshot.kind)
         if inv_st != self._last_inv_st:
             self._last_inv_st = inv_st

@@ -240,6 +240,13 @@ DRIVE_SETTINGS = (
         unit='s',
     ),
     Setting(
+        'gear_ratio',
+        1.0,
+        'Motor turns per turn of the output shaft; negative inverts the direction of joint_states '
+        'and joint_command',
+    ),
+    Setting('joint_name', '', "Name of the output shaft in joint_states; '': the node's name"),
+    Setting(
         'apply_parameters',
         True,
         'At the first configure, write the parameters of the drive that were given to this node '

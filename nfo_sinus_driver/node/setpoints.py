@@ -1,0 +1,122 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The set-points of one drive, from three topics: the newest valid one counts, wherever it came."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from nfo_sinus_msgs.msg import Setpoint
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float32
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.joint import Joint
+from nfo_sinus_driver.node.line import NEWEST
+from nfo_sinus_driver.node.line import Line
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.node.drive_node import DriveNode
+
+_UNITS = {
+    'Freque': Setpoint.HZ,
+    'Speed': Setpoint.RPM,
+    'Torque': Setpoint.PERCENT_TORQUE,
+    'PI-Reg': Setpoint.PROCESS,
+}
+_NAMES = {
+    Setpoint.HZ: 'Hz',
+    Setpoint.RPM: 'rpm',
+    Setpoint.PERCENT_TORQUE: '% of nominal torque',
+    Setpoint.PROCESS: 'the process unit',
+}
+#: How often a person is told the same, s.
+_TELL_PERIOD = 10.0
+
+
+class Setpoints:
+    """Hands set-points to the drive of a node; those that make no sense are told and ignored."""
+
+    def __init__(self, node: DriveNode, line: Line, joint: Joint) -> None:
+        self._node = node
+        self._joint = joint
+        self._told_idle = False
+        listen = line.listener.listen
+        listen(node, Float32, '~/setpoint', self._on_setpoint, NEWEST)
+        listen(node, Setpoint, '~/setpoint_stamped', self._on_stamped, NEWEST)
+        listen(node, JointState, '~/joint_command', self._on_joint_command, NEWEST)
+
+    def be_quiet(self, quiet: bool) -> None:
+        """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
+        self._told_idle = quiet
+
+    def _on_setpoint(self, message: Float32) -> None:
+        self._take(message.data)
+
+    def _on_stamped(self, message: Setpoint) -> None:
+        node = self._node
+        mode = node.drive.snapshot.control_mode
+        if node.state == 'active' and message.unit != _UNITS.get(mode):
+            unit = _NAMES.get(message.unit, f'unit {message.unit}')
+            self._ignore(f'set-point in {unit} ignored: the control mode is {mode or "not known"}')
+            return
+        stamp = Time.from_msg(message.header.stamp, clock_type=node.get_clock().clock_type)
+        timeout = node.settings.setpoint_timeout
+        if stamp.nanoseconds and timeout:
+            age = (node.get_clock().now() - stamp).nanoseconds / 1e9
+            if age > timeout:
+                self._ignore(f'set-point ignored: it was made {age:.1f} s ago')
+                return
+        self._take(message.value)
+
+    def _on_joint_command(self, message: JointState) -> None:
+        node = self._node
+        if node.state != 'active' or self._joint.name not in message.name:
+            return
+        index = message.name.index(self._joint.name)
+        if index >= len(message.velocity):
+            self._ignore('joint command ignored: it has no velocity')
+            return
+        try:
+            value = self._joint.setpoint(message.velocity[index], node.drive)
+        except ValueError as error:
+            self._ignore(f'joint command ignored: {error}')
+            return
+        self._take(value)
+
+    def _take(self, value: float) -> None:
+        node = self._node
+        if node.state != 'active':
+            return
+        if not math.isfinite(value):
+            self._ignore(f'set-point {value} ignored: it is not a finite number')
+            return
+        try:
+            node.drive.set_setpoint(value)
+        except DriveError as error:
+            self._ignore(str(error))
+            return
+        if node.drive.armed:
+            self._told_idle = False
+        elif not self._told_idle:
+            self._told_idle = True
+            node.get_logger().info(
+                'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
+            )
+
+    def _ignore(self, text: str) -> None:
+        self._node.get_logger().warning(text, throttle_duration_sec=_TELL_PERIOD)

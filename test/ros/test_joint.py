@@ -1,0 +1,111 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The output shaft as a joint, and set-points that say their unit and their time."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from nfo_sinus_msgs.msg import Setpoint
+import pytest
+from sensor_msgs.msg import JointState
+
+_RADIANS = 2 * math.pi
+#: The simulated motor has two pole pairs: 20 Hz are 10 turns a second without slip.
+_TURNS = 10.0
+
+
+class Publisher:
+    """Publishes one message again and again, while it is open."""
+
+    def __init__(self, client: Client, topic: str, message: object) -> None:
+        self._publisher = client.node.create_publisher(type(message), topic, 1)
+        self._message = message
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+
+    def __enter__(self) -> Publisher:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _work(self) -> None:
+        while not self._ended.wait(0.05):
+            self._publisher.publish(self._message)
+
+
+def start(bench: Bench, *arguments: str) -> tuple:
+    simulator = bench.simulator('--set', 'control.accel=0.5')
+    bench.driver(*arguments)
+    client = bench.client().connected()
+    client.listen('joint_states', JointState, '/nfo_sinus/joint_states', 10)
+    return simulator, client
+
+
+@pytest.mark.parametrize('ratio', [1.0, -5.0])
+def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio: float) -> None:
+    simulator, client = start(bench, '-p', f'gear_ratio:={ratio}', '-p', 'joint_name:=belt')
+    velocity = _RADIANS * _TURNS / ratio
+    other = JointState(name=['other', 'belt'], velocity=[99.0, velocity])
+    assert client.enable().success
+    with Publisher(client, '/nfo_sinus/joint_command', other):
+        wait_until(lambda: abs(simulator.state()['frequency'] - 20.0) < 0.1, 'it turns at 20 Hz')
+        # the slip of the motor is a few percent
+        state = client.wait_for(
+            'joint_states',
+            lambda message: message.velocity[0] == pytest.approx(velocity, rel=0.1),
+            'the shaft turns as it was told',
+        )
+        assert list(state.name) == ['belt']
+        before = client.latest('joint_states').position[0]
+        way = math.copysign(1.0, velocity)
+        wait_until(
+            lambda: way * (client.latest('joint_states').position[0] - before) > 1.0,
+            'the shaft gets on',
+        )
+
+
+def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
+    simulator, client = start(bench)
+    assert client.enable().success
+    topic = '/nfo_sinus/setpoint_stamped'
+    with Publisher(client, topic, Setpoint(value=600.0, unit=Setpoint.RPM)):
+        wait_until(lambda: 'set-point in rpm ignored' in bench.log, 'it says so')
+    old = Setpoint(value=15.0, unit=Setpoint.HZ)
+    old.header.stamp.sec = 1
+    with Publisher(client, topic, old):
+        wait_until(lambda: 'it was made' in bench.log, 'it says so')
+    assert not simulator.state()['frequency']
+    with Publisher(client, topic, Setpoint(value=15.0, unit=Setpoint.HZ)):
+        wait_until(lambda: abs(simulator.state()['frequency'] - 15.0) < 0.1, 'it turns at 15 Hz')
+    now = client.node.get_clock().now().to_msg()
+    fresh = Setpoint(value=-12.0, unit=Setpoint.HZ)
+    fresh.header.stamp = now
+    with Publisher(client, topic, fresh):
+        wait_until(lambda: simulator.state()['frequency'] < -1.0, 'it turns the other way')
+
+
+def test_gear_ratio_of_nothing_is_refused(bench: Bench) -> None:
+    _, client = start(bench)
+    result = client.set_parameters(gear_ratio=0.0)
+    assert not result.successful
+    assert 'never 0' in result.reason
