@@ -52,7 +52,7 @@ _log = logging.getLogger(__name__)
 
 #: How long one round of reading every parameter again takes at least, s: a change at the keypad
 #: is seen within 10 s, and a fast line is not kept busy for nothing.
-_ROUND = 9.4
+_ROUND = 9.8
 #: How often it is looked whether there is something to read, s.
 _WAIT = 0.5
 #: How often progress is logged while the parameters are read for the first time, s.
@@ -267,9 +267,8 @@ class Parameters:
         self._rounds += 1
         skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
-        for key in due:
-            # many drives on a line take their time, lest nothing but that goes on
-            earliest = time.monotonic() + _ROUND * self._bus.refreshing / len(due)
+        started = time.monotonic()
+        for number, key in enumerate(due, start=1):
             if inverter.connected and inverter.answering:
                 try:
                     await self._read(key, once=True)
@@ -278,7 +277,9 @@ class Parameters:
                 except LinkError:
                     # the poll says so if the drive is lost
                     inverter.answering = False
-            await self._bus.sleep(earliest - time.monotonic())
+            # many drives on a line take their time, lest nothing but that goes on
+            pace = _ROUND * self._bus.refreshing / len(due)
+            await self._bus.sleep(started + number * pace - time.monotonic())
             if keys is not self._keys:
                 # they are read anew
                 return
