@@ -34,6 +34,7 @@ from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
+from nfo_sinus_driver.drive.reference import references
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Refused
 
@@ -113,8 +114,8 @@ class DriveControl:
         """
         try:
             await self._change(~_RUN, Control(0), Priority.STOP)
-            if control_mode:
-                await Reference(self._registers, control_mode).write_zero(Priority.STOP)
+            for reference in references(self._registers, (control_mode,)):
+                await reference.write_zero(Priority.STOP)
         except Refused:
             if await self.in_control(Priority.STOP):
                 raise
@@ -124,9 +125,8 @@ class DriveControl:
         await self._change(
             ~(_RUN | Control.DISABLE_QUICK_STOP), Control.OVERRIDE_COAST, Priority.STOP
         )
-        if control_mode:
+        for reference in references(self._registers, (control_mode,)):
             with contextlib.suppress(Refused):
-                reference = Reference(self._registers, control_mode)
                 await reference.write_zero(Priority.STOP, once=False)
 
     async def release(self) -> None:

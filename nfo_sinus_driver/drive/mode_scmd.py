@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
@@ -27,7 +28,9 @@ from nfo_sinus_driver.catalog.words_optimal import Smode
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
+from nfo_sinus_driver.drive.reference import references
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.link import Refused
 
 
@@ -87,8 +90,8 @@ class ModeScmd:
         """
         try:
             await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)
-            if control_mode:
-                await Reference(self._registers, control_mode).write_zero(Priority.STOP)
+            for reference in self._references(control_mode):
+                await reference.write_zero(Priority.STOP)
         except Refused:
             if await self.in_control(Priority.STOP):
                 raise
@@ -96,11 +99,14 @@ class ModeScmd:
     async def quick_stop(self, control_mode: str) -> None:
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
         await self._registers.write('fieldbus.mode', Mode.STOP, Priority.STOP)
-        if control_mode:
+        for reference in self._references(control_mode):
             # a drive may well refuse a set-point while the bus has no control
             with contextlib.suppress(Refused):
-                reference = Reference(self._registers, control_mode)
                 await reference.write_zero(Priority.STOP, once=False)
+
+    def _references(self, control_mode: str) -> Sequence[Reference]:
+        """Return where a set-point may stand that the motor would follow."""
+        return references(self._registers, (control_mode,))
 
     async def release(self) -> None:
         """Give control back; never by MODE = Ext, which can start the motor [C43]."""
@@ -123,6 +129,9 @@ class ModeSmode(ModeScmd):
 
     Its MODE has no Stop: 1 is Manual, the keypad's, and 2 is Auto, which may start the motor and is
     never written [C51]. It has no way to release the motor at once [C96].
+
+    Nothing tells its control mode, so whichever is assumed, every set-point is 0 before it runs: an
+    old one in the register of the other mode would turn the motor.
     """
 
     coasts = False
@@ -134,6 +143,18 @@ class ModeSmode(ModeScmd):
             await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
         else:
             await self._registers.write('fieldbus.mode', OptimalMode.BUS, Priority.SERVICE)
+
+    async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
+        """
+        Write set-point 0 for every control mode, and read it back.
+
+        :raises DriveError: the drive keeps another value.
+        """
+        for reference in self._references(control_mode):
+            await reference.set_to_zero(priority)
+
+    def _references(self, control_mode: str) -> Sequence[Reference]:
+        return references(self._registers, CONTROL_MODES)
 
     async def quick_stop(self, control_mode: str) -> None:
         """Stop as usual: there is no other way."""

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Mapping
 
 from nfo_sinus_driver.bus import Priority
@@ -38,6 +39,15 @@ _CLASSIC = 'fieldbus.setpoint'
 _MOST = {'Freque': 150.0, 'Speed': 9000.0, 'Torque': 200.0, 'PI-Reg': 150.0}
 
 
+def references(registers: Registers, control_modes: Iterable[str]) -> list[Reference]:
+    """Return the places of the set-points of some control modes; one that has none is left out."""
+    return [Reference(registers, mode) for mode in control_modes if _keys(registers, mode)]
+
+
+def _keys(registers: Registers, control_mode: str) -> list[str]:
+    return [key for key in _KEYS.get(control_mode, ()) if key in registers.model]
+
+
 class Reference:
     """
     The place of the set-point in one control mode.
@@ -49,7 +59,7 @@ class Reference:
 
     def __init__(self, registers: Registers, control_mode: str) -> None:
         self._registers = registers
-        keys = [key for key in _KEYS.get(control_mode, ()) if key in registers.model]
+        keys = _keys(registers, control_mode)
         if not keys:
             raise DriveError(
                 f'the drive takes no set-point over the bus in control mode {control_mode or "?"}'

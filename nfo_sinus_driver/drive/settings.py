@@ -98,7 +98,8 @@ class DriveSettings:
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
             )
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
-        _one_of('expected_control_mode', self.expected_control_mode, ('', *CONTROL_MODES))
+        modes = ('Freque', 'Speed') if self.model == 'sinus_optimal' else CONTROL_MODES
+        _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         if self.address not in _MODBUS_ADDRESSES:
             raise ValueError(f'address {self.address}: a Modbus drive has 1 to 247')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')

@@ -22,7 +22,9 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
 
 OVERLOAD = 5
 
@@ -145,3 +147,50 @@ def test_set_points_are_refused_where_they_do_not_count(rig: Rig) -> None:
         rig.drive.set_setpoint(1.0)
     # nobody misses them either
     assert rig.drive.armed
+
+
+@pytest.mark.parametrize(
+    ('real', 'assumed', 'register'),
+    [
+        ('Speed', '', 'fieldbus.input_speed_setpoint'),
+        ('Freque', 'Speed', 'fieldbus.input_freq_setpoint'),
+    ],
+)
+def test_old_set_point_of_a_mode_that_nobody_tells_does_not_turn_the_motor(
+    make_rig: MakeRig, real: str, assumed: str, register: str
+) -> None:
+    rig = make_rig(
+        model='sinus_optimal', expected_control_mode=assumed, parameters={'control.mode': real}
+    )
+    with rig.simulator.lock:
+        rig.far.memory.put(register, 300)
+    rig.connect()
+    assert rig.enable().startswith('enabled')
+    assert rig.far.memory.raw(register) == 0
+    rig.next_snapshots(10)
+    assert rig.far.motor.at_zero
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    rig = make_rig(control_method=method)
+    rig.connect()
+    assert rig.enable().startswith('enabled')
+    inverter = rig.drive._inverter
+
+    async def read(priority: Priority = Priority.SERVICE) -> str:
+        inverter.control_mode = '7'
+        return inverter.control_mode
+
+    monkeypatch.setattr(inverter, 'read_control_mode', read)
+    wait_until(lambda: not rig.drive.armed)
+    assert rig.drive.stop().result(PATIENCE).startswith('stop')
+    assert not rig.drive.stop_unconfirmed
+
+
+@pytest.mark.parametrize('mode', ['Torque', 'PI-Reg'])
+def test_the_optimal_is_expected_in_no_mode_that_it_lacks(mode: str) -> None:
+    with pytest.raises(ValueError, match='expected_control_mode'):
+        DriveSettings(model='sinus_optimal', expected_control_mode=mode)
