@@ -63,6 +63,7 @@ class Codes:
 
     :ivar bus_standby: motor off, waiting for a command over the bus.
     :ivar bus_running: running under bus control.
+    :ivar bus_slowing: those of them in which the speed decreases, be it to a stop.
     :ivar local: standing or running under keypad or terminal control.
     :ivar start_delay: the run command is there and the start is delayed.
     :ivar tuning: a tuning procedure is going on.
@@ -74,6 +75,7 @@ class Codes:
 
     bus_standby: frozenset[int]
     bus_running: frozenset[int]
+    bus_slowing: frozenset[int]
     local: frozenset[int]
     start_delay: int
     tuning: int
@@ -174,6 +176,7 @@ DIALECTS: Mapping[str, Dialect] = {
         codes=Codes(
             bus_standby=inv_st.BUS_STANDBY,
             bus_running=inv_st.BUS_RUNNING,
+            bus_slowing=inv_st.BUS_SLOWING,
             local=inv_st.LOCAL,
             start_delay=inv_st.START_DELAY,
             tuning=inv_st.TUNING,
@@ -206,6 +209,7 @@ DIALECTS: Mapping[str, Dialect] = {
         codes=Codes(
             bus_standby=frozenset({37}),
             bus_running=frozenset({38, 39, 40}),
+            bus_slowing=frozenset({40}),
             # of Stop, Final Freq, Accel and Decel [M1] does not say who controls
             local=frozenset({33, 34, 35, 36}),
             start_delay=54,

@@ -46,6 +46,8 @@ class InvStCode:
 BUS_STANDBY = frozenset({37, 41})
 #: Running under bus control ([M0 table 19], [C3]).
 BUS_RUNNING = frozenset({38, 39, 40, 42, 43, 44})
+#: Of these, those in which the speed decreases towards the reference, or to a stop.
+BUS_SLOWING = frozenset({40, 44})
 #: Standing or running under keypad or terminal control [M0 table 19].
 LOCAL = frozenset({24, 29, 30, 31, 32, 33, 34, 35, 36})
 START_DELAY = 25

@@ -291,7 +291,7 @@ class Motion:
             reason = self._why_disarmed(seen)
             if reason:
                 self.secure(reason)
-        elif not self.ours and not self.stopping and seen.runs_by_bus:
+        elif not self.ours and not self.stopping and seen.keeps_running:
             self.secure('it runs under bus control although nobody enabled it')
 
     def secure(self, reason: str) -> None:

@@ -132,6 +132,13 @@ class InverterStatus:
         return self.runs and self.from_bus
 
     @property
+    def keeps_running(self) -> bool:
+        """It runs on a command from the bus, and may not be on its way to a stop."""
+        # without a status word nothing tells a stop from a lower reference
+        may_stop = self.word is None and self.code in self.codes.bus_slowing
+        return self.runs_by_bus and not may_stop
+
+    @property
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN:

@@ -160,4 +160,4 @@ class Withdrawal:
         # a drive with a fault may refuse everything; it stands, but would go on afterwards
         self.held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
         self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
-        return not refusal and not seen.runs_by_bus and not self._again
+        return not refusal and not seen.keeps_running and not self._again
