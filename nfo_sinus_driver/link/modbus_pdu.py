@@ -72,20 +72,12 @@ class Request(Protocol[_Answer]):
         """Return what a whole message says; ``None`` if it is no answer after all."""
 
 
-@dataclass(frozen=True)
-class Read:
-    """Read ``count`` registers of ``unit``, from ``register`` on (function 03)."""
+class _TellsWords:
+    """What is answered by ``count`` words, and by nothing that names a register."""
 
     unit: int
-    register: int
+    function: int
     count: int
-
-    function = READ_HOLDING_REGISTERS
-
-    @property
-    def body(self) -> bytes:
-        """The request without unit and function."""
-        return struct.pack('>HH', self.register, self.count)
 
     @property
     def answer_head(self) -> bytes:
@@ -104,6 +96,22 @@ class Read:
     def decode(self, message: bytes) -> Words:
         """Return the words read."""
         return struct.unpack(f'>{self.count}H', message[3:])
+
+
+@dataclass(frozen=True)
+class Read(_TellsWords):
+    """Read ``count`` registers of ``unit``, from ``register`` on (function 03)."""
+
+    unit: int
+    register: int
+    count: int
+
+    function = READ_HOLDING_REGISTERS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        return struct.pack('>HH', self.register, self.count)
 
 
 @dataclass(frozen=True)
@@ -148,7 +156,7 @@ class Write:
 
 
 @dataclass(frozen=True)
-class WriteAndRead:
+class WriteAndRead(_TellsWords):
     """
     Write ``words`` from ``register`` on, then read ``count`` registers from ``source`` on.
 
@@ -170,24 +178,6 @@ class WriteAndRead:
         size = len(self.words)
         where = (self.source, self.count, self.register, size)
         return struct.pack(f'>4HB{size}H', *where, 2 * size, *self.words)
-
-    @property
-    def answer_head(self) -> bytes:
-        """What of the answer is known beforehand."""
-        return bytes((self.unit, self.function, 2 * self.count))
-
-    @property
-    def answer_length(self) -> int:
-        """Bytes of the answer."""
-        return 3 + 2 * self.count
-
-    def measure(self, beginning: bytes) -> int:
-        """Bytes of the answer: always the same."""
-        return self.answer_length
-
-    def decode(self, message: bytes) -> Words:
-        """Return the words read."""
-        return struct.unpack(f'>{self.count}H', message[3:])
 
 
 def encode(request: Request[object]) -> bytes:
