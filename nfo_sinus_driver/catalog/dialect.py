@@ -64,11 +64,14 @@ class Codes:
     :ivar bus_standby: motor off, waiting for a command over the bus.
     :ivar bus_running: running under bus control.
     :ivar bus_slowing: those of them in which the speed decreases, be it to a stop.
-    :ivar local: standing or running under keypad or terminal control.
+    :ivar terminals: standing by or running under terminal control.
+    :ivar keypad: running where neither the bus nor the terminals have control.
+    :ivar passing: shown by a running motor instead of who runs it.
     :ivar start_delay: the run command is there and the start is delayed.
     :ivar tuning: a tuning procedure is going on.
     :ivar tuned: one has ended well.
     :ivar tuning_failed: one has not.
+    :ivar current_limit: the current limit holds the motor back.
     :ivar sio_fail: the serial line was silent for too long, or damaged.
     :ivar bus_fail: the same of the fieldbus.
     """
@@ -76,11 +79,14 @@ class Codes:
     bus_standby: frozenset[int]
     bus_running: frozenset[int]
     bus_slowing: frozenset[int]
-    local: frozenset[int]
+    terminals: frozenset[int]
+    keypad: frozenset[int]
     start_delay: int
     tuning: int
     tuned: frozenset[int]
     tuning_failed: frozenset[int]
+    passing: frozenset[int] = inv_st.PASSING
+    current_limit: int = inv_st.CURRENT_LIMIT
     sio_fail: int = inv_st.SIO_FAIL
     bus_fail: int = inv_st.BUS_FAIL
 
@@ -177,7 +183,8 @@ DIALECTS: Mapping[str, Dialect] = {
             bus_standby=inv_st.BUS_STANDBY,
             bus_running=inv_st.BUS_RUNNING,
             bus_slowing=inv_st.BUS_SLOWING,
-            local=inv_st.LOCAL,
+            terminals=inv_st.TERMINALS,
+            keypad=inv_st.KEYPAD,
             start_delay=inv_st.START_DELAY,
             tuning=inv_st.TUNING,
             tuned=frozenset({45, 46, 47}),
@@ -210,8 +217,9 @@ DIALECTS: Mapping[str, Dialect] = {
             bus_standby=frozenset({37}),
             bus_running=frozenset({38, 39, 40}),
             bus_slowing=frozenset({40}),
-            # of Stop, Final Freq, Accel and Decel [M1] does not say who controls
-            local=frozenset({33, 34, 35, 36}),
+            terminals=inv_st.TERMINALS,
+            # of Final Freq, Accel and Decel [M1] does not say who controls: nobody else is left
+            keypad=frozenset({30, 31, 32}),
             start_delay=54,
             tuning=28,
             tuned=frozenset({44, 45, 46, 47}),

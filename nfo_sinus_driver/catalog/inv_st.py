@@ -48,8 +48,13 @@ BUS_STANDBY = frozenset({37, 41})
 BUS_RUNNING = frozenset({38, 39, 40, 42, 43, 44})
 #: Of these, those in which the speed decreases towards the reference, or to a stop.
 BUS_SLOWING = frozenset({40, 44})
-#: Standing or running under keypad or terminal control [M0 table 19].
-LOCAL = frozenset({24, 29, 30, 31, 32, 33, 34, 35, 36})
+#: Standing by or running under terminal control ([M0 table 19], [M1]).
+TERMINALS = frozenset({33, 34, 35, 36})
+#: Running under keypad control, be it at standstill [M0 table 19].
+KEYPAD = frozenset({29, 30, 31, 32})
+#: What a running motor may show instead of who runs it: brake chopper on, current limit reached.
+PASSING = frozenset({26, 27})
+CURRENT_LIMIT = 27
 START_DELAY = 25
 TUNING = 28
 #: A tuning of any kind is finished ([M0 table 19], [M1]).

@@ -12,10 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a failed transaction means to a person, and what to check."""
+"""What a failed transaction or a status means to a person, and what to check."""
 
 from __future__ import annotations
 
+from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -44,4 +48,56 @@ def explain(error: LinkError, address: int, *, known: bool) -> str:
     return (
         f'what comes from address {address} is no answer ({error}): check baud rate '
         'and parity, that no other master is on the line, and the wiring'
+    )
+
+
+def explain_fault(inverter: Inverter, seen: InverterStatus) -> str:
+    """Return which fault stands, what it means and what to do about its cause."""
+    fault = inverter.model.inv_st(seen.code)
+    return f'fault {inverter.describe()}: {fault.description}. {fault.remedy}'
+
+
+def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) -> str:
+    """
+    Return why the motor no longer follows us and what to do, before it is enabled again.
+
+    :param control_mode: the one in which it was enabled.
+    :returns: ``''`` if it does follow.
+    """
+    told = inverter.describe()
+    if inverter.control_mode != control_mode:
+        return (
+            f'the control mode was changed to {inverter.control_mode} at the drive, so that '
+            f'set-points would be in another unit ({inverter.unit or "?"}): check what sends them'
+        )
+    if seen.faulted:
+        return explain_fault(inverter, seen)
+    if seen.state is State.NOT_READY_TO_SWITCH_ON:
+        return f'the drive is starting ({told}), it was switched off and on: check its mains'
+    if not seen.from_bus:
+        return _explain_loss_of_control(inverter, seen)
+    if Fact.RUN_INPUT_MISSING in seen.facts:
+        return f'its RUN input (DIN1) was lost ({told}): close it again'
+    if not seen.runs:
+        return (
+            f'the drive stopped by itself ({told}): its RUN input (DIN1) was lost, or another '
+            'master stopped it: close the input again'
+        )
+    return ''
+
+
+def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
+    told = inverter.describe()
+    if seen.code in seen.codes.terminals:
+        return f'the terminals have control now ({told}): press STOP at the drive to end that'
+    if seen.code in seen.codes.keypad:
+        return f'the keypad has control now and runs the motor ({told}): press STOP there'
+    if inverter.was_silent:
+        return (
+            f'the bus lost control while the drive did not answer ({told}): it was switched off '
+            'and on: check its mains and cable'
+        )
+    return (
+        f'the bus lost control ({told}): STOP was pressed at the keypad, or another master wrote '
+        'MODE: ask who did'
     )

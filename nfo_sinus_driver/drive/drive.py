@@ -79,7 +79,7 @@ class Drive:
             self._unit,
             self._registers,
             self._inverter,
-            lambda reason: self._motion.secure(reason) if self._motion else None,
+            lambda reason: self._motion.refused(reason) if self._motion else None,
         )
         self._motion: Motion | None = None
         if settings.control_method != 'monitor':

@@ -94,11 +94,17 @@ class DriveControl:
         await Reference(self._registers, control_mode).set_to_zero(priority)
 
     async def run(self, reached: Reached) -> None:
-        """Switch on, then give the direction, each when the drive shows the state before it."""
-        await reached(lambda seen: seen.state is State.READY_TO_SWITCH_ON)
+        """
+        Switch on, then give the direction, each when the drive shows a state before it.
+
+        From a motor that is still on its way to a stop bit 0 leads back to OPERATION_ENABLED, and
+        without a direction from there to DISABLE, which shows as SHUTDOWN does ([M0 table 16],
+        [C37]).
+        """
+        await reached(lambda seen: seen.state in (State.READY_TO_SWITCH_ON, State.STOPPING))
         switched_on = self._ready | Control.SWITCH_ON
         await self._registers.write(_WORD, switched_on, Priority.SERVICE, once=True)
-        await reached(lambda seen: seen.state is State.SWITCHED_ON)
+        await reached(lambda seen: seen.state in (State.SWITCHED_ON, State.STOPPING))
         # reverse is the sign of the set-point; both direction bits at once mean no change [C36]
         await self._registers.write(
             _WORD, switched_on | Control.ENABLE_OP, Priority.SERVICE, once=True

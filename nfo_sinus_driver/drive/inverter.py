@@ -86,6 +86,8 @@ class Inverter:
         self.connected = False
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
         self.answering = False
+        #: It did not answer just before it was last looked at.
+        self.was_silent = False
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
         #: Hz and rpm, as last polled.
@@ -97,6 +99,8 @@ class Inverter:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter ([M2], [C21]).
         self._older = False
+        #: The last inverter status that told who runs the motor.
+        self._last_telling: int | None = None
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
@@ -128,7 +132,9 @@ class Inverter:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
         assert isinstance(code, int)
-        return self._saw(InverterStatus(at, None, code, self.model))
+        if code not in self.model.dialect.codes.passing:
+            self._last_telling = code
+        return self._saw(InverterStatus(at, None, code, self.model, self._last_telling))
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -203,14 +209,15 @@ class Inverter:
         The Optimal has no register that tells it [C58]: it is what the settings expect.
         """
         if self._registers.reaches('control.mode'):
-            self.control_mode = await self.read_label('control.mode', priority)
+            mode = await self.read_label('control.mode', priority)
         else:
-            self.control_mode = self.settings.expected_control_mode or 'Freque'
-        if self.control_mode == 'PI-Reg':
-            self.unit = await self.read_label('pi_reg.unit', priority)
-        else:
-            self.unit = _UNITS.get(self.control_mode, '')
-        return self.control_mode
+            mode = self.settings.expected_control_mode or 'Freque'
+        unit = _UNITS.get(mode, '')
+        if mode == 'PI-Reg':
+            unit = await self.read_label('pi_reg.unit', priority)
+        # both at once: nobody is told of the one without the other
+        self.control_mode, self.unit = mode, unit
+        return mode
 
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97]."""

@@ -23,6 +23,8 @@ the run command is taken back until the drive says that it stops. All of this ru
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
+import math
 import time
 
 from nfo_sinus_driver.bus import Bus
@@ -31,7 +33,10 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive.advice import explain_fault
+from nfo_sinus_driver.drive.advice import explain_stop
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -76,6 +81,10 @@ class Motion:
         self._withdrawal = Withdrawal(bus, inverter, method, self._note_change)
         #: When the run command was last given or taken back: an older status says nothing.
         self._changed_at = 0.0
+        #: A set-point that the drive did not take: when, and what it answered.
+        self._refusal: tuple[float, str] | None = None
+        #: It was lost while it may have followed us.
+        self._lost_in_use = False
 
     def _note_change(self) -> None:
         self._changed_at = time.monotonic()
@@ -206,6 +215,14 @@ class Motion:
         ours = self.concerned
         self.disarm()
         name = inverter.describe()
+        if seen.state is State.FAULT_REACTION_ACTIVE:
+            # what comes before FAULTED acknowledges nothing [M0 table 16]
+            with contextlib.suppress(DriveError):
+                await self._await_status(
+                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE,
+                    Priority.SERVICE,
+                    withdrawal.PATIENCE,
+                )
         try:
             await self._method.acknowledge(seen.code)
         finally:
@@ -217,8 +234,11 @@ class Motion:
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
             )
         except DriveError:
+            now = inverter.seen or seen
+            stands = inverter.model.inv_st(now.code)
+            first = f'acknowledged {name}, but ' if now.code != seen.code else ''
             raise DriveError(
-                f'{inverter.describe()} still stands: {fault.description}. {fault.remedy}'
+                f'{first}{inverter.describe()} still stands: {stands.description}. {stands.remedy}'
             ) from None
         return f'acknowledged {name}'
 
@@ -263,8 +283,8 @@ class Motion:
 
     async def connected(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
+        seen = self._inverter.seen
         if await self._method.in_control(Priority.SERVICE):
-            seen = self._inverter.seen
             if seen is not None and seen.runs_by_bus and not self.stopping:
                 self._tell(
                     Severity.WARNING,
@@ -272,38 +292,65 @@ class Motion:
                     f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
                 )
             self._withdrawal.begin()
+        elif self._lost_in_use and seen is not None and not seen.faulted:
+            self._tell(
+                Severity.WARNING,
+                f'the bus lost control meanwhile ({self._inverter.describe()}): the drive was '
+                'switched off and on, or somebody used its keypad: check its mains; then call '
+                '~/enable to go on',
+            )
+        self._lost_in_use = False
 
-    def lost(self) -> None:
-        """Take note that the drive does not answer any more."""
-        ours = self.ours
+    def lost(self) -> bool:
+        """Take note that the drive does not answer any more; true if it may have followed us."""
+        self._lost_in_use = self.ours
+        self._refusal = None
         self.disarm()
-        if ours:
+        if self._lost_in_use:
             self._withdrawal.begin()
+        return self._lost_in_use
 
-    def watch(self, seen: InverterStatus) -> None:
-        """Judge what the drive says about itself."""
+    def watch(self, seen: InverterStatus) -> bool:
+        """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
         if self._withdrawal.held_by_fault and not seen.faulted:
             self._withdrawal.wake()
+        refused_at, reason = self._refusal or (math.inf, '')
+        if seen.at > refused_at:
+            # as a drive with a fault refuses everything
+            self._refusal = None
+            self.secure(explain_fault(self._inverter, seen) if seen.faulted else reason)
+            return True
         if seen.at < self._changed_at:
-            return
+            return False
+        reason = ''
         if self.armed:
-            reason = self._why_disarmed(seen)
-            if reason:
-                self.secure(reason)
+            reason = explain_stop(self._inverter, seen, self._setpoint.control_mode)
         elif not self.ours and not self.stopping and seen.keeps_running:
-            self.secure('it runs under bus control although nobody enabled it')
+            reason = (
+                'it runs under bus control although nobody enabled it: does another master '
+                'command it? End that'
+            )
+        if reason:
+            self.secure(reason)
+        return bool(reason)
+
+    def refused(self, reason: str) -> None:
+        """Disarm and stop because of a set-point; the next status may tell a better reason."""
+        self.disarm()
+        self._withdrawal.begin()
+        self._refusal = (time.monotonic(), reason)
 
     def secure(self, reason: str) -> None:
-        """Disarm and stop for a reason that a person should know."""
+        """Disarm and stop for a reason that a person should know, with what to do about it."""
         self.disarm()
         self._withdrawal.begin()
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
-            remedy = 'call ~/fault_ack, then ~/enable to go on'
+            remedy = 'then call ~/fault_ack and ~/enable to go on'
             self._tell(Severity.ERROR, f'stopped: {reason}; {remedy}')
         else:
-            self._tell(Severity.WARNING, f'stopped: {reason}; call ~/enable to go on')
+            self._tell(Severity.WARNING, f'stopped: {reason}; then call ~/enable to go on')
 
     def disarm(self) -> None:
         """Follow set-points no more; end an enable that is on its way, and a loan."""
@@ -376,22 +423,6 @@ class Motion:
             if time.monotonic() > deadline:
                 raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
-
-    def _why_disarmed(self, seen: InverterStatus) -> str:
-        control_mode = self._inverter.control_mode
-        if control_mode != self._setpoint.control_mode:
-            return f'the control mode was changed to {control_mode}'
-        if seen.faulted:
-            fault = self._inverter.model.inv_st(seen.code)
-            return f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}'
-        if not seen.from_bus:
-            by = 'keypad or terminals' if seen.code in seen.codes.local else 'somebody else'
-            return f'{by} took control ({self._inverter.describe()})'
-        if Fact.RUN_INPUT_MISSING in seen.facts:
-            return f'the RUN input was lost ({self._inverter.describe()})'
-        if not seen.runs:
-            return f'the drive stopped by itself, RUN input lost? ({self._inverter.describe()})'
-        return ''
 
     def _no_control(self, seen: InverterStatus | None) -> str:
         text = f'the bus has no control of this drive ({self._inverter.describe()})'

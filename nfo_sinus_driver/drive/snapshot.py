@@ -54,12 +54,15 @@ class InverterStatus:
     :ivar word: DriveStatus, the low 16 bits [C24]; ``None`` if the drive has none [C21].
     :ivar code: the inverter status code, read without acknowledging.
     :ivar model: whose words these are.
+    :ivar under: without a status word, the last code that told who runs the motor: others may
+        stand in for it, such as that of the current limit.
     """
 
     at: float
     word: int | None
     code: int
     model: Model
+    under: int | None = None
 
     @property
     def listed(self) -> InvStCode:
@@ -76,8 +79,8 @@ class InverterStatus:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
             return self.model.dialect.facts(self.word, self.listed.kind)
-        facts = Fact.OPERATION_ENABLED if self.code in self.codes.bus_running else Fact(0)
-        if self.code in self.codes.bus_running | self.codes.bus_standby:
+        facts = Fact.OPERATION_ENABLED if self._code in self.codes.bus_running else Fact(0)
+        if self._code in self.codes.bus_running | self.codes.bus_standby:
             facts |= Fact.NETWORK_CONTROL
         if self.kind is Kind.ALARM:
             facts |= Fact.ALARM
@@ -108,6 +111,11 @@ class InverterStatus:
         return Fact.FAULT in self.facts
 
     @property
+    def _code(self) -> int:
+        """What tells who runs the motor."""
+        return self.code if self.under is None else self.under
+
+    @property
     def standby(self) -> bool:
         """It waits for a command over the bus."""
         return self.code in self.codes.bus_standby
@@ -116,14 +124,14 @@ class InverterStatus:
     def from_bus(self) -> bool:
         """The bus has control."""
         codes = self.codes
-        by_code = self.code in codes.bus_running or self.code in codes.bus_standby
+        by_code = self._code in codes.bus_running or self._code in codes.bus_standby
         return by_code or Fact.NETWORK_CONTROL in self.facts
 
     @property
     def runs(self) -> bool:
         """The motor is driven and not on its way to a stop."""
         if self.state is State.UNKNOWN:
-            return self.code in self.codes.bus_running
+            return self._code in self.codes.bus_running
         return self.state is State.OPERATION_ENABLED
 
     @property
@@ -135,14 +143,14 @@ class InverterStatus:
     def keeps_running(self) -> bool:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing tells a stop from a lower reference
-        may_stop = self.word is None and self.code in self.codes.bus_slowing
+        may_stop = self.word is None and self._code in self.codes.bus_slowing
         return self.runs_by_bus and not may_stop
 
     @property
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN:
-            return self.code in self.codes.bus_running
+            return self._code in self.codes.bus_running
         return self.state in _DRIVEN
 
 

@@ -27,9 +27,11 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.notices import Notices
 from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
@@ -95,6 +97,7 @@ class Watch:
         self._mode_read_at = 0.0
         self._complaint = ''
         self._told_fault = 0
+        self._notices = Notices(inverter)
 
     @property
     def begun(self) -> bool:
@@ -173,11 +176,13 @@ class Watch:
         """Read the status and judge it."""
         # a request that fails is not repeated at once, so that a silent drive costs its
         # neighbours no more than one time-out in each of their cycles
-        seen = await self._inverter.look(Priority.POLL, once=True)
-        self._inverter.answering = True
-        self._tell_fault(seen)
-        if self._motion is not None:
-            self._motion.watch(seen)
+        inverter = self._inverter
+        silent = not inverter.answering
+        seen = await inverter.look(Priority.POLL, once=True)
+        inverter.answering, inverter.was_silent = True, silent
+        told = self._motion is not None and self._motion.watch(seen)
+        self._tell_fault(seen, told)
+        self._notices.take(seen)
         return seen
 
     async def _poll(self) -> None:
@@ -193,16 +198,12 @@ class Watch:
             actual = await self._measure(_ACTUAL_KEYS[inverter.control_mode])
         self._publish(seen, frequency=frequency, speed=speed, actual=actual)
 
-    def _tell_fault(self, seen: InverterStatus) -> None:
-        """Say on change that a fault stands; one that ends a ride is told by who ends it."""
+    def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
+        """Say on change that a fault stands, unless who ended a ride because of it has told."""
         code = seen.code if seen.faulted else 0
-        if code and code != self._told_fault and not self._setpoint.armed:
-            fault = self._inverter.model.inv_st(code)
-            self._inverter.tell(
-                Severity.ERROR,
-                f'fault {self._inverter.describe()}: {fault.description}. {fault.remedy}; '
-                'then call ~/fault_ack',
-            )
+        if code and code != self._told_fault and not told:
+            text = explain_fault(self._inverter, seen)
+            self._inverter.tell(Severity.ERROR, f'{text}; then call ~/fault_ack')
         self._told_fault = code
 
     async def _measure(self, key: str) -> float:
@@ -223,9 +224,10 @@ class Watch:
             inverter.connected = False
             explained = self._explain(error)
             self._bus.forget_cycle(self._inverter.settings.address)
-            if self._motion is not None:
-                self._motion.lost()
-            inverter.tell(Severity.ERROR, f'lost: {explained}; trying again for ever')
+            goes_on = 'trying again for ever'
+            if self._motion is not None and self._motion.lost():
+                goes_on = f'{goes_on}, and stopping it then; call ~/enable after that to go on'
+            inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
             try:
                 self._publish(None)
             except Exception:

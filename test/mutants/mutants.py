@@ -27,6 +27,7 @@ _ECHO = 'test/unit/link/test_echo.py'
 
 _MOTION = 'nfo_sinus_driver/drive/motion.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
+_ADVICE = 'nfo_sinus_driver/drive/advice.py'
 _DRIVE = 'nfo_sinus_driver/drive/drive.py'
 _WATCH = 'nfo_sinus_driver/drive/watch.py'
 _WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
@@ -69,33 +70,33 @@ MUTANTS = (
     Mutant(
         2,
         'a fault does not disarm',
-        _MOTION,
-        '        if seen.faulted:\n            fault = self._inverter.model',
-        '        if False:\n            fault = self._inverter.model',
+        _ADVICE,
+        '    if seen.faulted:\n        return explain_fault',
+        '    if False:\n        return explain_fault',
         (_NO_RESTART, '-k', 'fault_and_ack'),
     ),
     Mutant(
         2,
         'a keypad STOP does not disarm',
-        _MOTION,
-        '        if not seen.from_bus:\n            by =',
-        '        if False:\n            by =',
+        _ADVICE,
+        '    if not seen.from_bus:\n        return _explain',
+        '    if False:\n        return _explain',
         (_NO_RESTART, '-k', 'keypad or mode_changed'),
     ),
     Mutant(
         2,
         'a lost RUN input does not disarm',
-        _MOTION,
-        "        if not seen.runs:\n            return f'the drive stopped",
-        "        if False:\n            return f'the drive stopped",
+        _ADVICE,
+        '    if not seen.runs:\n        return (',
+        '    if False:\n        return (',
         (_NO_RESTART, '-k', 'run_input'),
     ),
     Mutant(
         2,
         'a lost line does not disarm',
         _WATCH,
-        '                self._motion.lost()',
-        '                pass',
+        'self._motion is not None and self._motion.lost():',
+        'False:',
         (_NO_RESTART, '-k', 'line_gone'),
     ),
     Mutant(
@@ -118,8 +119,8 @@ MUTANTS = (
         2,
         'a restarted driver lets run what runs',
         _MOTION,
-        '        if await self._method.in_control(Priority.SERVICE):\n            seen',
-        '        self._changed_at = float("inf")\n        if False:\n            seen',
+        '        if await self._method.in_control(Priority.SERVICE):\n            if seen',
+        '        self._changed_at = float("inf")\n        if False:\n            if seen',
         (_NO_RESTART, '-k', 'restarted_driver'),
     ),
     Mutant(

@@ -34,9 +34,12 @@ from nfo_sinus_driver.catalog import state_of
 from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
 from nfo_sinus_driver.catalog.inv_st import BUS_RUNNING
 from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
-from nfo_sinus_driver.catalog.inv_st import LOCAL
+from nfo_sinus_driver.catalog.inv_st import CURRENT_LIMIT
+from nfo_sinus_driver.catalog.inv_st import KEYPAD
+from nfo_sinus_driver.catalog.inv_st import PASSING
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.catalog.inv_st import START_DELAY
+from nfo_sinus_driver.catalog.inv_st import TERMINALS
 from nfo_sinus_driver.catalog.inv_st import TUNING
 
 G2 = load_model('sinus_g2')
@@ -168,17 +171,15 @@ def test_groups_of_status_codes() -> None:
     assert {code for code in range(48) if TEXTS[code].startswith('Bus ')} == (
         BUS_RUNNING | BUS_STANDBY | {BUS_FAIL}
     )
-    assert {TEXTS[code] for code in LOCAL} == {
-        'Stop',
+    assert [TEXTS[code] for code in sorted(KEYPAD)] == [
         'St still',
         'Final fr',
         'Loc Acc',
         'Loc Ret',
-        'Ext Stby',
-        'Ext Run',
-        'Ext Acc',
-        'Ext Ret',
-    }
+    ]
+    assert {code for code in range(48) if TEXTS[code].startswith('Ext ')} == TERMINALS
+    assert [TEXTS[code] for code in sorted(PASSING)] == ['Brake Ch', 'Cur Limt']
+    assert TEXTS[CURRENT_LIMIT] == 'Cur Limt'
     assert [TEXTS[code] for code in (START_DELAY, TUNING, SIO_FAIL, BUS_FAIL)] == [
         'Wait...',
         'Tuning',
@@ -186,7 +187,7 @@ def test_groups_of_status_codes() -> None:
         'Bus Fail',
     ]
     assert not BUS_RUNNING & BUS_STANDBY
-    assert not LOCAL & (BUS_RUNNING | BUS_STANDBY)
+    assert not (KEYPAD | TERMINALS) & (BUS_RUNNING | BUS_STANDBY)
 
 
 def test_codes_of_mode() -> None:

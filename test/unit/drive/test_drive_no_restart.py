@@ -97,7 +97,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('run', 'off')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('RUN input lost?', Severity.WARNING)
+    assert rig.notes.told('its RUN input (DIN1) was lost, or', Severity.WARNING)
     rig.assert_stays_still()
     rig.simulator.inject('run', 'on')
     assert_only_enable_helps(rig)
@@ -117,7 +117,7 @@ def test_stop_key(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('keypad', 'stop')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('keypad or terminals took control', Severity.WARNING)
+    assert rig.notes.told('STOP was pressed at the keypad, or', Severity.WARNING)
     assert_only_enable_helps(rig)
 
 
@@ -299,7 +299,7 @@ def test_set_point_that_the_drive_refuses(rig: Rig, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(type(rig.far.memory), 'check', staticmethod(refuse))
     rig.publish(30.0)
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('it refused set-point 30: ', Severity.WARNING)
+    wait_until(lambda: rig.notes.told('it refused set-point 30: ', Severity.WARNING))
     rig.assert_stays_still()
 
 

@@ -1,0 +1,72 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a drive says of itself and nobody has to act on: told when it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+
+from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Severity
+
+#: What comes and goes is told again only when it was away for so long, s.
+_AGAIN_AFTER = 10.0
+
+#: Whether it is there, and how grave it is.
+_SEVERITIES: Mapping[str, Severity] = {
+    'limit': Severity.WARNING,
+    'alarm': Severity.WARNING,
+    'sleep': Severity.INFO,
+}
+
+
+class Notices:
+    """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
+
+    def __init__(self, inverter: Inverter) -> None:
+        self._inverter = inverter
+        #: When each was last there.
+        self._seen_at: dict[str, float] = {}
+
+    def take(self, seen: InverterStatus) -> None:
+        """Tell what has begun."""
+        for name, text in self._texts(seen).items():
+            before = self._seen_at.get(name, -math.inf)
+            self._seen_at[name] = seen.at
+            if seen.at - before > _AGAIN_AFTER:
+                self._inverter.tell(_SEVERITIES[name.partition(' ')[0]], text)
+
+    def _texts(self, seen: InverterStatus) -> Mapping[str, str]:
+        """Return what is there, each alarm by its code."""
+        told, entry, codes = self._inverter.describe(), seen.listed, seen.codes
+        texts: dict[str, str] = {}
+        limited = Fact.LIMIT_ACTIVE in seen.facts or seen.code == codes.current_limit
+        if limited and not seen.faulted:
+            remedy = self._inverter.model.inv_st(codes.current_limit).remedy
+            texts['limit'] = f'the current limit holds the motor back ({told}): {remedy}'
+        elif seen.kind is Kind.ALARM:
+            # the bit may come with a code that is no alarm's: of that nothing more is known
+            meaning = f'{entry.description}. {entry.remedy}' if entry.remedy else 'see its display'
+            texts[f'alarm {seen.code}'] = f'alarm {told}: {meaning}'
+        if Fact.SLEEPING in seen.facts:
+            texts['sleep'] = (
+                f'the drive sleeps ({told}), for its set-point is below its sleep frequency: '
+                'a greater one wakes it'
+            )
+        return texts
