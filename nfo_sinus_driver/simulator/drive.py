@@ -57,6 +57,7 @@ from nfo_sinus_driver.simulator.runner import Runner
 from nfo_sinus_driver.simulator.runner import nameplate
 from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 from nfo_sinus_driver.simulator.runner_optimal import OptimalRunner
+from nfo_sinus_driver.simulator.self_restart import SelfRestart
 from nfo_sinus_driver.simulator.serial_side import SerialSide
 
 #: What a factory reset leaves as it is: without them the drive would not hear the line any more.
@@ -124,6 +125,7 @@ class SimulatedDrive:
         self.memory = Memory(machine, {**(settings or {}), 'serial.address': address})
         self.firmware = firmware_of(self.memory)
         self.faults = Faults(self.model, self.firmware.log_size)
+        self.self_restart = SelfRestart(self.memory, self.faults)
         self.motor = Motor(nameplate(self.memory))
         self.counters = Counters()
         self.runner = _RUNNERS[model](self.memory, self.motor, self.faults, self.counters)
@@ -276,6 +278,7 @@ class SimulatedDrive:
         :raises ValueError: the model has no such fault.
         """
         self.faults.trip(code, self.counters.op_time, cause_present=cause_present)
+        self.self_restart.tripped(code)
         if code in SERIAL:
             self.runner.take(Source.STOP)
         self._settle()
@@ -398,6 +401,7 @@ class SimulatedDrive:
     @property
     def _resting(self) -> bool:
         timers = self._boot_left > 0 or self._silent_left > 0 or self.runner.waiting
+        timers = timers or self.self_restart.waiting
         watched = self.serial.watches and self._bus_controls
         return self.motor.settled and self.runner.settled and not timers and not watched
 
@@ -418,6 +422,7 @@ class SimulatedDrive:
         if self.serial.timed_out:
             self.serial_error(SioErr.TIMEOUT)
         self.runner.wait(dt)
+        self.self_restart.wait(dt, driven=self.motor.driven, voltage=self.motor.voltage_on)
         self.motor.advance(dt)
         self.counters.advance(dt, self.motor)
         self._settle()

@@ -114,6 +114,11 @@ class Faults:
         """Whether a fault of the serial channel stands."""
         return not SERIAL.isdisjoint(self._present)
 
+    @property
+    def lasting(self) -> bool:
+        """Whether the cause of a fault is still there."""
+        return any(self._present[code] for code in self.codes)
+
     def trip(self, code: int, op_time: float, *, cause_present: bool) -> None:
         """
         Let a fault happen, at ``op_time`` hours.

@@ -19,6 +19,7 @@ import pytest
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.self_restart import TRIES
 
 MODEL = load_model('sinus_g2')
 FAULTS = [code for code in range(48) if MODEL.inv_st(code).kind is Kind.FAULT]
@@ -275,3 +276,95 @@ def test_a_silent_drive_hears_nothing_and_times_out(bench):
     bench.drive.silence(5)
     bench.drive.advance(2.1)
     assert bench.inv_st == 14
+
+
+# ---- RstDly, TrTime and ErrCnt: the drive goes on by itself ----
+
+
+def restarting(bench, code=5, tries=1, delay=2, trial=10):
+    bench.write(TRIES[code], tries)
+    bench.write('error.rst_dly', delay)
+    bench.write('error.tr_time', trial)
+    bench.run(20, 5)
+    return bench
+
+
+@pytest.mark.parametrize('code', TRIES)
+def test_a_fault_with_tries_ends_by_itself_and_the_motor_runs_again(bench, code):
+    restarting(bench, code)
+    bench.drive.trip(code)
+    bench.drive.advance(1.9)
+    assert bench.inv_st == code
+    assert not bench.running
+    bench.drive.advance(0.3)
+    assert bench.running
+    assert bench.inv_st == 39
+    assert bench.drive.ack_reads == 0
+    assert [entry.code for entry in bench.drive.faults.log] == [code]
+
+
+def test_the_delay_counts_from_when_the_cause_is_gone(bench):
+    restarting(bench)
+    bench.drive.trip(5, cause_present=True)
+    bench.drive.advance(100)
+    assert bench.inv_st == 5
+    bench.drive.end_fault_causes()
+    bench.drive.advance(1.9)
+    assert bench.inv_st == 5
+    bench.drive.advance(0.3)
+    assert bench.running
+
+
+def test_without_tries_it_waits_to_be_acknowledged(bench):
+    restarting(bench, tries=0)
+    bench.drive.trip(5)
+    bench.drive.advance(60)
+    assert bench.inv_st == 5
+
+
+@pytest.mark.parametrize('code', sorted(set(FAULTS) - set(TRIES)))
+def test_a_fault_that_has_no_tries_never_ends_by_itself(bench, code):
+    restarting(bench)
+    bench.drive.trip(code)
+    bench.drive.advance(60)
+    assert bench.inv_st == code
+
+
+def test_the_tries_are_used_up_unless_it_runs_well_for_a_while(bench):
+    restarting(bench, tries=2, trial=10)
+    for _ in range(2):
+        bench.drive.trip(5)
+        bench.drive.advance(5)
+        assert bench.running
+    bench.drive.trip(5)
+    bench.drive.advance(100)
+    assert bench.inv_st == 5, 'it has used its tries up'
+    acknowledge(bench)
+    bench.drive.advance(11)
+    assert bench.running
+    bench.drive.trip(5)
+    bench.drive.advance(5)
+    assert bench.running, 'it has run well for TrTime'
+
+
+def test_it_restarts_nothing_when_the_command_was_taken_back_meanwhile(bench):
+    bench.write('error.overload_err_cnt', 1)
+    bench.write('error.rst_dly', 2)
+    bench.write('fieldbus.drive_control', 0x4006)
+    bench.write('fieldbus.drive_control', 0xC07F)
+    assert bench.running
+    bench.drive.trip(5)
+    bench.write('fieldbus.drive_control', 0xC07E)  # not refused: it is how a fault is reset
+    bench.drive.advance(10)
+    assert (bench.running, bench.state) == (False, 'READY_TO_SWITCH_ON')
+
+
+def test_a_control_word_needs_bit_0_low_after_a_fault_that_ended_by_itself(bench):
+    bench.write('error.overload_err_cnt', 1)
+    bench.write('fieldbus.drive_control', 0x4006)
+    bench.write('fieldbus.drive_control', 0xC07F)
+    bench.drive.trip(5)
+    bench.drive.advance(10)
+    assert (bench.running, bench.state) == (False, 'SWITCH_ON_DISABLED')
+    bench.write('fieldbus.drive_control', 0xD07F)  # unless bit 12 is set
+    assert bench.running

@@ -31,6 +31,7 @@ ON = POWER | Control.SWITCH_ON
 FORWARD = ON | Control.ENABLE_OP
 REVERSE = ON | Control.ENABLE_REV_OP
 BOTH = FORWARD | REVERSE
+EVENT = Control.EVENT_TRIGGERED_OP
 
 MOVING = Conditions(at_zero=False, voltage=True)
 RESTING = Conditions()
@@ -40,6 +41,7 @@ FAULT_MOVING = Conditions(fault=True, at_zero=False, voltage=True)
 COASTING = Conditions(brake=False, at_zero=False, voltage=True)
 RELEASED = Conditions(brake=False, at_zero=False)
 BRAKED = Conditions(at_zero=True, voltage=True)
+LET_GO = Conditions(at_zero=False)
 
 
 def machine_in(phase, word=FORWARD):
@@ -49,65 +51,189 @@ def machine_in(phase, word=FORWARD):
     return machine
 
 
-# from, control word, conditions, to, the control word before
-EXITS = [
-    ('NOT_READY_TO_SWITCH_ON', ON, NOT_READY, 'NOT_READY_TO_SWITCH_ON', ON),
-    ('NOT_READY_TO_SWITCH_ON', 0, RESTING, 'SWITCH_ON_DISABLED', 0),
-    ('SWITCH_ON_DISABLED', ON, RESTING, 'SWITCH_ON_DISABLED', ON),
-    ('SWITCH_ON_DISABLED', POWER, RESTING, 'READY_TO_SWITCH_ON', ON),
-    ('SWITCH_ON_DISABLED', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
-    ('SWITCH_ON_DISABLED', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0),
-    ('SWITCH_ON_DISABLED', ON | Control.AUTO_INIT, RESTING, 'SWITCHED_ON', 0),
-    ('READY_TO_SWITCH_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', 0),
-    ('READY_TO_SWITCH_ON', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
-    ('READY_TO_SWITCH_ON', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0),
-    ('READY_TO_SWITCH_ON', ON, RESTING, 'SWITCHED_ON', 0),
-    ('SWITCHED_ON', ON, RESTING, 'SWITCHED_ON', ON),
-    ('SWITCHED_ON', POWER, MOVING, 'SWITCHED_ON', ON),
-    ('SWITCHED_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', ON),
-    ('SWITCHED_ON', Control.SWITCH_ON, RESTING, 'SWITCH_ON_DISABLED', ON),
-    ('SWITCHED_ON', FORWARD, RESTING, 'OPERATION_ENABLED', ON),
-    ('SWITCHED_ON', REVERSE, RESTING, 'OPERATION_ENABLED', ON),
-    ('SWITCHED_ON', BOTH, RESTING, 'SWITCHED_ON', ON),
-    ('SWITCHED_ON', FORWARD | Control.EVENT_TRIGGERED_OP, RESTING, 'SWITCHED_ON', FORWARD),
-    ('SWITCHED_ON', FORWARD | Control.EVENT_TRIGGERED_OP, RESTING, 'OPERATION_ENABLED', ON),
-    ('SWITCHED_ON', REVERSE | Control.EVENT_TRIGGERED_OP, RESTING, 'OPERATION_ENABLED', FORWARD),
-    ('OPERATION_ENABLED', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD),
-    ('OPERATION_ENABLED', BOTH, MOVING, 'OPERATION_ENABLED', FORWARD),
-    ('OPERATION_ENABLED', ON & ~Control.ENABLE_VOLTAGE, MOVING, 'QUICK_STOP', FORWARD),
-    ('OPERATION_ENABLED', ON & ~Control.DISABLE_QUICK_STOP, MOVING, 'QUICK_STOP', FORWARD),
-    ('OPERATION_ENABLED', FORWARD & ~Control.SWITCH_ON, MOVING, 'SHUTDOWN', FORWARD),
-    ('OPERATION_ENABLED', ON, MOVING, 'DISABLE', FORWARD),
-    ('DISABLE', ON, MOVING, 'DISABLE', ON),
-    ('DISABLE', Control.SWITCH_ON, MOVING, 'QUICK_STOP', ON),
-    ('DISABLE', POWER, MOVING, 'SHUTDOWN', ON),
-    ('DISABLE', REVERSE, MOVING, 'OPERATION_ENABLED', ON),
-    ('DISABLE', ON, BRAKED, 'SWITCHED_ON', ON),
-    ('DISABLE', ON | Control.OVERRIDE_COAST, MOVING, 'SWITCHED_ON', ON),
-    ('SHUTDOWN', POWER, MOVING, 'SHUTDOWN', ON),
-    ('SHUTDOWN', POWER, BRAKED, 'SHUTDOWN', ON),
-    ('SHUTDOWN', POWER, COASTING, 'SHUTDOWN', ON),
-    ('SHUTDOWN', POWER, RELEASED, 'READY_TO_SWITCH_ON', ON),
-    ('SHUTDOWN', 0, MOVING, 'QUICK_STOP', ON),
-    ('SHUTDOWN', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD),
-    ('QUICK_STOP', FORWARD, MOVING, 'QUICK_STOP', ON),
-    ('QUICK_STOP', 0, RESTING, 'SWITCH_ON_DISABLED', ON),
-    ('FAULT_REACTION_ACTIVE', ON, FAULT_MOVING, 'FAULT_REACTION_ACTIVE', ON),
-    ('FAULT_REACTION_ACTIVE', ON, FAULT, 'FAULTED', ON),
-    ('FAULTED', ON, FAULT, 'FAULTED', ON),
-    ('FAULTED', ON, RESTING, 'SWITCH_ON_DISABLED', ON),
-]
+# by name: from, control word, conditions, to, the control word before
+EXITS = {
+    'not_ready_to_switch_on_stays_during_the_self_test': (
+        'NOT_READY_TO_SWITCH_ON', ON, NOT_READY, 'NOT_READY_TO_SWITCH_ON', ON,
+    ),
+    'not_ready_to_switch_on_leaves_when_initialised': (
+        'NOT_READY_TO_SWITCH_ON', 0, RESTING, 'SWITCH_ON_DISABLED', 0,
+    ),
+    'switch_on_disabled_stays_while_bit_0_is_set': (
+        'SWITCH_ON_DISABLED', ON, RESTING, 'SWITCH_ON_DISABLED', ON,
+    ),
+    'switch_on_disabled_stays_without_quick_stop_disabled': (
+        'SWITCH_ON_DISABLED', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0,
+    ),
+    'switch_on_disabled_stays_without_voltage_enabled': (
+        'SWITCH_ON_DISABLED', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0,
+    ),
+    'switch_on_disabled_leaves_on_bits_1_and_2_with_bit_0_low': (
+        'SWITCH_ON_DISABLED', POWER, RESTING, 'READY_TO_SWITCH_ON', ON,
+    ),
+    'switch_on_disabled_leaves_on_auto_init': (
+        'SWITCH_ON_DISABLED', ON | Control.AUTO_INIT, RESTING, 'SWITCHED_ON', 0,
+    ),
+    'ready_to_switch_on_stays_with_bit_0_low': (
+        'READY_TO_SWITCH_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', 0,
+    ),
+    'ready_to_switch_on_leaves_on_quick_stop': (
+        'READY_TO_SWITCH_ON', Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0,
+    ),
+    'ready_to_switch_on_leaves_on_voltage_disabled': (
+        'READY_TO_SWITCH_ON', Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', 0,
+    ),
+    'ready_to_switch_on_leaves_on_switch_on': (
+        'READY_TO_SWITCH_ON', ON, RESTING, 'SWITCHED_ON', 0,
+    ),
+    'switched_on_stays_without_direction': (
+        'SWITCHED_ON', ON, RESTING, 'SWITCHED_ON', ON,
+    ),
+    'switched_on_stays_while_there_is_voltage': (
+        'SWITCHED_ON', POWER, MOVING, 'SWITCHED_ON', ON,
+    ),
+    'switched_on_stays_on_both_directions': (
+        'SWITCHED_ON', BOTH, RESTING, 'SWITCHED_ON', ON,
+    ),
+    'switched_on_stays_on_an_old_direction_if_an_event_is_required': (
+        'SWITCHED_ON', FORWARD | EVENT, RESTING, 'SWITCHED_ON', FORWARD,
+    ),
+    'switched_on_leaves_on_switch_off': (
+        'SWITCHED_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', ON,
+    ),
+    # and on from there at once
+    'switched_on_leaves_on_quick_stop': (
+        'SWITCHED_ON', ON & ~Control.DISABLE_QUICK_STOP, RESTING, 'SWITCH_ON_DISABLED', ON,
+    ),
+    'switched_on_leaves_on_voltage_disabled': (
+        'SWITCHED_ON', ON & ~Control.ENABLE_VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', ON,
+    ),
+    'switched_on_leaves_on_forward': (
+        'SWITCHED_ON', FORWARD, RESTING, 'OPERATION_ENABLED', ON,
+    ),
+    'switched_on_leaves_on_reverse': (
+        'SWITCHED_ON', REVERSE, RESTING, 'OPERATION_ENABLED', ON,
+    ),
+    'switched_on_leaves_on_a_direction_that_comes_if_an_event_is_required': (
+        'SWITCHED_ON', FORWARD | EVENT, RESTING, 'OPERATION_ENABLED', ON,
+    ),
+    'switched_on_leaves_on_a_direction_that_changes_if_an_event_is_required': (
+        'SWITCHED_ON', REVERSE | EVENT, RESTING, 'OPERATION_ENABLED', FORWARD,
+    ),
+    'operation_enabled_stays_with_a_direction': (
+        'OPERATION_ENABLED', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD,
+    ),
+    'operation_enabled_stays_on_reverse': (
+        'OPERATION_ENABLED', REVERSE, MOVING, 'OPERATION_ENABLED', FORWARD,
+    ),
+    'operation_enabled_stays_on_both_directions': (
+        'OPERATION_ENABLED', BOTH, MOVING, 'OPERATION_ENABLED', FORWARD,
+    ),
+    'operation_enabled_leaves_on_voltage_disabled': (
+        'OPERATION_ENABLED', FORWARD & ~Control.ENABLE_VOLTAGE, MOVING, 'QUICK_STOP', FORWARD,
+    ),
+    'operation_enabled_leaves_on_quick_stop': (
+        'OPERATION_ENABLED', FORWARD & ~Control.DISABLE_QUICK_STOP, MOVING, 'QUICK_STOP', FORWARD,
+    ),
+    'operation_enabled_leaves_on_switch_off': (
+        'OPERATION_ENABLED', FORWARD & ~Control.SWITCH_ON, MOVING, 'SHUTDOWN', FORWARD,
+    ),
+    'operation_enabled_leaves_on_a_lost_direction': (
+        'OPERATION_ENABLED', ON, MOVING, 'DISABLE', FORWARD,
+    ),
+    'disable_stays_while_it_brakes': (
+        'DISABLE', ON, MOVING, 'DISABLE', ON,
+    ),
+    'disable_leaves_on_voltage_disabled': (
+        'DISABLE', ON & ~Control.ENABLE_VOLTAGE, MOVING, 'QUICK_STOP', ON,
+    ),
+    'disable_leaves_on_quick_stop': (
+        'DISABLE', ON & ~Control.DISABLE_QUICK_STOP, MOVING, 'QUICK_STOP', ON,
+    ),
+    'disable_leaves_on_switch_off': (
+        'DISABLE', POWER, MOVING, 'SHUTDOWN', ON,
+    ),
+    'disable_leaves_on_a_direction': (
+        'DISABLE', REVERSE, MOVING, 'OPERATION_ENABLED', ON,
+    ),
+    'disable_leaves_at_zero_rpm': (
+        'DISABLE', ON, BRAKED, 'SWITCHED_ON', ON,
+    ),
+    'disable_leaves_on_coast': (
+        'DISABLE', ON | Control.OVERRIDE_COAST, MOVING, 'SWITCHED_ON', ON,
+    ),
+    'shutdown_stays_while_it_brakes': (
+        'SHUTDOWN', POWER, MOVING, 'SHUTDOWN', ON,
+    ),
+    'shutdown_stays_at_zero_rpm_while_there_is_voltage': (
+        'SHUTDOWN', POWER, BRAKED, 'SHUTDOWN', ON,
+    ),
+    'shutdown_stays_while_it_coasts_and_there_is_voltage': (
+        'SHUTDOWN', POWER, COASTING, 'SHUTDOWN', ON,
+    ),
+    'shutdown_leaves_when_it_has_braked_and_the_voltage_is_off': (
+        'SHUTDOWN', POWER, RESTING, 'READY_TO_SWITCH_ON', ON,
+    ),
+    'shutdown_leaves_when_it_coasts_and_the_voltage_is_off': (
+        'SHUTDOWN', POWER, RELEASED, 'READY_TO_SWITCH_ON', ON,
+    ),
+    'shutdown_leaves_when_coast_is_chosen_and_the_voltage_is_off': (
+        'SHUTDOWN', POWER | Control.OVERRIDE_COAST, LET_GO, 'READY_TO_SWITCH_ON', ON,
+    ),
+    'shutdown_leaves_on_voltage_disabled': (
+        'SHUTDOWN', Control.DISABLE_QUICK_STOP, MOVING, 'QUICK_STOP', ON,
+    ),
+    'shutdown_leaves_on_quick_stop': (
+        'SHUTDOWN', Control.ENABLE_VOLTAGE, MOVING, 'QUICK_STOP', ON,
+    ),
+    'shutdown_leaves_on_switch_on': (
+        'SHUTDOWN', FORWARD, MOVING, 'OPERATION_ENABLED', FORWARD,
+    ),
+    # by way of OPERATION_ENABLED, which a lost direction leaves
+    'shutdown_leaves_on_switch_on_without_direction': (
+        'SHUTDOWN', ON, MOVING, 'DISABLE', POWER,
+    ),
+    'quick_stop_stays_while_there_is_voltage': (
+        'QUICK_STOP', FORWARD, MOVING, 'QUICK_STOP', ON,
+    ),
+    'quick_stop_leaves_when_the_voltage_is_off': (
+        'QUICK_STOP', 0, RESTING, 'SWITCH_ON_DISABLED', ON,
+    ),
+    'fault_reaction_active_stays_while_there_is_voltage': (
+        'FAULT_REACTION_ACTIVE', ON, FAULT_MOVING, 'FAULT_REACTION_ACTIVE', ON,
+    ),
+    'fault_reaction_active_leaves_when_the_voltage_is_off': (
+        'FAULT_REACTION_ACTIVE', ON, FAULT, 'FAULTED', ON,
+    ),
+    'faulted_stays_while_the_fault_stands': (
+        'FAULTED', ON, FAULT, 'FAULTED', ON,
+    ),
+    'faulted_leaves_when_the_fault_is_gone_and_acknowledged': (
+        'FAULTED', ON, RESTING, 'SWITCH_ON_DISABLED', ON,
+    ),
+}
 
 
-@pytest.mark.parametrize(('begin', 'word', 'conditions', 'end', 'before'), EXITS)
-def test_exit(begin, word, conditions, end, before):
+@pytest.mark.parametrize(
+    ('begin', 'word', 'conditions', 'end', 'before'), EXITS.values(), ids=EXITS
+)
+def test_table_16(begin, word, conditions, end, before):
     machine = machine_in(Phase[begin], Control(before))
     machine.update(Control(word), conditions)
     assert machine.phase is Phase[end]
 
 
-@pytest.mark.parametrize('phase', [phase for phase in Phase if phase is not Phase.FAULTED])
-def test_a_fault_is_entered_from_everywhere(phase):
+def test_every_state_has_its_exits():
+    left = {begin for begin, _, _, end, _ in EXITS.values() if begin != end}
+    assert left == set(Phase.__members__)
+
+
+@pytest.mark.parametrize(
+    'phase',
+    [phase for phase in Phase if phase is not Phase.FAULTED],
+    ids=lambda phase: f'{phase.value.lower()}_leaves_on_a_fault',
+)
+def test_table_16_fault(phase):
     machine = machine_in(phase)
     machine.update(FORWARD, FAULT_MOVING)
     assert machine.phase is Phase.FAULT_REACTION_ACTIVE
