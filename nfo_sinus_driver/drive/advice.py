@@ -92,6 +92,9 @@ def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
         return f'the terminals have control now ({told}): press STOP at the drive to end that'
     if seen.code in seen.codes.keypad:
         return f'the keypad has control now and runs the motor ({told}): press STOP there'
+    if seen.runs:
+        # the current limit, for one, shows instead of who runs it
+        return f'keypad or terminals have control now and run the motor ({told}): press STOP there'
     if inverter.was_silent:
         return (
             f'the bus lost control while the drive did not answer ({told}): it was switched off '

@@ -118,62 +118,8 @@ def test_scmd_cannot_be_read(bench):
         bench.drive.read(0x298, 1)
 
 
-@pytest.mark.parametrize(
-    ('code', 'frequency'),
-    [
-        (Scmd.ANALOG_F, 30),
-        (Scmd.ANALOG_R, -30),
-        (Scmd.FIX_1_F, 10),
-        (Scmd.FIX_1_R, -10),
-        (Scmd.FIX_2_F, 15),
-        (Scmd.FIX_2_R, -15),
-        (Scmd.FIX_3_F, 20),
-        (Scmd.FIX_3_R, -20),
-        (Scmd.FIX_4_F, 25),
-        (Scmd.FIX_4_R, -25),
-        (Scmd.FIX_5_F, 30),
-        (Scmd.FIX_5_R, -30),
-        (Scmd.FIX_6_F, 40),
-        (Scmd.FIX_6_R, -40),
-        (Scmd.FIX_7_F, 50),
-        (Scmd.FIX_7_R, -50),
-        (Scmd.OP_MODE, 25),
-        (Scmd.TERMINAL, 25),
-        (Scmd.FIELDBUS, 12.5),
-    ],
-)
-def test_every_run_command_has_its_reference(bench, code, frequency):
-    bench.mode(3)
-    bench.write('status.frq_set', 12.5)
-    bench.scmd(code)
-    assert bench.running
-    bench.drive.advance(6)
-    assert bench.read('status.frq_act') == frequency
-    assert bench.inv_st == 38
-    status = bench.read('fieldbus.drive_status')
-    assert bool(status & 1 << 14) is (frequency < 0)
-    assert bool(status & 1 << 8) is (code is Scmd.FIELDBUS)
-    assert status & 1 << 9
-    bench.scmd(0)
-    assert bench.state == 'SHUTDOWN'
-
-
 def test_all_run_commands_are_known():
     assert len(RUN_COMMANDS) == 19
-
-
-def test_erasing_the_error_log_and_resetting_the_energy(bench):
-    bench.drive.trip(5)
-    bench.read('fieldbus.inv_st_with_ack')
-    assert len(bench.drive.faults.log) == 1
-    bench.mode(3)
-    bench.scmd(Scmd.ERASE_E_LOG)
-    assert bench.drive.faults.log == []
-    assert bench.read('status.e_out') > 0
-    total = bench.read('status.sigma_e_out')
-    bench.scmd(Scmd.RESET_E_OUT)
-    assert bench.read('status.e_out') == 0
-    assert bench.read('status.sigma_e_out') == total
 
 
 # ---- running by the bus ----
