@@ -35,7 +35,7 @@ from std_srvs.srv import SetBool
 
 #: Unlike any other drive's name: what is said to these must never reach a motor.
 NAMES = [f'simulated_for_bench_{number}' for number in range(1, 9)]
-_FORMATS = {'modbus_rtu': '8E1', 'classic': '7E1'}
+_FORMATS = {'modbus_rtu': '8E1', 'modbus_ascii': '7E1', 'classic': '7E1'}
 #: From the moment that every drive is polled until nothing is special any more, s.
 _SETTLE = 2.0
 

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+import functools
 import json
 import statistics
 import struct
@@ -29,9 +30,9 @@ from driver_rig import DriverRig
 import masters
 from rig import Rig
 from rig import Window
+import stops
 import trace_file
 from trace_file import Frame
-from trace_file import Line
 
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import load_model
@@ -53,19 +54,22 @@ class Effort:
 
     :ivar window: how long cycles are watched, s.
     :ivar setpoints: how many set-points are published.
+    :ivar events: how many of each kind have to stop a motor.
     """
 
     window: float
     setpoints: int
+    events: int
 
 
 @dataclass(frozen=True)
 class Measurement:
     """
-    One row of the table.
+    What is measured at a time: one row of a table, or several.
 
     :ivar group: what ``--only`` takes.
     :ivar aims: the most that is aimed at, by the name of the figure.
+    :ivar measure: returns the figures of each row, by its title.
     """
 
     group: str
@@ -73,37 +77,58 @@ class Measurement:
     baud_rate: int
     drives: int
     aims: Figures
-    measure: Callable[[Effort], Figures]
+    measure: Callable[[Effort], dict[str, Figures]]
 
 
 def all_measurements() -> Iterator[Measurement]:
-    """Return every row in the order of the table."""
+    """Return every measurement in the order of the tables."""
     lines = [(57600, 8), (57600, 1), (19200, 8), (19200, 1)]
     aims = {'ratio': 1.05, 'short_gaps': 0, 'cpu': 10}
     for title, settings in (('driver', {}), ('driver, telemetry off', {'telemetry_rate': 0.0})):
         for baud_rate, drives in lines:
-            measure = _bound(_driver_cycle, baud_rate, drives, settings)
+            measure = _bound(title, _driver_cycle, baud_rate, drives, settings)
             yield Measurement('driver', title, baud_rate, drives, aims, measure)
     for baud_rate, drives in ((57600, 8), (57600, 1), (9600, 1)):
-        measure = _bound(_classic_cycle, baud_rate, drives)
+        measure = _bound('driver, Classic', _classic_cycle, baud_rate, drives)
         yield Measurement(
             'classic', 'driver, Classic', baud_rate, drives, {'ratio': 1.05, 'cpu': 10}, measure
         )
     for name in masters.MASTERS:
         for baud_rate, drives in lines:
-            measure = _bound(_other_cycle, name, baud_rate, drives)
+            measure = _bound(name, _other_cycle, name, baud_rate, drives)
             yield Measurement('masters', name, baud_rate, drives, {}, measure)
     idle = {'poll_rate': 1.0, 'telemetry_rate': 0.0}
     for title, drives, settings, aims in (
         ('set-point to wire, idle', 1, idle, {'time': 2, 'short_gaps': 0}),
         ('set-point to wire, saturated', 8, {}, {'p99': 15, 'short_gaps': 0, 'cpu': 10}),
     ):
-        measure = _bound(_setpoints, 57600, drives, settings)
+        measure = _bound(title, _setpoints, 57600, drives, settings)
         yield Measurement('setpoints', title, 57600, drives, aims, measure)
+    for protocol, baud_rate, kinds in (
+        ('modbus_rtu', 57600, stops.KINDS),
+        ('modbus_rtu', 19200, stops.KINDS),
+        ('modbus_ascii', 19200, stops.FEW_KINDS),
+        ('classic', 57600, stops.FEW_KINDS),
+        ('classic', 9600, stops.FEW_KINDS),
+    ):
+        yield Measurement(
+            'stop', f'stop, {protocol}', baud_rate, 8, {'beyond': 5, 'polls': 2},
+            functools.partial(_stops, protocol, baud_rate, kinds),
+        )
 
 
-def _bound(function: Callable[..., Figures], *arguments: object) -> Callable[[Effort], Figures]:
-    return lambda effort: function(*arguments, effort)
+def _bound(
+    title: str, function: Callable[..., Figures], *arguments: object
+) -> Callable[[Effort], dict[str, Figures]]:
+    return lambda effort: {title: function(*arguments, effort)}
+
+
+def _stops(
+    protocol: str, baud_rate: int, kinds: Sequence[str], effort: Effort
+) -> dict[str, Figures]:
+    with DriverRig(baud_rate, 8, protocol, setpoint_timeout=stops.TIMEOUT) as rig:
+        figures = stops.measure(rig, kinds, effort.events)
+        return {f'{kind}, {protocol}': found for kind, found in figures.items()}
 
 
 def _driver_cycle(baud_rate: int, drives: int, settings: Figures, effort: Effort) -> Figures:
@@ -159,7 +184,8 @@ def _setpoints(baud_rate: int, drives: int, settings: Figures, effort: Effort) -
             raise RuntimeError(f'the publisher failed:\n{rig.log}')
         window = watched_since()
         delays, lost = _delays(json.loads(output), window.frames)
-        median, limit = statistics.median(delays), _longest_transaction(window.frames, rig.line)
+        median = statistics.median(delays)
+        limit = trace_file.longest_transaction(window.frames, rig.line)
         return {
             'time': 1e3 * median,
             'p99': 1e3 * trace_file.percentile(delays, 99),
@@ -188,10 +214,3 @@ def _delays(
         moments = written.get((drive + 1, word), ())
         delays += [moment - at for moment in moments if at <= moment < at + _LOST][:1]
     return delays, len(published) - len(delays)
-
-
-def _longest_transaction(frames: list[Frame], line: Line) -> float:
-    """Return the longest time for which a transaction keeps the line, s."""
-    return max(line.limit(pair) for pair in pairwise(frames) if pair[0].is_request)
-
-

@@ -34,7 +34,7 @@ _BEGIN = '<!-- benchmark: from here to the end mark written by benchmark/run.py 
 _END = '<!-- benchmark: end -->'
 
 #: Title and figure of each column, and how many decimals.
-_COLUMNS = (
+_CYCLES = (
     ('time, ms', 'time', 2),
     ('p99, ms', 'p99', 2),
     ('limit, ms', 'limit', 2),
@@ -47,22 +47,46 @@ _COLUMNS = (
     ('CPU, ms a transaction', 'cpu_transaction', 2),
     ('others, % of a core', 'others', 0),
 )
+_STOPS = (
+    ('events', 'events', 0),
+    ('median, ms', 'time', 2),
+    ('p99, ms', 'p99', 2),
+    ('longest, ms', 'longest', 2),
+    ('transaction, ms', 'limit', 2),
+    ('longest / transaction', 'ratio', 2),
+    ('longest beyond it, ms', 'beyond', 2),
+    ('polls', 'polls', 0),
+    ('others, % of a core', 'others', 0),
+)
 _UNITS = {
     'ratio': ('time / limit', '', 3),
     'short_gaps': ('gaps < t3.5', '', 0),
     'cpu': ('CPU', ' %', 1),
     'time': ('median', ' ms', 2),
     'p99': ('p99', ' ms', 2),
+    'beyond': ('beyond a transaction', ' ms', 2),
+    'polls': ('polls', '', 0),
 }
 
+Row = tuple[Measurement, str, Figures]
 
-def table(rows: Sequence[tuple[Measurement, Figures]]) -> str:
-    """Return the table in Markdown."""
-    titles = ['what', 'bit/s', 'drives', *(title for title, _, _ in _COLUMNS), 'aims']
+
+def tables(rows: Sequence[Row]) -> str:
+    """Return the tables in Markdown: that of cycles and set-points, and that of stops."""
+    of_stops = [row for row in rows if row[0].group == 'stop']
+    of_cycles = [row for row in rows if row[0].group != 'stop']
+    found = [_table(some, columns) for some, columns in ((of_cycles, _CYCLES), (of_stops, _STOPS))]
+    return '\n\n'.join(filter(None, found))
+
+
+def _table(rows: Sequence[Row], columns: Sequence[tuple[str, str, int]]) -> str:
+    if not rows:
+        return ''
+    titles = ['what', 'bit/s', 'drives', *(title for title, _, _ in columns), 'aims']
     lines = [_line(titles), _line(['---', *['---:'] * (len(titles) - 2), '---'])]
-    for measurement, figures in rows:
-        cells = [measurement.title, str(measurement.baud_rate), str(measurement.drives)]
-        cells += [_number(figures.get(name), decimals) for _, name, decimals in _COLUMNS]
+    for measurement, title, figures in rows:
+        cells = [title, str(measurement.baud_rate), str(measurement.drives)]
+        cells += [_number(figures.get(name), decimals) for _, name, decimals in columns]
         lines.append(_line([*cells, verdict(measurement.aims, figures)]))
     return '\n'.join(lines)
 
@@ -71,6 +95,8 @@ def verdict(aims: Figures, figures: Figures) -> str:
     """Return whether the aims are met, or what was missed and by how much."""
     missed = []
     for name, most in aims.items():
+        if name not in figures:
+            continue
         title, unit, decimals = _UNITS[name]
         excess = round(figures[name] - most, decimals)
         if excess > 0:

@@ -21,6 +21,7 @@ own. docs/performance.md explains the rows.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 import os
 import signal
 import statistics
@@ -34,12 +35,15 @@ from measurements import all_measurements
 import page
 import processor
 
-_WHOLE = Effort(window=5.0, setpoints=500)
-_QUICK = Effort(window=3.0, setpoints=60)
+_WHOLE = Effort(window=5.0, setpoints=500, events=10)
+_QUICK = Effort(window=3.0, setpoints=60, events=3)
 #: The machine is calm when everybody else takes less than this, cores.
 _CALM = 0.5
 #: What may not happen in any run, so that a median would hide it.
 _COUNTED = ('short_gaps', 'lost')
+#: What counts in every run: the events, and the longest that any of them took.
+_SUMMED = (*_COUNTED, 'events')
+_WORST = ('longest', 'ratio', 'beyond', 'polls')
 
 
 def main() -> None:
@@ -53,14 +57,18 @@ def main() -> None:
     chosen = [row for row in all_measurements() if not options.only or row.group in options.only]
     runs = 1 if options.quick else options.runs
     effort = _QUICK if options.quick else _WHOLE
-    measured: list[list[Figures]] = [[] for _ in chosen]
+    measured: list[list[dict[str, Figures]]] = [[] for _ in chosen]
     loads = []
     for run in range(1, runs + 1):
         for measurement, results in zip(chosen, measured, strict=True):
             results.append(_measure(measurement, effort, options.calm, loads))
             _tell(f'run {run} of {runs}', measurement, results[-1])
-    rows = [(row, merged(results)) for row, results in zip(chosen, measured, strict=True)]
-    text = f'{page.circumstances(_command(), runs, loads)}\n\n{page.table(rows)}'
+    rows = [
+        (measurement, title, merged(measurement.group, [found[title] for found in results]))
+        for measurement, results in zip(chosen, measured, strict=True)
+        for title in results[0]
+    ]
+    text = f'{page.circumstances(_command(), runs, loads)}\n\n{page.tables(rows)}'
     print(text)
     if options.write:
         page.write(text)
@@ -68,30 +76,37 @@ def main() -> None:
 
 def _measure(
     measurement: Measurement, effort: Effort, patience: float, loads: list[float]
-) -> Figures:
+) -> dict[str, Figures]:
     """Measure, again while the machine is not calm and there is patience (s)."""
     deadline = time.monotonic() + patience
-    counted = dict.fromkeys(_COUNTED, 0.0)
+    counted: dict[tuple[str, str], float] = {}
     while True:
         processor.await_calm(_CALM, deadline - time.monotonic())
         loads.append(os.getloadavg()[0])
-        figures = measurement.measure(effort)
+        rows = measurement.measure(effort)
         # it is no excuse that others were busy
-        for name in counted:
-            counted[name] += figures.get(name, 0.0)
-        if figures['others'] < 100 * _CALM or time.monotonic() > deadline:
-            return {**figures, **{name: counted[name] for name in _COUNTED if name in figures}}
+        for title, figures in rows.items():
+            for name in figures.keys() & set(_COUNTED):
+                figures[name] += counted.get((title, name), 0.0)
+                counted[title, name] = figures[name]
+        others = max(figures['others'] for figures in rows.values())
+        if others < 100 * _CALM or time.monotonic() > deadline:
+            return rows
 
 
-def merged(results: list[Figures]) -> Figures:
+def merged(group: str, results: list[Figures]) -> Figures:
     """Return the medians of the runs; what must never happen is counted over all of them."""
     names = {name for figures in results for name in figures}
     return {
-        name: (sum if name in _COUNTED else statistics.median)(
-            [figures[name] for figures in results if name in figures]
-        )
+        name: _merging(group, name)([figures[name] for figures in results if name in figures])
         for name in names
     }
+
+
+def _merging(group: str, name: str) -> Callable[[list[float]], float]:
+    if name in _SUMMED:
+        return sum
+    return max if group == 'stop' and name in _WORST else statistics.median
 
 
 def _command() -> str:
@@ -101,10 +116,11 @@ def _command() -> str:
     return ' '.join([*words, *sys.argv[1:]])
 
 
-def _tell(run: str, measurement: Measurement, figures: Figures) -> None:
-    told = ', '.join(f'{name} {value:.3f}' for name, value in figures.items())
+def _tell(run: str, measurement: Measurement, rows: dict[str, Figures]) -> None:
     where = f'{measurement.baud_rate} bit/s, {measurement.drives} drives'
-    print(f'{run}: {measurement.title}, {where}: {told}', file=sys.stderr, flush=True)
+    for title, figures in rows.items():
+        told = ', '.join(f'{name} {value:.3f}' for name, value in figures.items())
+        print(f'{run}: {title}, {where}: {told}', file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -25,8 +25,8 @@ import statistics
 import struct
 
 #: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU;
-#: and with seven data bits: Classic.
-_BITS = {'modbus_rtu': 11, 'classic': 10}
+#: and with seven data bits: Modbus ASCII and Classic.
+_BITS = {'modbus_rtu': 11, 'modbus_ascii': 10, 'classic': 10}
 _READ = 3
 #: How a Classic ENQUIRY begins and ends; the address is a character from here on [M0 §6.1].
 _EOT, _ENQ, _ADDRESS_ZERO = 4, 5, 0x20
@@ -64,8 +64,8 @@ class Line:
 
     @property
     def gap(self) -> float:
-        """The silence before each frame, s: t3.5, fixed above 19200 bit/s; none for Classic."""
-        if self.protocol == 'classic':
+        """The silence before each frame, s: t3.5, fixed above 19200 bit/s; of Modbus RTU alone."""
+        if self.protocol != 'modbus_rtu':
             return 0.0
         return 0.00175 if self.baud_rate > 19200 else 3.5 * self.character
 
@@ -167,6 +167,15 @@ def additions(frames: Sequence[Frame], line: Line) -> dict[str, float]:
 def transactions(frames: Sequence[Frame]) -> int:
     """Return how many requests there are."""
     return sum(frame.is_request for frame in frames)
+
+
+def longest_transaction(frames: Sequence[Frame], line: Line) -> float:
+    """Return the longest time for which a transaction keeps the line, s."""
+    return max(
+        line.limit((request, answer))
+        for request, answer in pairwise(frames)
+        if request.is_request and not answer.is_request
+    )
 
 
 def percentile(values: Sequence[float], percent: float) -> float:

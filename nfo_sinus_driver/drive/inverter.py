@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
+from dataclasses import replace
 from fractions import Fraction
 import logging
 import math
@@ -29,6 +30,7 @@ from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
@@ -106,27 +108,46 @@ class Inverter:
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
         self.auto_stop = False
 
-    async def look(self, priority: Priority, *, once: bool = False) -> InverterStatus:
+    async def look(
+        self,
+        priority: Priority,
+        *,
+        once: bool = False,
+        alarming: Callable[[InverterStatus], bool] = lambda _: False,
+    ) -> InverterStatus:
         """
         Read the status, without acknowledging anything.
 
         :param once: do not repeat a request when nobody answers.
+        :param alarming: tells of half a status whether it may have to stop the motor; if it does
+            and has not before, the rest is read at the head of the bus.
         :raises LinkError: the drive does not answer.
         """
         if not self.has('fieldbus.drive_status'):
             return await self._look_at_code(priority, once)
+        before = self.seen
+        word, at = await self._read_word(priority, once)
+        seen = InverterStatus(at, word, NO_CODE, self.model)
+        alarmed = before is not None and word != before.word and alarming(seen)
+        priority = Priority.STOP if alarmed else priority
+        code = int(await self._registers.read_number('fieldbus.inv_st', priority, once=once))
+        seen = replace(seen, code=code)
+        # a fault came or went between the two, or the drive treats it as an alarm [C95]
+        differs = seen.listed.kind is not Kind.ALARM
+        differs = differs and (seen.listed.kind is Kind.FAULT) != seen.faulted
+        news = before is not None and code != before.code and not alarmed
+        if news and alarming(replace(seen, word=None)):
+            differs, priority = True, Priority.STOP
+        if differs:
+            word, at = await self._read_word(priority, once)
+            seen = replace(seen, word=word, at=at)
+        return self._saw(seen)
+
+    async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
         word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
-        code = await self._registers.read_number('fieldbus.inv_st', priority, once=once)
         assert isinstance(word, int)
         # the upper half is described nowhere [C24]
-        seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
-        says_fault = seen.listed.kind is Kind.FAULT
-        if says_fault != seen.faulted and seen.listed.kind is not Kind.ALARM:
-            # a fault came or went between the two, or the drive treats it as an alarm [C95]
-            word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
-            assert isinstance(word, int)
-            seen = InverterStatus(at, word & 0xFFFF, int(code), self.model)
-        return self._saw(seen)
+        return word & 0xFFFF, at
 
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
@@ -194,7 +215,7 @@ class Inverter:
         """
         assert self.identity is not None
         told = await self._registers.identify(Priority.SERVICE)
-        self.identity = dataclasses.replace(
+        self.identity = replace(
             self.identity,
             vendor=told.vendor,
             model=f'{told.product} {told.model}'.strip(),

@@ -310,6 +310,11 @@ class Motion:
             self._withdrawal.begin()
         return self._lost_in_use
 
+    def alarmed_by(self, seen: InverterStatus) -> bool:
+        """Tell whether a status would end the ride."""
+        follows = self.armed and seen.at >= self._changed_at
+        return follows and bool(self._why_stopped(seen))
+
     def watch(self, seen: InverterStatus) -> bool:
         """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
@@ -325,7 +330,7 @@ class Motion:
             return False
         reason = ''
         if self.armed:
-            reason = explain_stop(self._inverter, seen, self._setpoint.control_mode)
+            reason = self._why_stopped(seen)
         elif not self.ours and not self.stopping and seen.keeps_running:
             reason = (
                 'it runs under bus control although nobody enabled it: does another master '
@@ -423,6 +428,9 @@ class Motion:
             if time.monotonic() > deadline:
                 raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
+
+    def _why_stopped(self, seen: InverterStatus) -> str:
+        return explain_stop(self._inverter, seen, self._setpoint.control_mode)
 
     def _no_control(self, seen: InverterStatus | None) -> str:
         text = f'the bus has no control of this drive ({self._inverter.describe()})'

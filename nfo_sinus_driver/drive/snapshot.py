@@ -30,6 +30,8 @@ from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog.dialect import Codes
 
 NAN = math.nan
+#: Stands for an inverter status that has not been read; no drive has it.
+NO_CODE = -1
 
 #: States in which the output stage drives the motor [M0 table 16].
 _DRIVEN = frozenset(

@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 #: How often a drive is looked at while its node is not active, s.
 _IDLE_PERIOD = 0.5
-#: How often the control mode is read; it can only change while the motor stands, s.
+#: How often the control mode is read, while no motor that stands may start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
 _WATCH_PERIOD = 0.2
@@ -172,13 +172,20 @@ class Watch:
             period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
         return period
 
+    @property
+    def _mode_is_due(self) -> bool:
+        """The control mode is to be read again; it can only change while the motor stands."""
+        stands = self._setpoint.armed and self._inverter.frequency == 0
+        return stands or time.monotonic() - self._mode_read_at > _MODE_PERIOD
+
     async def _look(self) -> InverterStatus:
         """Read the status and judge it."""
         # a request that fails is not repeated at once, so that a silent drive costs its
         # neighbours no more than one time-out in each of their cycles
         inverter = self._inverter
         silent = not inverter.answering
-        seen = await inverter.look(Priority.POLL, once=True)
+        alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
+        seen = await inverter.look(Priority.POLL, once=True, alarming=alarming)
         inverter.answering, inverter.was_silent = True, silent
         told = self._motion is not None and self._motion.watch(seen)
         self._tell_fault(seen, told)
@@ -188,9 +195,11 @@ class Watch:
     async def _poll(self) -> None:
         inverter = self._inverter
         seen = await self._look()
-        if time.monotonic() - self._mode_read_at > _MODE_PERIOD:
+        if self._mode_is_due:
             self._mode_read_at = time.monotonic()
             await inverter.read_control_mode(Priority.POLL)
+            if self._motion is not None:
+                self._motion.watch(seen)
         inverter.frequency = frequency = await self._measure('status.frq_act')
         inverter.speed = speed = await self._measure('status.spd_act')
         actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)

@@ -1,0 +1,358 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+How long after an event the command that stops the motor is on the line.
+
+All drives run on a full line, with set-points a hundred times a second. One event after another
+has to stop one of them, which is then enabled again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
+import itertools
+from itertools import pairwise
+import random
+import signal
+import statistics
+import threading
+import time
+
+from driver_rig import DriverRig
+from nfo_sinus_msgs.msg import DriveStatus
+from rclpy.qos import QoSProfile
+from rig import PATIENCE
+from std_msgs.msg import Float32
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+import trace_file
+from trace_file import Frame
+
+from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.link import classic
+from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link import rtu
+from nfo_sinus_driver.simulator.control import Client
+
+#: ``setpoint_timeout`` of every drive, s.
+TIMEOUT = 1.5
+#: Between two set-points, s; each drive has one in its turn.
+_PERIOD = 0.01
+#: Hz, in turn: no set-point is the one before it.
+_VALUES = (10.0, 12.0)
+#: The next event comes at any moment of that time, s: longer than a cycle of the slowest line.
+_PAUSE = 1.0
+#: Undervoltage: a fault that can be acknowledged.
+_FAULT = 5
+#: What of DriveStatus tells that a motor no longer runs as it was told to.
+_TELLS = ~int(Status.SETPOINT_REACHED | Status.LIMIT_ACTIVE | Status.REV_OP_ENABLED) & 0xFFFF
+_MODEL = load_model('sinus_g2')
+_STATUS, _INV_ST, _MODE_KEY = 'fieldbus.drive_status', 'fieldbus.inv_st', 'control.mode'
+
+Figures = dict[str, float]
+
+
+@dataclass(frozen=True)
+class _Event:
+    """
+    Something that has to stop a motor.
+
+    :ivar at: when, s; of a set-point that does not come, when it was due at last.
+    """
+
+    kind: str
+    unit: int
+    at: float
+
+
+class _Wire:
+    """What frames look like on one line."""
+
+    def __init__(self, protocol: str) -> None:
+        self._protocol = protocol
+        self._space = Protocol.CLASSIC if protocol == 'classic' else Protocol.MODBUS
+        self.setpoint = 'fieldbus.setpoint' if protocol == 'classic' else 'status.frq_set'
+
+    def read(self, unit: int, key: str) -> bytes:
+        """Return the request that reads a parameter."""
+        place = _MODEL[key].place(self._space)
+        if self._protocol == 'classic':
+            return classic.encode(classic.Enquiry(unit, place.address))
+        return self._modbus(modbus_pdu.Read(unit, place.address, place.words))
+
+    def write(self, unit: int, key: str, word: int) -> bytes:
+        """Return the request that writes a parameter of one word."""
+        place = _MODEL[key].place(self._space)
+        if self._protocol == 'classic':
+            return classic.encode(classic.Select(unit, place.address, word))
+        return self._modbus(modbus_pdu.Write(unit, place.address, (word,)))
+
+    def is_refusal(self, unit: int, answer: bytes) -> bool:
+        """Tell whether an answer is the refusal of a drive."""
+        if self._protocol == 'classic':
+            return answer == classic.encode(classic.Nak(unit))
+        message = self._message(answer)
+        return message[0] == unit and message[1] >= 0x80
+
+    def word(self, answer: bytes) -> int:
+        """Return what a read is answered, the low word of it."""
+        if self._protocol == 'classic':
+            return int(answer[8:12], 16)
+        return int.from_bytes(self._message(answer)[3:5], 'big')
+
+    def _message(self, answer: bytes) -> bytes:
+        return bytes.fromhex(answer[1:-2].decode()) if answer[:1] == b':' else answer
+
+    def _modbus(self, request: modbus_pdu.Request[object]) -> bytes:
+        return (modbus_ascii if self._protocol == 'modbus_ascii' else rtu).encode(request)
+
+
+class _Feeder(threading.Thread):
+    """Publishes set-points for all drives in turn, but for those that are held back."""
+
+    def __init__(self, rig: DriverRig) -> None:
+        super().__init__(daemon=True)
+        self._publishers = [
+            rig.listener.create_publisher(Float32, f'/{name}/setpoint', QoSProfile(depth=1))
+            for name in rig.names
+        ]
+        #: Who gets none, and who gets 0.
+        self.held = self.standing = 0
+        #: When each drive got its last one.
+        self.published: dict[int, float] = {}
+        self._ended = threading.Event()
+
+    def run(self) -> None:
+        """Publish until told to end."""
+        numbers = itertools.cycle(enumerate(self._publishers, start=1))
+        values = itertools.cycle(value for value in _VALUES for _ in self._publishers)
+        due = time.monotonic()
+        while not self._ended.wait(max(0.0, due - time.monotonic())):
+            due += _PERIOD
+            unit, publisher = next(numbers)
+            value = next(values)
+            message = Float32(data=0.0 if unit == self.standing else value)
+            if unit != self.held:
+                self.published[unit] = time.monotonic()
+                publisher.publish(message)
+
+    def end(self) -> None:
+        """End."""
+        self._ended.set()
+        self.join()
+
+
+class _Ride:
+    """All drives of a rig, running; makes events happen to them, and lets them run again."""
+
+    def __init__(self, rig: DriverRig, drives: Client, feeder: _Feeder) -> None:
+        self._rig = rig
+        self._drives = drives
+        self._feeder = feeder
+        self._enabled: dict[int, bool] = {}
+        self._clients: dict[str, object] = {}
+        for unit, name in enumerate(rig.names, start=1):
+            rig.listener.create_subscription(
+                DriveStatus,
+                f'/{name}/status',
+                lambda message, unit=unit: self._enabled.update({unit: message.enabled}),
+                10,
+            )
+
+    def call(self, unit: int, service: str, kind: type = Trigger, **fields: object) -> float:
+        """Call a service of a drive; return when."""
+        path = f'/{self._rig.names[unit - 1]}/{service}'
+        client = self._clients.get(path)
+        if client is None:
+            client = self._clients[path] = self._rig.listener.create_client(kind, path)
+            client.wait_for_service(PATIENCE)
+        request = kind.Request(**fields)
+        called = time.monotonic()
+        response = client.call(request, timeout_sec=PATIENCE)
+        if response is None or not response.success:
+            raise RuntimeError(f'{path}: {response}\n{self._rig.log}')
+        return called
+
+    def enable(self, unit: int) -> None:
+        """Let a drive run."""
+        self.call(unit, 'enable', SetBool, data=True)
+        self._await(lambda: self._enabled.get(unit), f'drive {unit} is enabled')
+
+    def event(self, kind: str, unit: int) -> _Event:
+        """Make something happen to a drive, and wait until it has been noticed."""
+        if kind == 'set-point time-out':
+            self._feeder.held = unit
+            time.sleep(TIMEOUT + 0.3)
+            at = self._feeder.published[unit] + TIMEOUT
+            self._feeder.held = 0
+            return _Event(kind, unit, at)
+        if kind in _SERVICES:
+            service, message, fields = _SERVICES[kind]
+            at = self.call(unit, service, message, **fields)
+            return _Event(kind, unit, at)
+        if kind == 'fault in a poll':
+            # the drive would refuse a set-point, and tell it by that
+            self._feeder.held = unit
+        elif kind == 'control mode changed':
+            self._feeder.standing = unit
+            self._drives.wait_for(lambda state: not state['turning'], PATIENCE, unit)
+        at = time.monotonic()
+        self._drives.inject(*_INJECTED[kind], address=unit)
+        self._await(lambda: not self._enabled[unit], f'{kind} is noticed')
+        self._feeder.held = self._feeder.standing = 0
+        return _Event(kind, unit, at)
+
+    def mend(self, kind: str, unit: int) -> None:
+        """Let a drive run again after an event."""
+        if kind == 'set-point time-out':
+            return
+        if kind.startswith('fault'):
+            self.call(unit, 'fault_ack')
+        elif kind == 'RUN input lost':
+            self._drives.inject('run', True, address=unit)
+        elif kind == 'control mode changed':
+            self._drives.inject('set', _MODE_KEY, 'Freque', address=unit)
+        self._await(lambda: not self._enabled[unit], f'{kind} is told')
+        self.enable(unit)
+
+    def _await(self, condition: Callable[[], object], what: str) -> None:
+        self._rig.wait_for(lambda: bool(condition()), self._rig.driver)
+
+
+_SERVICES: dict[str, tuple[str, type, dict[str, object]]] = {
+    'service stop': ('stop', Trigger, {}),
+    'service quick_stop': ('quick_stop', Trigger, {}),
+    'service enable, false': ('enable', SetBool, {'data': False}),
+}
+_INJECTED: dict[str, tuple[object, ...]] = {
+    'fault': ('fault', _FAULT),
+    'fault in a poll': ('fault', _FAULT),
+    'RUN input lost': ('run', False),
+    'keypad STOP': ('keypad', 'stop'),
+    'keypad takes over': ('keypad', 'ext'),
+    'control mode changed': ('set', _MODE_KEY, 'Speed'),
+}
+KINDS = (*_SERVICES, *_INJECTED, 'set-point time-out', 'SIGTERM')
+FEW_KINDS = ('service stop', 'fault', 'fault in a poll', 'set-point time-out', 'SIGTERM')
+
+
+def measure(rig: DriverRig, kinds: Sequence[str], count: int) -> dict[str, Figures]:
+    """
+    Return the figures of each kind of event; the driver has ended then.
+
+    :param count: how often each of them happens.
+    """
+    feeder = _Feeder(rig)
+    with Client.at_link(rig.port) as drives:
+        ride = _Ride(rig, drives, feeder)
+        feeder.start()
+        try:
+            for unit in range(1, rig.drives + 1):
+                ride.enable(unit)
+            watched_since = rig.begin_watch(rig.driver)
+            events = list(_happen(ride, kinds, rig.drives, count))
+            window = watched_since()
+        finally:
+            feeder.end()
+    if 'SIGTERM' in kinds:
+        at = time.monotonic()
+        rig.driver.send_signal(signal.SIGTERM)
+        rig.driver.wait(PATIENCE)
+        events.append(_Event('SIGTERM', 0, at))
+    frames = rig.frames()
+    limit = trace_file.longest_transaction(window.frames, rig.line)
+    wire = _Wire(rig.line.protocol)
+    found = {}
+    for kind in kinds:
+        seen = [_seen(event, frames, wire) for event in events if event.kind == kind]
+        delays = [delay for delay, _ in seen]
+        found[kind] = {
+            'events': len(seen),
+            'time': 1e3 * statistics.median(delays),
+            'p99': 1e3 * trace_file.percentile(delays, 99),
+            'longest': 1e3 * max(delays),
+            'limit': 1e3 * limit,
+            'ratio': max(delays) / limit,
+            'beyond': 1e3 * (max(delays) - limit),
+            'others': window.figures()['others'],
+        }
+        if kind in _INJECTED:
+            found[kind]['polls'] = max(polls for _, polls in seen)
+    return found
+
+
+def _happen(ride: _Ride, kinds: Sequence[str], drives: int, count: int) -> Iterator[_Event]:
+    """Make everything happen, in turn and to all drives in turn."""
+    chance = random.Random()
+    units = itertools.cycle(range(1, drives + 1))
+    for kind in [kind for kind in kinds if kind != 'SIGTERM'] * count:
+        unit = next(units)
+        time.sleep(chance.uniform(0.0, _PAUSE))
+        yield ride.event(kind, unit)
+        ride.mend(kind, unit)
+
+
+def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
+    """Return how long after its detection an event was answered (s), and polls until that."""
+    stops = _stops(event, frames, wire)
+    stop = next(frame.first for frame in stops if frame.first >= event.at)
+    if event.kind not in _INJECTED:
+        return stop - event.at, 0
+    keys = (_MODE_KEY,) if event.kind == 'control mode changed' else (_STATUS, _INV_ST)
+    requests = {wire.read(event.unit, key): key for key in (_STATUS, *keys)}
+    before: dict[str, int] = {}
+    told, polls = [], 0
+    for request, answer in pairwise(frames):
+        if answer.last > stop or not request.is_request or answer.is_request:
+            continue
+        key = requests.get(request.data)
+        happened = answer.last >= event.at
+        polls += happened and key == _STATUS
+        if happened and wire.is_refusal(event.unit, answer.data):
+            told.append(answer.last)
+        elif key in keys:
+            word = wire.word(answer.data)
+            if happened and _tells(key, before.get(key), word):
+                told.append(answer.last)
+            elif not happened:
+                before[key] = word
+    if not told:
+        raise RuntimeError(f'{event}: nothing told it')
+    return stop - told[0], polls
+
+
+def _tells(key: str, before: int | None, word: int) -> bool:
+    if key == _INV_ST:
+        return word not in _MODEL.dialect.codes.bus_running
+    return before is not None and bool((before ^ word) & (_TELLS if key == _STATUS else 0xFFFF))
+
+
+def _stops(event: _Event, frames: list[Frame], wire: _Wire) -> Iterator[Frame]:
+    """Return the requests that answer an event."""
+    units = (event.unit,) if event.unit else range(1, 95)
+    if event.kind == 'set-point time-out':
+        wanted = {wire.write(unit, wire.setpoint, 0) for unit in units}
+    elif event.kind == 'service quick_stop':
+        wanted = {wire.write(unit, 'fieldbus.mode', Mode.STOP) for unit in units}
+    else:
+        wanted = {wire.write(unit, 'fieldbus.scmd', Scmd.STOP) for unit in units}
+    return (frame for frame in frames if frame.is_request and frame.data in wanted)
