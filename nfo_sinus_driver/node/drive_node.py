@@ -46,6 +46,7 @@ from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
 from nfo_sinus_driver.node.error_log import ErrorLogServices
 from nfo_sinus_driver.node.joint import Joint
+from nfo_sinus_driver.node.lifecycle import refuse_what_cannot_be
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.setpoints import Setpoints
@@ -97,6 +98,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         lifecycle_group = MutuallyExclusiveCallbackGroup()
         Node.__init__(self, name)
         LifecycleNodeMixin.__init__(self, callback_group=lifecycle_group)
+        refuse_what_cannot_be(self)
         self._line = line
         values = declare(self, DRIVE_SETTINGS)
         if not values['gear_ratio']:
