@@ -1,0 +1,86 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Start a robot with two driven wheels: the driver, and ros2_control with diff_drive_controller.
+
+    ros2 launch nfo_sinus_driver diff_drive.launch.py folder:=my_robot port:=/dev/ttyUSB0
+
+What it needs beside this package, and what the files of the folder mean: docs/ros2_control.md.
+No motor turns before the drives are enabled.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.actions import IncludeLaunchDescription
+from launch.substitutions import FileContent
+from launch.substitutions import LaunchConfiguration
+from launch.substitutions import PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description():
+    """Return the launch description."""
+    share = FindPackageShare('nfo_sinus_driver')
+    folder = LaunchConfiguration('folder')
+    driver = IncludeLaunchDescription(
+        PathJoinSubstitution([share, 'launch', 'driver.launch.py']),
+        launch_arguments={
+            'params_file': PathJoinSubstitution([folder, 'drives.yaml']),
+            'port': LaunchConfiguration('port'),
+        }.items(),
+    )
+    controllers = PathJoinSubstitution([folder, 'controllers.yaml'])
+    robot = FileContent(PathJoinSubstitution([folder, 'robot.urdf']))
+    robot_state_publisher = Node(
+        package='robot_state_publisher',
+        executable='robot_state_publisher',
+        parameters=[{'robot_description': ParameterValue(robot, value_type=str)}],
+        output='screen',
+    )
+    # it waits for the robot's description on the topic robot_description
+    controller_manager = Node(
+        package='controller_manager',
+        executable='ros2_control_node',
+        parameters=[controllers],
+        output='screen',
+    )
+    spawner = Node(
+        package='controller_manager',
+        executable='spawner',
+        arguments=[
+            'joint_state_broadcaster',
+            'diff_drive_controller',
+            '--param-file',
+            controllers,
+        ],
+        output='screen',
+    )
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                'folder',
+                default_value=PathJoinSubstitution([share, 'config', 'diff_drive']),
+                description='folder of drives.yaml, robot.urdf and controllers.yaml',
+            ),
+            DeclareLaunchArgument(
+                'port', default_value='', description='serial port; empty: as drives.yaml says'
+            ),
+            driver,
+            robot_state_publisher,
+            controller_manager,
+            spawner,
+        ]
+    )

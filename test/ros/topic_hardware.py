@@ -1,0 +1,136 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A stand-in for ros2_control with joint_state_topic_hardware_interface, on a robot's own URDF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+from pathlib import Path
+import threading
+import time
+from xml.etree import ElementTree
+
+from bench import Client
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+
+@dataclass
+class Component:
+    """One ``ros2_control`` tag: what it is told, and what it does in a cycle."""
+
+    name: str
+    plugin: str
+    parameters: dict[str, str]
+    #: The interfaces of each joint.
+    commands: dict[str, list[str]]
+    states: dict[str, list[str]]
+    command: dict[str, float] = field(default_factory=dict)
+    position: dict[str, float] = field(default_factory=dict)
+    velocity: dict[str, float] = field(default_factory=dict)
+    #: How many commands it has sent.
+    sent: int = 0
+
+    @property
+    def threshold(self) -> float:
+        """How far command and state must be apart, all joints together, that it sends."""
+        return float(self.parameters.get('trigger_joint_command_threshold', '1e-5'))
+
+    def read(self, newest: JointState | None) -> None:
+        """Take the newest message, of whichever of its joints it tells; it knows no other."""
+        for index, joint in enumerate([] if newest is None else newest.name):
+            if joint in self.states:
+                self.position[joint] = newest.position[index]
+                self.velocity[joint] = newest.velocity[index]
+
+    def write(self) -> JointState | None:
+        """Return the command to send, if there is one to send."""
+        apart = sum(abs(self.velocity[joint] - self.command[joint]) for joint in self.commands)
+        if apart <= self.threshold:
+            return None
+        joints = list(self.commands)
+        return JointState(name=joints, velocity=[self.command[joint] for joint in joints])
+
+
+def components(urdf: Path) -> list[Component]:
+    """Return the components of a robot."""
+    return [_component(tag) for tag in ElementTree.parse(urdf).getroot().iter('ros2_control')]
+
+
+def _component(tag: ElementTree.Element) -> Component:
+    hardware = tag.find('hardware')
+    assert hardware is not None
+    joints = {joint.attrib['name']: joint for joint in tag.findall('joint')}
+    still = dict.fromkeys(joints, 0.0)
+    return Component(
+        tag.attrib['name'],
+        hardware.findtext('plugin', ''),
+        {one.attrib['name']: one.text or '' for one in hardware.findall('param')},
+        {name: _interfaces(joint, 'command') for name, joint in joints.items()},
+        {name: _interfaces(joint, 'state') for name, joint in joints.items()},
+        dict(still),
+        dict(still),
+        dict(still),
+    )
+
+
+def _interfaces(joint: ElementTree.Element, kind: str) -> list[str]:
+    return [one.attrib['name'] for one in joint.findall(f'{kind}_interface')]
+
+
+class Hardware:
+    """
+    Some components at work at a rate (Hz), while it is open.
+
+    Between two cycles each keeps the newest message alone, as the real one does.
+    """
+
+    def __init__(self, client: Client, parts: list[Component], rate: float) -> None:
+        self._period = 1 / rate
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._newest: dict[str, JointState] = {}
+        self._parts = []
+        for part in parts:
+            publisher = client.node.create_publisher(
+                JointState, part.parameters['joint_commands_topic'], 1
+            )
+            client.node.create_subscription(
+                JointState,
+                part.parameters['joint_states_topic'],
+                lambda message, name=part.name: self._newest.update({name: message}),
+                qos_profile_sensor_data,
+            )
+            self._parts.append((part, publisher))
+
+    def __enter__(self) -> Hardware:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _work(self) -> None:
+        due = time.monotonic()
+        while not self._ended.wait(max(0.0, due - time.monotonic())):
+            due += self._period
+            for part, publisher in self._parts:
+                part.read(self._newest.get(part.name))
+                message = part.write()
+                if message is not None:
+                    publisher.publish(message)
+                    part.sent += 1
