@@ -157,8 +157,10 @@ class Watch:
             # a drive that stays silent costs its neighbours less and less
             return min(_RECONNECT_PERIOD * max(1, self._silences), _SLOWEST_RECONNECT)
         pause = polled_at + self._period - time.monotonic()
-        # however seldom somebody wants to read the status, a motor that runs is watched
-        return min(pause, _WATCH_PERIOD) if self._setpoint.armed else pause
+        # however seldom somebody wants to read the status, a motor that runs is watched, and so is
+        # one whose run command may still stand, for a fault that ends would let it go on
+        watched = self._setpoint.armed or (self._motion is not None and self._motion.stopping)
+        return min(pause, _WATCH_PERIOD) if watched else pause
 
     @property
     def _period(self) -> float:

@@ -81,6 +81,19 @@ def test_fault_that_somebody_else_acknowledges(rig: Rig) -> None:
     assert_only_enable_helps(rig)
 
 
+def test_fault_that_ends_while_the_drive_is_polled_seldom(make_rig: MakeRig) -> None:
+    rig = make_rig(poll_rate=0.02)
+    rig.turn()
+    rig.simulator.inject('fault', OVERLOAD)
+    # the drive refuses every command now, and its run command stands
+    wait_until(lambda: rig.drive._motion and rig.drive._motion.held_by_fault)
+    with rig.simulator.lock:
+        rig.far.faults.acknowledge()
+        rig.far._settle()
+    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP)
+    rig.wait_until_still()
+
+
 def test_fault_of_which_no_poll_knows(rig: Rig) -> None:
     # it comes and is acknowledged between two polls
     rig.turn()
