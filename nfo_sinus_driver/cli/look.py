@@ -123,12 +123,27 @@ def errors(options: argparse.Namespace) -> int:
         entries = drive.error_log(options.count)
     if options.json:
         # JSON has no NaN
-        rows = [{**vars(entry), 'age': _known(entry.age)} for entry in entries]
+        rows = [
+            {
+                'code': entry.code,
+                'text': entry.text,
+                'operating_time': entry.operating_time,
+                'age': _known(entry.age),
+                'time': entry.wall_time,
+            }
+            for entry in entries
+        ]
         put(json.dumps(rows, ensure_ascii=False, indent=2))
         return 0
     for line in columns(
         [
-            (f'{entry.operating_time:.1f} h', str(entry.code), entry.text, _ago(entry.age))
+            (
+                f'{entry.operating_time:.1f} h',
+                str(entry.code),
+                entry.text,
+                _ago(entry.age),
+                entry.wall_time,
+            )
             for entry in entries
         ],
         right=(0, 1),

@@ -156,6 +156,9 @@ class Remote:
     def on_parameters(self, keys: Collection[str]) -> None:
         """Nothing: the values are looked at when all are read."""
 
+    def on_log_entry(self, entry: LogEntry) -> None:
+        """Nothing: nobody watches the log."""
+
 
 class Session:
     """

@@ -36,6 +36,7 @@ from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_watch import LogWatch
 from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
@@ -102,6 +103,7 @@ class Drive:
         )
         self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         self._error_log = ErrorLog(self._inverter, self._registers, errands)
+        self._log_watch = LogWatch(bus, self._inverter, self._error_log, listener)
         self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, errands)
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -136,6 +138,16 @@ class Drive:
     def armed(self) -> bool:
         """The motor follows set-points."""
         return self._setpoint.armed
+
+    @property
+    def last_error(self) -> LogEntry | None:
+        """The newest entry of the error log that was read in the background."""
+        return self._log_watch.newest
+
+    @property
+    def powered_since(self) -> float:
+        """From this operating hour on the drive is known to have had power; NaN: not known."""
+        return self._error_log.clock.since
 
     @property
     def stop_unconfirmed(self) -> bool:
@@ -291,6 +303,7 @@ class Drive:
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
+            self._log_watch.begin()
         return str(self._inverter.identity)
 
     async def _connect(self, patient: bool) -> None:
@@ -353,6 +366,7 @@ class Drive:
                 task, self._parameters_task = self._parameters_task, None
                 self._bus.cancel(task)
             self._inverter.connected = False
+            self._log_watch.end()
             self._watch.end()
 
     async def _deactivate(self, patience: float | None = None) -> str:

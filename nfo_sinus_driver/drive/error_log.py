@@ -17,8 +17,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 import math
+import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ERROR_LOG
@@ -27,13 +30,16 @@ from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.operating_clock import TICK
+from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
 #: The operating time of an entry [M2 §9].
-_HOURS_PER_TICK = 0.1
 _TICKS = 0xFFFFFF
+#: Of how many entries it is remembered when they came.
+_REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
 _TRIES = 3
 _ENERGY = 'status.e_out'
@@ -50,16 +56,44 @@ class LogEntry:
     :ivar text: as on the display.
     :ivar operating_time: the drive's operating time when it happened, h.
     :ivar age: operating hours ago; NaN if the drive does not tell.
+    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
+        to come, or the drive is known to have had power ever since; else NaN.
+    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
     """
 
     code: int
     text: str
     operating_time: float
     age: float
+    at: float = math.nan
+    latest: float = math.nan
+
+    @property
+    def wall_time(self) -> str:
+        """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
+        if not math.isnan(self.at):
+            return _local(self.at)
+        return '' if math.isnan(self.latest) else f'{_local(self.latest)} or before'
 
     def __str__(self) -> str:
         age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
-        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}'
+        wall_time = f' ({self.wall_time})' if self.wall_time else ''
+        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
+
+
+def code_of(entry: int) -> int:
+    """Return the inverter status code of an entry as it stands in the drive."""
+    return entry >> 24
+
+
+def hours_of(entry: int) -> float:
+    """Return the operating time of an entry as it stands in the drive, h."""
+    return (entry & _TICKS) * TICK
+
+
+def _local(at: float) -> str:
+    moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    return moment.isoformat(' ', 'minutes')
 
 
 class ErrorLog:
@@ -69,6 +103,14 @@ class ErrorLog:
         self._inverter = inverter
         self._registers = registers
         self._errands = errands
+        self.clock = OperatingClock()
+        #: Entries that were seen to come, and when, the newest first.
+        self._sightings: list[tuple[int, float]] = []
+
+    @property
+    def documented(self) -> bool:
+        """A manual says where it stands."""
+        return self._inverter.has('fieldbus.scmd')
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """
@@ -79,15 +121,47 @@ class ErrorLog:
         """
         area = self._area()
         limit = min(most or area.entries, area.limit)
-        for _ in range(_TRIES):
-            words = await self._read(area, limit)
-            # an entry that came in meanwhile has moved the others
-            if not words or await self._entry(area, 0) == words[0]:
-                break
-        else:
-            raise DriveError('the drive writes into its error log all the time: try again')
-        now = await self._registers.read_number('status.op_time', Priority.POLL)
-        return tuple(self._understood(entry, now) for entry in words)
+        words = await self._read(area, limit, 0, Priority.POLL)
+        return self.understood(words, await self.read_time(Priority.POLL))
+
+    async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
+        """
+        Read the entries that are newer than one, as they stand in the drive, newest first.
+
+        :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
+        :raises DriveError: the model's log is not documented, or it cannot be read.
+        """
+        area = self._area()
+        if known is None:
+            return await self._read(area, 1, 0, priority)
+        return await self._read(area, area.entries, known, priority)
+
+    async def read_time(self, priority: Priority) -> float:
+        """Read the operating time, h, and have the clock follow it."""
+        once = priority > Priority.POLL
+        hours, at = await self._registers.read_at('status.op_time', priority, once=once)
+        assert not isinstance(hours, str)
+        self.clock.note(float(hours), at)
+        return float(hours)
+
+    def note_sighting(self, entry: int, at: float) -> None:
+        """Remember when an entry came, s of ``time.monotonic``."""
+        self._sightings = [(entry, at), *self._sightings[: _REMEMBERED - 1]]
+
+    def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
+        """
+        Return what entries say, newest first.
+
+        :param now: the operating time, h.
+        """
+        sightings = list(self._sightings)
+        found: list[LogEntry] = []
+        for entry in entries:
+            sighting = next((one for one in sightings if one[0] == entry), None)
+            if sighting is not None:
+                sightings.remove(sighting)
+            found.append(self._understood(entry, now, sighting[1] if sighting else math.nan))
+        return tuple(found)
 
     async def erase_now(self) -> str:
         """
@@ -100,7 +174,7 @@ class ErrorLog:
         area = self._area()
         async with self._errands.sent(what):
             await self._errands.tell(Scmd.ERASE_E_LOG)
-            if await self._entry(area, 0) >> 24:
+            if code_of(await self._entry(area, 0)):
                 raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
 
@@ -127,38 +201,61 @@ class ErrorLog:
         return f'{_ENERGY}: {before:.3f} -> {after:.3f} kWh'
 
     def _area(self) -> ErrorLogArea:
-        if not self._inverter.has('fieldbus.scmd'):
+        if not self.documented:
             raise DriveError(
                 f'the error log of this model ({self._inverter.model.name}) is not documented [M1]'
             )
         return ERROR_LOG[self._registers.protocol]
 
-    async def _read(self, area: ErrorLogArea, limit: int) -> list[int]:
-        """Read entries until one is empty, or until there are no more."""
+    async def _read(
+        self, area: ErrorLogArea, limit: int, known: int, priority: Priority
+    ) -> list[int]:
+        """Read the entries down to one that is known, while none comes in."""
+        for _ in range(_TRIES):
+            words = await self._read_down(area, limit, known, priority)
+            # an entry that came in meanwhile has moved the others
+            if not words or await self._entry(area, 0, priority) == words[0]:
+                return words
+        raise DriveError('the drive writes into its error log all the time: try again')
+
+    async def _read_down(
+        self, area: ErrorLogArea, limit: int, known: int, priority: Priority
+    ) -> list[int]:
+        """Read entries until one is empty or known, or until there are no more."""
         found: list[int] = []
         while len(found) < limit:
             try:
-                entry = await self._entry(area, len(found))
+                entry = await self._entry(area, len(found), priority)
             except Refused:
                 if len(found) < area.entries:
                     raise
                 break
-            if not entry >> 24:
+            if not code_of(entry) or entry == known:
                 break
             found.append(entry)
         return found
 
-    async def _entry(self, area: ErrorLogArea, number: int) -> int:
+    async def _entry(
+        self, area: ErrorLogArea, number: int, priority: Priority = Priority.POLL
+    ) -> int:
         """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
         first = area.address(number)
         classic = self._registers.protocol.value == 'classic'
         numbers = (first, first + 1) if classic else (first,)
-        words = await self._registers.read_from(Address(numbers, area.TYPE.words), Priority.POLL)
+        # nobody waits for what is read in the background, so it is not asked for again at once
+        words = await self._registers.read_from(
+            Address(numbers, area.TYPE.words), priority, once=priority > Priority.POLL
+        )
         return area.TYPE.to_raw(words)
 
-    def _understood(self, entry: int, now: float) -> LogEntry:
-        code = entry >> 24
-        then = (entry & _TICKS) * _HOURS_PER_TICK
+    def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
+        code, then = code_of(entry), hours_of(entry)
         # one tick of doubt, for the drive rounds
-        age = max(0.0, now - then) if now > then - _HOURS_PER_TICK else math.nan
-        return LogEntry(code, self._inverter.text_of(code), round(then, 1), age)
+        age = at = latest = math.nan
+        if now > then - TICK:
+            age = max(0.0, now - then)
+            at = self.clock.moment(then)
+            latest = time.monotonic() - max(0.0, age - TICK) * 3600
+        if not math.isnan(sighted_at):
+            at = sighted_at
+        return LogEntry(code, self._inverter.text_of(code), round(then, 1), age, at, latest)

@@ -42,6 +42,8 @@ _log = logging.getLogger(__name__)
 _FIRST_OF_V2_03 = 4.28
 #: As long as RunDly of the G2 can be, s.
 _LONGEST_START_DELAY = 3600.0
+#: A fault that is seen so long after the status before it came just now, s.
+_SOON = 2.0
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -92,6 +94,11 @@ class Inverter:
         self.was_silent = False
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
+        #: Called when a fault comes that did not stand before.
+        self.on_fault: Callable[[], None] = lambda: None
+        #: The status that first showed the fault that stands, and whether that was soon.
+        self.fault: InverterStatus | None = None
+        self.fault_is_fresh = False
         #: Hz and rpm, as last polled.
         self.frequency = math.nan
         self.speed = math.nan
@@ -159,9 +166,22 @@ class Inverter:
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
-        if self.seen is None or seen.at >= self.seen.at:
+        before = self.seen
+        if before is None or seen.at >= before.at:
             self.seen = seen
+            self._note_fault(before)
         return seen
+
+    def _note_fault(self, before: InverterStatus | None) -> None:
+        """Take note of a fault that comes or goes."""
+        seen = self.seen
+        assert seen is not None
+        if not seen.faulted:
+            self.fault = None
+        elif self.fault is None or self.fault.code != seen.code:
+            self.fault = seen
+            self.fault_is_fresh = before is not None and seen.at - before.at < _SOON
+            self.on_fault()
 
     @property
     def can_time_out(self) -> bool:

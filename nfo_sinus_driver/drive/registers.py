@@ -157,9 +157,11 @@ class Registers:
         """Write a parameter as it shall stand in the drive, whatever its range."""
         await self._ask(self.address(key), priority, words, once)
 
-    async def read_from(self, address: Address, priority: Priority) -> Words:
+    async def read_from(
+        self, address: Address, priority: Priority, *, once: bool = False
+    ) -> Words:
         """Read words from an address."""
-        return (await self._ask(address, priority, None, once=False)).words
+        return (await self._ask(address, priority, None, once)).words
 
     async def write_at(
         self, address: Address, words: Words, priority: Priority, *, once: bool = False

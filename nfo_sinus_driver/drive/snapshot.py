@@ -20,6 +20,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 import enum
 import math
+from typing import TYPE_CHECKING
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Fact
@@ -28,6 +29,9 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog.dialect import Codes
+
+if TYPE_CHECKING:
+    from nfo_sinus_driver.drive.error_log import LogEntry
 
 NAN = math.nan
 #: Stands for an inverter status that has not been read; no drive has it.
@@ -216,6 +220,9 @@ class Listener(Protocol):
 
     def on_parameters(self, keys: Collection[str]) -> None:
         """Take note that these settings of the drive have new values."""
+
+    def on_log_entry(self, entry: LogEntry) -> None:
+        """Take a new entry of the drive's error log."""
 
     def on_event(self, severity: Severity, text: str) -> None:
         """Take a line for the log."""

@@ -63,6 +63,7 @@ class Refused(LinkError):
     ILLEGAL_ADDRESS = 2
     ILLEGAL_VALUE = 3
     DEVICE_FAILURE = 4
+    BUSY = 6
     NO_PATH = 10
     NO_ANSWER = 11
 
@@ -81,7 +82,7 @@ _REFUSALS = {
     Refused.ILLEGAL_VALUE: 'the drive does not accept this value',
     Refused.DEVICE_FAILURE: 'the drive cannot do this in its present state',
     5: 'the drive needs more time',
-    6: 'the drive is busy',
+    Refused.BUSY: 'the drive is busy',
     8: 'the drive found a memory error',
     Refused.NO_PATH: 'the gateway has no path to the drive',
     Refused.NO_ANSWER: 'the gateway got no answer from the drive',

@@ -28,6 +28,7 @@ from std_msgs.msg import Header
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Identity
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.statistics import Statistics
@@ -52,12 +53,14 @@ def drive_status(
     address: int,
     identity: Identity | None,
     stop_unconfirmed: bool,
+    last_error: LogEntry | None,
     parameters: str,
     drift: Sequence[Change],
 ) -> DiagnosticStatus:
     """
     Return how one drive is doing.
 
+    :param last_error: the newest entry of its error log.
     :param parameters: how many of them are known.
     :param drift: what is otherwise than the parameter file says.
     """
@@ -86,6 +89,7 @@ def drive_status(
         'serial number': serial,
         'firmware': identity.versions if identity else '',
         'inverter status': f'{code} {snapshot.text}'.strip(),
+        'last error': _logged(last_error),
         'control method': snapshot.control_method,
         'control mode': snapshot.control_mode,
         'parameters': parameters,
@@ -95,6 +99,13 @@ def drive_status(
         'actual': _quantity(snapshot.actual, snapshot.unit),
     }
     return _status(level, f'{name}: drive', message, serial, values)
+
+
+def _logged(entry: LogEntry | None) -> str:
+    if entry is None:
+        return ''
+    wall_time = f' ({entry.wall_time})' if entry.wall_time else ''
+    return f'{entry.code} {entry.text} at {entry.operating_time:.1f} h{wall_time}'
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -119,7 +119,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.add_post_set_parameters_callback(self._take_settings)
         self._commands = Commands(self)
         self._setpoints = Setpoints(self, line, joint)
-        ErrorLogServices(self, self._commands)
+        ErrorLogServices(self, self._commands, self._reporter.stamp)
         self._tuning = TuningServices(self)
         self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
         self._autostarting = False

@@ -17,15 +17,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import math
 from typing import TYPE_CHECKING
 
-from nfo_sinus_msgs.msg import ErrorLogEntry
+from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.srv import GetErrorLog
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.commands import Commands
 
 if TYPE_CHECKING:
@@ -36,10 +41,17 @@ _LONGEST = 60.0
 
 
 class ErrorLogServices:
-    """Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``."""
+    """
+    Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``.
 
-    def __init__(self, node: DriveNode, commands: Commands) -> None:
+    :param stamp: gives the node's time of a moment of ``time.monotonic``.
+    """
+
+    def __init__(
+        self, node: DriveNode, commands: Commands, stamp: Callable[[float], Time]
+    ) -> None:
         self._node = node
+        self._stamp = stamp
         node.create_service(
             GetErrorLog,
             '~/get_error_log',
@@ -64,14 +76,18 @@ class ErrorLogServices:
             response.message = f'error in the driver: {error}'
         else:
             response.entries = [
-                ErrorLogEntry(
-                    code=entry.code,
-                    text=entry.text,
-                    operating_time=entry.operating_time,
-                    age=entry.age,
-                )
-                for entry in entries
+                messages.error_log_entry(entry, self._stamp(entry.at)) for entry in entries
             ]
-            response.message = f'{len(entries)} entries'
+            response.message = self._summary(entries)
             response.success = True
         return response
+
+    def _summary(self, entries: Sequence[LogEntry]) -> str:
+        undated = sum(math.isnan(entry.at) for entry in entries)
+        if not undated:
+            return f'{len(entries)} entries'
+        since = self._node.drive.powered_since
+        return (
+            f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
+            f'since the driver has seen the drive with power, from operating hour {since:.1f} on'
+        )

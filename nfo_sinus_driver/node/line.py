@@ -47,6 +47,13 @@ LATCHED = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+#: For what happens rarely, where late comers want to know the last few.
+KEPT = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=10,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 #: For set-points: only the newest counts, and every publisher matches.
 NEWEST = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,

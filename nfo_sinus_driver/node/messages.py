@@ -21,6 +21,7 @@ import math
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import BusStatistics
 from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
 from std_msgs.msg import Header
@@ -29,6 +30,7 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.statistics import Statistics
@@ -120,6 +122,21 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
     """Return the Telemetry message of measured values."""
     values = {field: measured.values.get(key, math.nan) for field, key in _TELEMETRY.items()}
     return TelemetryMessage(header=Header(stamp=stamp, frame_id=frame_id), **values)
+
+
+def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
+    """
+    Return the ErrorLogEntry of an entry.
+
+    :param stamp: when it happened; 0 if nobody knows.
+    """
+    return ErrorLogEntry(
+        code=entry.code,
+        text=entry.text,
+        operating_time=entry.operating_time,
+        age=entry.age,
+        stamp=stamp,
+    )
 
 
 def bus_statistics(

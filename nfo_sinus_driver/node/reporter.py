@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
+import math
 from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -34,12 +36,14 @@ from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.joint import Joint
+from nfo_sinus_driver.node.line import KEPT
 from nfo_sinus_driver.node.line import LATCHED
 from nfo_sinus_driver.node.line import RELIABLE
 from nfo_sinus_driver.node.line import Line
@@ -72,6 +76,7 @@ class Reporter:
         # these flow from the start, whatever the lifecycle says
         self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
         self._inv_st = node.create_publisher(InvSt, '~/inv_st', LATCHED)
+        self._log_entries = node.create_publisher(ErrorLogEntry, '~/error_log_entry', KEPT)
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self._speed = create(Float32, '~/actual_speed', RELIABLE)
         self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
@@ -102,6 +107,10 @@ class Reporter:
         """Have the ROS parameters follow the drive."""
         self._node.drive_parameters.note(keys)
 
+    def on_log_entry(self, entry: LogEntry) -> None:
+        """Publish a new entry of the error log."""
+        self._line.outbox.put(lambda: self._tell_log_entry(entry))
+
     def on_event(self, severity: Severity, text: str) -> None:
         """Log a line."""
         # one call site for each level: rclpy forbids another level at the same place
@@ -112,10 +121,12 @@ class Reporter:
         else:
             self._line.outbox.put(lambda: self._log.info(text))
 
-    # --- on the outbox's thread ---------------------------------------------------------------
+    # --- on any thread ------------------------------------------------------------------------
 
-    def _stamp(self, at: float) -> Time:
-        """Return the node's time of a moment of ``time.monotonic``."""
+    def stamp(self, at: float) -> Time:
+        """Return the node's time of a moment of ``time.monotonic``, 0 for NaN."""
+        if math.isnan(at):
+            return Time()
         age = self._steady.now().nanoseconds - round(at * 1e9)
         now = self._node.get_clock().now()
         # simulated time begins at zero, and times before it cannot be
@@ -123,12 +134,14 @@ class Reporter:
         stamp: Time = (now - Duration(nanoseconds=age)).to_msg()
         return stamp
 
+    # --- on the outbox's thread ---------------------------------------------------------------
+
     def _frame_id(self) -> str:
         frame_id: str = self._node.get_parameter('frame_id').value
         return frame_id
 
     def _tell_snapshot(self, snapshot: Snapshot) -> None:
-        stamp = self._stamp(snapshot.at)
+        stamp = self.stamp(snapshot.at)
         frame_id = self._frame_id()
         self._status.publish(messages.drive_status(snapshot, stamp, frame_id))
         self._diagnose(snapshot, on_change=True)
@@ -143,15 +156,18 @@ class Reporter:
             self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
 
     def _tell_telemetry(self, telemetry: Telemetry) -> None:
-        stamp = self._stamp(telemetry.at)
+        stamp = self.stamp(telemetry.at)
         self._telemetry.publish(messages.telemetry(telemetry, stamp, self._frame_id()))
+
+    def _tell_log_entry(self, entry: LogEntry) -> None:
+        self._log_entries.publish(messages.error_log_entry(entry, self.stamp(entry.at)))
 
     def _tell_regularly(self) -> None:
         assert self._drive is not None
         snapshot = self._drive().snapshot
         if not snapshot.connected:
             now = self._steady.now().nanoseconds / 1e9
-            stamp = self._stamp(now)
+            stamp = self.stamp(now)
             self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id()))
         self._diagnose(snapshot, on_change=False)
 
@@ -165,6 +181,7 @@ class Reporter:
             address=drive.settings.address,
             identity=drive.identity,
             stop_unconfirmed=drive.stop_unconfirmed,
+            last_error=drive.last_error,
             parameters=drive.parameters.progress,
             drift=drive.parameters.drift,
         )

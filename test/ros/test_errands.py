@@ -22,11 +22,15 @@ import signal
 from action_msgs.msg import GoalStatus
 from bench import Bench
 from bench import Client
+from bench import seconds
 from bench import wait_until
 from nfo_sinus_msgs.action import Tune
+from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.srv import GetErrorLog
 import pytest
 from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 from ways import needs
 
@@ -69,6 +73,14 @@ class Tuner:
         return future.result().status, future.result().result
 
 
+def _last_error(client: Client) -> str:
+    for array in reversed(client.messages['diagnostics']):
+        for status in array.status:
+            if status.name == 'nfo_sinus: drive':
+                return {pair.key: pair.value for pair in status.values}['last error']
+    return ''
+
+
 def test_the_error_log_is_read_and_erased(bench: Bench) -> None:
     simulator, client = start(bench)
     for code in (5, 12, 3):
@@ -90,6 +102,38 @@ def test_the_error_log_is_read_and_erased(bench: Bench) -> None:
     assert simulator.state()['error_log'] == []
     assert simulator.state()['mode'] == 1
     assert list(client.call('get_error_log', GetErrorLog).entries) == []
+
+
+def test_a_new_entry_is_published_with_the_fault(bench: Bench) -> None:
+    simulator = bench.simulator()
+    simulator.inject('fault', 3)
+    simulator.inject('power-cycle', 0.1)
+    bench.driver('-p', 'poll_rate:=50.0')
+    client = bench.client().connected()
+    kept = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    client.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', kept)
+    wait_until(lambda: _last_error(client).startswith('3 Temp Hi'), 'the log is read')
+    before = client.node.get_clock().now().nanoseconds / 1e9
+    with client.run_at(10.0):
+        simulator.inject('fault', 5)
+        entry = client.wait_for('entry', lambda entry: entry.code == 5, 'the entry')
+    assert (entry.text, len(client.messages['entry'])) == ('Overload', 1)
+    assert abs(entry.operating_time - 1234.5) < 0.2
+    assert before <= seconds(entry.stamp) <= client.node.get_clock().now().nanoseconds / 1e9
+    assert not simulator.state()['driven']
+    client.wait_for('status', lambda status: status.fault, 'the fault stands')
+    assert simulator.state()['ack_reads'] == 0
+    wait_until(lambda: _last_error(client).startswith('5 Overload at'), 'told there')
+    # the old one is from before the driver, and nobody knows when that was
+    log = client.call('get_error_log', GetErrorLog)
+    assert [one.code for one in log.entries] == [5, 3]
+    assert seconds(log.entries[0].stamp) == pytest.approx(seconds(entry.stamp), abs=0.1)
+    assert seconds(log.entries[1].stamp) == 0
+    assert '1 of them without the wall time' in log.message
+    # who comes late is told too
+    late = bench.client()
+    late.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', kept)
+    late.wait_for('entry', lambda one: one == entry, 'the entry')
 
 
 def test_the_energy_is_reset(bench: Bench) -> None:

@@ -34,6 +34,7 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -73,6 +74,7 @@ class Notes:
         self.telemetry: list[Telemetry] = []
         self.events: list[tuple[Severity, str]] = []
         self.news: list[str] = []
+        self.entries: list[LogEntry] = []
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         self.snapshots.append(snapshot)
@@ -82,6 +84,9 @@ class Notes:
 
     def on_parameters(self, keys: Collection[str]) -> None:
         self.news += keys
+
+    def on_log_entry(self, entry: LogEntry) -> None:
+        self.entries.append(entry)
 
     def on_event(self, severity: Severity, text: str) -> None:
         self.events.append((severity, text))

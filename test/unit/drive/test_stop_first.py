@@ -23,6 +23,7 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -43,6 +44,8 @@ class _Deaf:
     def on_telemetry(self, telemetry: Telemetry) -> None: ...
 
     def on_parameters(self, keys: Collection[str]) -> None: ...
+
+    def on_log_entry(self, entry: LogEntry) -> None: ...
 
     def on_event(self, severity: Severity, text: str) -> None: ...
 
