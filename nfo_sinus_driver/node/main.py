@@ -47,6 +47,9 @@ from nfo_sinus_driver.node.output import Output
 from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
+from nfo_sinus_driver.signals import ENDING
+from nfo_sinus_driver.signals import SUSPENDING
+from nfo_sinus_driver.signals import signal_name
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
 _GROUPS_OF_A_DRIVE = 16
@@ -62,28 +65,6 @@ _POLL_SIGNALS = 0.5
 _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
-
-#: Signals that would suspend a process and leave the motors running.
-_SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))
-#: Signals that end no process, or that cannot or must not be caught: those of a crash.
-_OTHERS = frozenset(
-    (
-        signal.SIGCHLD,
-        signal.SIGCONT,
-        signal.SIGURG,
-        signal.SIGWINCH,
-        signal.SIGPIPE,
-        signal.SIGKILL,
-        signal.SIGSTOP,
-        signal.SIGBUS,
-        signal.SIGFPE,
-        signal.SIGILL,
-        signal.SIGSEGV,
-        signal.SIGSYS,
-    )
-)
-#: Every other signal ends a process, and therefore stops the motors first.
-_ENDING = frozenset(signal.valid_signals()) - _SUSPENDING - _OTHERS
 
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
@@ -252,7 +233,7 @@ def main(args: list[str] | None = None) -> int:
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _limit_arenas()
     # blocked before any thread exists, so that only the main thread ever sees them
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING | _SUSPENDING)
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | SUSPENDING)
     output = Output()
     try:
         return _run(*take_out_node_name(sys.argv if args is None else args))
@@ -288,23 +269,15 @@ def _run(arguments: list[str], single_name: str | None) -> int:
     return 0 if confirmed else 1
 
 
-def _name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        # the real-time signals have no names but the first and the last
-        return f'signal {number}'
-
-
 def _await_end(process: DriverProcess) -> str:
     """Wait until something ends the driver; return what."""
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
-        caught = signal.sigtimedwait(_ENDING | _SUSPENDING, _POLL_SIGNALS)
+        caught = signal.sigtimedwait(ENDING | SUSPENDING, _POLL_SIGNALS)
         if caught is None:
             continue
-        name = _name(caught.si_signo)
-        if caught.si_signo in _ENDING:
+        name = signal_name(caught.si_signo)
+        if caught.si_signo in ENDING:
             return name
         log.warning(f'{name} ignored: a suspended driver would leave the motors running')
     return 'a part of the driver has ended by itself'

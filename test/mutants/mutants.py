@@ -35,6 +35,7 @@ _TUNING = 'test/unit/drive/test_tuning.py'
 _METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
+_SIGNALS = 'nfo_sinus_driver/signals.py'
 
 
 @dataclass(frozen=True)
@@ -158,17 +159,17 @@ MUTANTS = (
     Mutant(
         3,
         'SIGHUP is left to the system',
-        _MAIN,
-        ' - _SUSPENDING - _OTHERS',
-        ' - _SUSPENDING - _OTHERS - {signal.SIGHUP}',
+        _SIGNALS,
+        ' - SUSPENDING - _OTHERS',
+        ' - SUSPENDING - _OTHERS - {signal.SIGHUP}',
         (_WAYS_OUT, '-k', 'SIGHUP'),
     ),
     Mutant(
         3,
         'Ctrl-Z suspends the driver',
-        _MAIN,
-        '_SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))',
-        '_SUSPENDING: frozenset[signal.Signals] = frozenset()',
+        _SIGNALS,
+        'SUSPENDING = frozenset((signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))',
+        'SUSPENDING: frozenset[signal.Signals] = frozenset()',
         (_WAYS_OUT, '-k', 'ctrl_z'),
     ),
     Mutant(

@@ -36,12 +36,13 @@ MAY_IMPORT = {
     'statistics': {'link'},
     'bus': {'jobs', 'link', 'statistics', 'timers', 'turns'},
     'timers': set(),
+    'signals': set(),
     'jobs': {'link'},
     'turns': {'jobs'},
     'drive': {'bus', 'catalog', 'link'},
     'simulator': {'catalog'},
-    'node': {'bus', 'catalog', 'drive', 'link', 'statistics'},
-    'cli': {'bus', 'catalog', 'drive', 'link', 'statistics'},
+    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
+    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
 }
 #: What else they may import beside the standard library; node may import anything.
 MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'}}
