@@ -117,6 +117,9 @@ class Drive:
 
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
+        for name in ('address', 'model', 'control_method', 'reference'):
+            if getattr(settings, name) != getattr(self.settings, name):
+                raise ValueError(f'{name} cannot change within a session: make another Drive')
         self._inverter.settings = settings
 
     @property
@@ -163,6 +166,14 @@ class Drive:
             the other drives on the line that time.
         """
         return self._run(lambda: self._connect_first(patient, parameters))
+
+    def require_standing(self) -> Future[None]:
+        """
+        Make sure that another control method may follow: no motor may run by this one any more.
+
+        It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
+        """
+        return self._run(lambda: self._require_standing())
 
     def disconnect(self, timeout: float) -> Future[str]:
         """
@@ -368,6 +379,16 @@ class Drive:
             self._inverter.connected = False
             self._log_watch.end()
             self._watch.end()
+
+    async def _require_standing(self) -> None:
+        if self._motion is None or self._inverter.identity is None:
+            return
+        seen = await self._inverter.look(Priority.SERVICE)
+        if seen.driven and seen.from_bus:
+            raise DriveError(
+                f'the motor still runs by control_method {self.settings.control_method} '
+                f'({self._inverter.describe()}): another one has to wait until it stands'
+            )
 
     async def _deactivate(self, patience: float | None = None) -> str:
         self._set_active(False)

@@ -185,6 +185,11 @@ class DriveNode(LifecycleNodeMixin, Node):
                 detection = detect_model(self._line.bus, self.settings.address)
                 self._found_model = self._line.bus.run(detection).result()
             if self._drive.settings != self._concrete:
+                before = self._drive.settings
+                if before.address == self.settings.address and (
+                    before.control_method != self.settings.control_method
+                ):
+                    self._drive.require_standing().result()
                 self._drive = Drive(self._line.bus, self._concrete, self._reporter)
             self._drive.connect(patient=not self._autostarting, parameters=True).result()
         except (DriveError, ValueError) as error:

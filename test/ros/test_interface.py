@@ -32,6 +32,7 @@ from parameter_bench import Wire
 import pytest
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import ReliabilityPolicy
+from ways import needs
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 
@@ -259,6 +260,29 @@ def test_lifecycle_by_hand(bench: Bench) -> None:
     assert client.change_state(Transition.TRANSITION_CONFIGURE)
     assert client.change_state(Transition.TRANSITION_INACTIVE_SHUTDOWN)
     assert client.state() == 'finalized'
+
+
+@needs('modbus', 'states')
+def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=0.5', '--set', 'control.retard=30')
+    driver = bench.driver('-p', 'shutdown_timeout:=0.1')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        result = client.set_parameters(control_method='drive_control')
+        assert not result.successful and 'deactivate it and clean it up first' in result.reason
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+    assert not client.set_parameters(control_method='drive_control').successful
+    # it is left to its ramp, under bus control
+    assert client.change_state(Transition.TRANSITION_CLEANUP)
+    assert client.set_parameters(control_method='drive_control').successful
+    assert not client.change_state(Transition.TRANSITION_CONFIGURE)
+    assert 'the motor still runs by control_method mode_scmd' in driver.text
+    drive.inject('set', 'control.retard', 0.2)
+    wait_until(lambda: drive.state()['state'] == 'READY_TO_SWITCH_ON', 'it stands')
+    assert client.change_state(Transition.TRANSITION_CONFIGURE), driver.text
+    assert client.change_state(Transition.TRANSITION_ACTIVATE)
+    with client.run_at(10.0):
+        assert client.messages['status'][-1].control_method == DriveStatus.DRIVE_CONTROL
 
 
 def test_monitor_writes_nothing(bench: Bench) -> None:

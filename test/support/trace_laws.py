@@ -41,6 +41,7 @@ _MODE = 0x0294
 _SCMD = 0x0298
 _MASK = 0x0250
 _CONTROL = 0x0254
+_METHODS = {_SCMD: 'SCMD', _MASK: 'the control word', _CONTROL: 'the control word'}
 _SETPOINTS = frozenset((0x03FC, 0x025C, 0x0408, 0x0410))
 
 Frame = dict[str, Any]
@@ -55,6 +56,13 @@ def violations(
     :param frame_gap: the least silence before a request, t3.5, s.
     """
     return [
+        *_mixed_methods(frames),
+        *_complaints(frames, frame_gap, model),
+    ]
+
+
+def _complaints(frames: list[Frame], frame_gap: float, model: str) -> list[str]:
+    return [
         f'frame {number}: {complaint} ({frame["hex"]})'
         for number, frame in enumerate(frames)
         if frame['direction'] == 'request'
@@ -63,6 +71,20 @@ def violations(
             *_wrong_request(frames, number, bytes.fromhex(frame['hex']), model),
         )
     ]
+
+
+def _mixed_methods(frames: list[Frame]) -> Iterator[str]:
+    """Complain of a drive that is commanded by SCMD and by its control word in one session."""
+    methods: dict[int, set[str]] = {}
+    for frame in frames:
+        data = bytes.fromhex(frame['hex'])
+        if frame['direction'] == 'request' and data[1] in (_WRITE_ONE, _WRITE_SEVERAL):
+            method = _METHODS.get(int.from_bytes(data[2:4], 'big'))
+            if method:
+                methods.setdefault(data[0], set()).add(method)
+    for unit, used in methods.items():
+        if len(used) > 1:
+            yield f'drive {unit} is commanded by {" and by ".join(sorted(used))}'
 
 
 def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from drive_rig import PATIENCE
 from drive_rig import MakeRig
 from drive_rig import Rig
@@ -194,3 +196,46 @@ def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
 def test_the_optimal_is_expected_in_no_mode_that_it_lacks(mode: str) -> None:
     with pytest.raises(ValueError, match='expected_control_mode'):
         DriveSettings(model='sinus_optimal', expected_control_mode=mode)
+
+
+# --- one method in a session ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    'changed',
+    [
+        {'control_method': 'drive_control'},
+        {'reference': 'terminal'},
+        {'address': 2},
+        {'model': 'sinus_optimal'},
+    ],
+    ids=lambda changed: next(iter(changed)),
+)
+def test_method_of_a_session_never_changes(make_rig: MakeRig, changed: dict[str, str]) -> None:
+    rig = make_rig()
+    with pytest.raises(ValueError, match=f'{next(iter(changed))} cannot change within a session'):
+        rig.drive.settings = dataclasses.replace(rig.drive.settings, **changed)
+    rig.turn()
+    assert rig.drive.settings.control_method == 'mode_scmd'
+
+
+@pytest.mark.parametrize(
+    ('model', 'reference'), [('sinus_g2', 'fieldbus'), ('sinus_optimal', 'terminal')]
+)
+def test_another_method_waits_until_the_motor_stands(
+    make_rig: MakeRig, model: str, reference: str
+) -> None:
+    rig = make_rig(model=model, reference=reference, parameters={'control.retard': 60.0})
+    turn(rig)
+    assert 'left to its ramp' in rig.drive.disconnect(0.1).result(PATIENCE)
+    message = rig.refused(rig.drive.require_standing())
+    assert 'the motor still runs by control_method mode_scmd (40 Bus Ret)' in message
+    rig.skip(70.0)
+    rig.drive.require_standing().result(PATIENCE)
+
+
+def test_another_method_need_not_wait_for_who_only_watched(make_rig: MakeRig) -> None:
+    rig = make_rig(control_method='monitor')
+    rig.simulator.inject('keypad', 'ext')
+    rig.connect()
+    rig.drive.require_standing().result(PATIENCE)

@@ -44,6 +44,8 @@ def test_a_good_ride_has_nothing_to_complain_of() -> None:
     [
         ([_POLL, _request('01 03 0400 0001', gap=0.0017)], 't3.5 is not kept'),
         ([_request('01 03 02A4 0001')], 'acknowledges'),
+        ([_STOP, _request('01 06 0254 C076')], 'by SCMD and by the control word'),
+        ([_request('01 10 0250 0002 04 FFF6 0000'), _STOP], 'by SCMD and by the control word'),
         ([_request('01 03 02A5 0002')], 'not exactly one parameter'),
         ([_request('01 03 0258 0001')], 'not exactly one parameter'),
         ([_request('01 03 0211 0001')], 'not exactly one parameter'),
