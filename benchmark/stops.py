@@ -169,7 +169,12 @@ class _Ride:
         self._drives = drives
         self._feeder = feeder
         self._enabled: dict[int, bool] = {}
-        self._clients: dict[str, object] = {}
+        # all of them at once: the first request of a new client waits until the driver knows it
+        self._clients = {
+            (name, service): rig.listener.create_client(kind, f'/{name}/{service}')
+            for name in rig.names
+            for service, kind in _TYPES.items()
+        }
         for unit, name in enumerate(rig.names, start=1):
             rig.listener.create_subscription(
                 DriveStatus,
@@ -178,23 +183,21 @@ class _Ride:
                 10,
             )
 
-    def call(self, unit: int, service: str, kind: type = Trigger, **fields: object) -> float:
+    def call(self, unit: int, service: str, **fields: object) -> float:
         """Call a service of a drive; return when."""
-        path = f'/{self._rig.names[unit - 1]}/{service}'
-        client = self._clients.get(path)
-        if client is None:
-            client = self._clients[path] = self._rig.listener.create_client(kind, path)
-            client.wait_for_service(PATIENCE)
-        request = kind.Request(**fields)
+        client = self._clients[self._rig.names[unit - 1], service]
+        if not client.wait_for_service(PATIENCE):
+            raise RuntimeError(f'drive {unit} has no service {service}')
+        request = _TYPES[service].Request(**fields)
         called = time.monotonic()
         response = client.call(request, timeout_sec=PATIENCE)
         if response is None or not response.success:
-            raise RuntimeError(f'{path}: {response}\n{self._rig.log}')
+            raise RuntimeError(f'drive {unit}, {service}: {response}\n{self._rig.log}')
         return called
 
     def enable(self, unit: int) -> None:
         """Let a drive run."""
-        self.call(unit, 'enable', SetBool, data=True)
+        self.call(unit, 'enable', data=True)
         self._await(lambda: self._enabled.get(unit), f'drive {unit} is enabled')
 
     def event(self, kind: str, unit: int) -> _Event:
@@ -206,9 +209,8 @@ class _Ride:
             self._feeder.held = 0
             return _Event(kind, unit, at)
         if kind in _SERVICES:
-            service, message, fields = _SERVICES[kind]
-            at = self.call(unit, service, message, **fields)
-            return _Event(kind, unit, at)
+            service, fields = _SERVICES[kind]
+            return _Event(kind, unit, self.call(unit, service, **fields))
         if kind == 'fault in a poll':
             # the drive would refuse a set-point, and tell it by that
             self._feeder.held = unit
@@ -238,10 +240,11 @@ class _Ride:
         self._rig.wait_for(lambda: bool(condition()), self._rig.driver)
 
 
-_SERVICES: dict[str, tuple[str, type, dict[str, object]]] = {
-    'service stop': ('stop', Trigger, {}),
-    'service quick_stop': ('quick_stop', Trigger, {}),
-    'service enable, false': ('enable', SetBool, {'data': False}),
+_TYPES = {'enable': SetBool, 'stop': Trigger, 'quick_stop': Trigger, 'fault_ack': Trigger}
+_SERVICES: dict[str, tuple[str, dict[str, object]]] = {
+    'service stop': ('stop', {}),
+    'service quick_stop': ('quick_stop', {}),
+    'service enable, false': ('enable', {'data': False}),
 }
 _INJECTED: dict[str, tuple[object, ...]] = {
     'fault': ('fault', _FAULT),

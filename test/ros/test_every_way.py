@@ -30,11 +30,13 @@ from nfo_sinus_msgs.msg import DriveStatus
 from parameter_bench import refused
 from parameter_bench import set_one
 import pytest
+from support.trace_laws import violations
 from unit.catalog import setting_names
 from ways import WAYS
 from ways import Way
 from ways import needs
 
+from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.node.domain import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
@@ -289,7 +291,8 @@ def test_nothing_turns_again_until_enable(rig: Rig, event) -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
 def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: int) -> None:
-    drive = _simulator(bench)
+    """And a whole ride, on a line that takes its time, has broken no law."""
+    drive = bench.simulator(*_QUICK)
     driver = bench.driver(*_MODEST)
     client = bench.client().connected()
     with client.run_at(_SPEED):
@@ -298,6 +301,9 @@ def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: i
         state = drive.wait_for(_stands, timeout=PATIENCE)
     assert (state['mode'], state['scmd'], state['fault']) == (1, 0, 0)
     assert state['mode_ext_writes'] == 0
+    way = bench.way
+    gap = LineSettings(way.baud_rate).frame_gap
+    assert violations(bench.frames(), gap, way.model, way.protocol) == []
 
 
 @needs('parameters')

@@ -21,20 +21,31 @@ import signal
 from bench import Bench
 from lifecycle_msgs.msg import Transition
 from support.trace_laws import violations
+from support.wire import Request
+from support.wire import understand
 from ways import needs
 
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.link import LineSettings
 
-_BAUD_RATE = 19200
+pytestmark = needs('states')
 
-pytestmark = needs('rtu')
+
+def _requests(bench: Bench) -> list[Request]:
+    """Return what was asked for on the line, but for who the drive is."""
+    asked = [
+        understand(bytes.fromhex(frame['hex']), bench.way.protocol)
+        for frame in bench.frames()
+        if frame['direction'] == 'request'
+    ]
+    return [request for request in asked if request is not None]
 
 
 def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
-    drive = bench.simulator(
-        '--baud', str(_BAUD_RATE), '--set', 'control.accel=1', '--set', 'control.retard=1'
-    )
-    driver = bench.driver('-p', f'baud_rate:={_BAUD_RATE}', '-p', 'drive_timeout:=3.0')
+    way = bench.way
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    driver = bench.driver('-p', 'drive_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(20.0):
         client.wait_for('telemetry', lambda message: message.frequency > 15, 'telemetry')
@@ -55,11 +66,13 @@ def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
         assert client.enable().success
     driver.signal(signal.SIGTERM)
     assert driver.wait() == 0, driver.text
-    frames = bench.frames()
-    requests = [frame['hex'] for frame in frames if frame['direction'] == 'request']
-    runs = [request for request in requests if request.startswith('010602980101')]
-    assert len(runs) == 5, 'every enable but the refused one, whose run command is withdrawn, too'
-    assert violations(frames, LineSettings(_BAUD_RATE).frame_gap) == []
+    place = load_model(way.model)['fieldbus.scmd'].place(way.bus).address
+    run = Request(1, place, 1, (Scmd.FIELDBUS,))
+    assert _requests(bench).count(run) == 5, (
+        'every enable but the refused one, whose run command is withdrawn, too'
+    )
+    gap = LineSettings(way.baud_rate).frame_gap
+    assert violations(bench.frames(), gap, way.model, way.protocol) == []
     state = drive.state()
     assert state['ack_reads'] == 0
     assert state['mode_ext_writes'] == 0

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from nfo_sinus_driver.catalog import Protocol
+
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
     'rtu': 'it reads frames of Modbus RTU by hand',
@@ -50,6 +52,11 @@ class Way:
     model: str = 'sinus_g2'
     dialect: str = ''
     baud_rate: int = 57600
+
+    @property
+    def bus(self) -> Protocol:
+        """How parameters are addressed."""
+        return Protocol.CLASSIC if self.protocol == 'classic' else Protocol.MODBUS
 
     @property
     def simulator(self) -> dict[str, str | int]:

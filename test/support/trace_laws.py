@@ -17,74 +17,73 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+import functools
 from typing import Any
 
 from nfo_sinus_driver.catalog import ERROR_LOG
-from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import load_model
+from support.wire import WITH_GAP
+from support.wire import Request
+from support.wire import understand
 
-_READ = 3
-_WRITE_ONE = 6
-_WRITE_SEVERAL = 16
-#: Who are you: whole requests without unit and CRC. They touch no parameter [M0 §6.2.4].
-_REPORT_SLAVE_ID = bytes((17,))
-_READ_DEVICE = frozenset(
-    bytes((43, 14, code, first)) for code in (1, 2, 4) for first in range(7)
-)
-_ACKNOWLEDGING = 0x02A4
-_MODE = 0x0294
-_SCMD = 0x0298
-_MASK = 0x0250
-_CONTROL = 0x0254
-_METHODS = {_SCMD: 'SCMD', _MASK: 'the control word', _CONTROL: 'the control word'}
-_SETPOINTS = frozenset((0x03FC, 0x025C, 0x0408, 0x0410))
+#: The Classic address that every drive obeys [M0 §6.1].
+_EVERYBODY = 95
+#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
+_SETPOINTS = {
+    Protocol.MODBUS: frozenset((0x03FC, 0x025C, 0x0408, 0x0410)),
+    Protocol.CLASSIC: frozenset((0x001E,)),
+}
 
 Frame = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class _Places:
+    """
+    Where things stand on one bus of one model: registers, or Classic ids.
+
+    :ivar methods: by which control method a command is given there.
+    :ivar whole: place and number of words of everything that can be read or written.
+    """
+
+    mode: int
+    command: int
+    mask: int
+    control: int
+    acknowledging: frozenset[int]
+    setpoints: frozenset[int]
+    methods: Mapping[int, str]
+    whole: frozenset[tuple[int, int]]
+
+
 def violations(
-    frames: list[Frame], frame_gap: float, model: str = 'sinus_g2'
+    frames: list[Frame],
+    frame_gap: float,
+    model: str = 'sinus_g2',
+    protocol: str = 'modbus_rtu',
 ) -> list[str]:
     """
     Return what breaks the laws of the house in a trace; nothing is as it should be.
 
-    :param frame_gap: the least silence before a request, t3.5, s.
+    :param frame_gap: the least silence before a request, t3.5, s; counts for Modbus RTU alone.
     """
-    return [
-        *_mixed_methods(frames),
-        *_complaints(frames, frame_gap, model),
-    ]
-
-
-def _complaints(frames: list[Frame], frame_gap: float, model: str) -> list[str]:
+    judge = _Judge(model, protocol)
     return [
         f'frame {number}: {complaint} ({frame["hex"]})'
         for number, frame in enumerate(frames)
         if frame['direction'] == 'request'
         for complaint in (
-            *_wrong_gap(frame, number, frame_gap),
-            *_wrong_request(frames, number, bytes.fromhex(frame['hex']), model),
+            *(_wrong_gap(frame, number, frame_gap) if protocol in WITH_GAP else ()),
+            *judge.complaints(bytes.fromhex(frame['hex'])),
         )
     ]
-
-
-def _mixed_methods(frames: list[Frame]) -> Iterator[str]:
-    """Complain of a drive that is commanded by SCMD and by its control word in one session."""
-    methods: dict[int, set[str]] = {}
-    for frame in frames:
-        data = bytes.fromhex(frame['hex'])
-        if frame['direction'] == 'request' and data[1] in (_WRITE_ONE, _WRITE_SEVERAL):
-            method = _METHODS.get(int.from_bytes(data[2:4], 'big'))
-            if method:
-                methods.setdefault(data[0], set()).add(method)
-    for unit, used in methods.items():
-        if len(used) > 1:
-            yield f'drive {unit} is commanded by {" and by ".join(sorted(used))}'
 
 
 def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:
@@ -92,38 +91,55 @@ def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:
         yield f'came {1000 * frame["gap"]:.3f} ms after the frame before, t3.5 is not kept'
 
 
-def _wrong_request(
-    frames: list[Frame], number: int, data: bytes, model: str
-) -> Iterator[str]:
-    if data[1:-2] == _REPORT_SLAVE_ID or data[1:-2] in _READ_DEVICE:
-        return
-    unit, function, register = struct.unpack('>BBH', data[:4])
-    if function == _READ:
-        count = struct.unpack('>H', data[4:6])[0]
-        words = None
-    elif function == _WRITE_ONE:
-        count = 1
-        words = struct.unpack('>H', data[4:6])
-    elif function == _WRITE_SEVERAL:
-        count = struct.unpack('>H', data[4:6])[0]
-        words = struct.unpack(f'>{count}H', data[7 : 7 + 2 * count])
-    else:
-        yield f'function {function} is not for parameters'
-        return
-    if register == _ACKNOWLEDGING:
-        yield 'reads the status that acknowledges'
-    if (register, count) not in _PARAMETERS[model]:
-        yield f'{count} registers at {register:04X}h are not exactly one parameter'
-    if words is None:
-        return
-    if register == _MODE and words[0] == Mode.EXT:
-        yield 'MODE = 2 can start the motor'
-    if register == _MASK:
-        yield from _wrong_control_word(words[1])
-    if register == _CONTROL and model == 'sinus_g2':
-        yield from _wrong_control_word(words[0])
-    if _runs(register, words[0], model) and not _zero_before(frames, number, unit, model):
-        yield 'a run command without set-point 0 before it'
+class _Judge:
+    """Hears the requests on one line, one after another."""
+
+    def __init__(self, model: str, protocol: str) -> None:
+        self._protocol = protocol
+        self._places = _places(model, protocol)
+        #: The set-point of each unit is 0 and was written since its last run command.
+        self._zero: dict[int, bool] = {}
+        #: How each unit was commanded at first.
+        self._methods: dict[int, str] = {}
+
+    def complaints(self, data: bytes) -> Iterator[str]:
+        """Take a request; yield what is wrong with it."""
+        try:
+            request = understand(data, self._protocol)
+        except ValueError as error:
+            yield str(error)
+            return
+        if request is None:
+            return
+        places = self._places
+        unit, place, count, words = request
+        if place in places.acknowledging and words is None:
+            yield 'reads the status that acknowledges'
+        if (place, count) not in places.whole:
+            yield f'{count} words at {place:04X}h are not exactly one parameter'
+        if words is None:
+            return
+        if place == places.mode and words[0] == Mode.EXT:
+            yield 'MODE = 2 can start the motor'
+        if self._protocol == 'classic' and unit == _EVERYBODY and not _stops(request, places):
+            yield 'a call to everybody that is no stop'
+        if place == places.mask:
+            yield from _wrong_control_word(words[1])
+        if place == places.control:
+            yield from _wrong_control_word(words[0])
+        method = places.methods.get(place, '')
+        if method and self._methods.setdefault(unit, method) != method:
+            yield f'is commanded by {method}, and was by {self._methods[unit]}'
+        if place in places.setpoints:
+            self._zero[unit] = words == (0,)
+        if _runs(request, places):
+            if not self._zero.get(unit):
+                yield 'a run command without set-point 0 before it'
+            self._zero[unit] = False
+
+
+def _stops(request: Request, places: _Places) -> bool:
+    return request.place == places.mode and request.words == (Mode.STOP,)
 
 
 def _wrong_control_word(word: int) -> Iterator[str]:
@@ -131,37 +147,48 @@ def _wrong_control_word(word: int) -> Iterator[str]:
         yield 'both directions at once are no direction'
 
 
-def _runs(register: int, word: int, model: str) -> bool:
+def _runs(request: Request, places: _Places) -> bool:
     """Tell whether a write makes the motor follow the set-point of the bus."""
-    if register == _CONTROL and model == 'sinus_g2':
+    assert request.words is not None
+    if request.place == places.control:
         wanted = Control.SWITCH_ON | Control.ENABLE_OP | Control.NET_REF
-        return word & wanted == wanted
-    return register == _SCMD and word == Scmd.FIELDBUS
+        return request.words[0] & wanted == wanted
+    return request.place == places.command and request.words[0] == Scmd.FIELDBUS
 
 
-def _zero_before(frames: list[Frame], number: int, unit: int, model: str) -> bool:
-    """Tell whether the last set-point written to a unit was 0, since the last run command."""
-    for frame in reversed(frames[:number]):
-        data = bytes.fromhex(frame['hex'])
-        if frame['direction'] != 'request' or data[0] != unit or data[1] != _WRITE_ONE:
-            continue
-        register, value = struct.unpack('>HH', data[2:6])
-        if register in _SETPOINTS:
-            return value == 0
-        if _runs(register, value, model):
-            return False
-    return False
-
-
-def _parameters(model: str) -> Iterator[tuple[int, int]]:
-    for parameter in load_model(model).values():
-        if Protocol.MODBUS in parameter.places:
-            place = parameter.place(Protocol.MODBUS)
-            yield place.address, place.words
+@functools.cache
+def _places(model: str, protocol: str) -> _Places:
+    bus = Protocol.CLASSIC if protocol == 'classic' else Protocol.MODBUS
+    parameters = [parameter for parameter in load_model(model).values() if bus in parameter.places]
+    whole = set()
+    for parameter in parameters:
+        place = parameter.place(bus)
+        if bus is Protocol.CLASSIC:
+            whole |= {(number, 1) for number in place.addresses}
+        else:
+            whole.add((place.address, place.words))
     if model == 'sinus_g2':
-        area = ERROR_LOG[Protocol.MODBUS]
-        for entry in range(area.entries):
-            yield area.address(entry), area.TYPE.words
-
-
-_PARAMETERS = {model: frozenset(_parameters(model)) for model in MODELS}
+        area = ERROR_LOG[bus]
+        for entry in range(area.entries if bus is Protocol.MODBUS else area.limit):
+            low = area.address(entry)
+            whole |= {(low, 1), (low + 1, 1)} if bus is Protocol.CLASSIC else {(low, 2)}
+    acknowledging = frozenset(
+        parameter.place(bus).address
+        for parameter in parameters
+        if parameter.access is Access.ACKNOWLEDGE
+    )
+    at = {parameter.key: parameter.place(bus).address for parameter in parameters}
+    command = at.get('fieldbus.scmd', at.get('fieldbus.smode', -1))
+    mask = at.get('fieldbus.drv_ctrl_write_mask', -1)
+    word = at['fieldbus.drive_control']
+    return _Places(
+        mode=at['fieldbus.mode'],
+        command=command,
+        # the control word of the Optimal has other bits
+        mask=mask,
+        control=word if model == 'sinus_g2' else -1,
+        acknowledging=acknowledging,
+        setpoints=_SETPOINTS[bus],
+        methods={command: 'SCMD', mask: 'the control word', word: 'the control word'},
+        whole=frozenset(whole),
+    )
