@@ -115,7 +115,7 @@ class DriverRig(Rig):
             arguments = [f'{name}:={value}' for name, value in parameters.items()]
             self.listener = self._start_listener()
             self.driver = self.start(
-                executable('driver'),
+                *self._program(),
                 '--ros-args',
                 *(word for argument in arguments for word in ('-p', argument)),
             )
@@ -123,6 +123,10 @@ class DriverRig(Rig):
             self.wait_for(lambda: self.listener.measured >= set(self.names), self.driver)
             time.sleep(_SETTLE)
             failing.pop_all()
+
+    def _program(self) -> tuple[str, ...]:
+        """Return how the driver is started."""
+        return (executable('driver'),)
 
     def _while_starting(self) -> None:
         """Do what has to be done while the driver starts."""

@@ -126,7 +126,7 @@ def _bound(
 def _stops(
     protocol: str, baud_rate: int, kinds: Sequence[str], effort: Effort
 ) -> dict[str, Figures]:
-    with DriverRig(baud_rate, 8, protocol, setpoint_timeout=stops.TIMEOUT) as rig:
+    with stops.StopRig(baud_rate, 8, protocol, setpoint_timeout=stops.TIMEOUT) as rig:
         figures = stops.measure(rig, kinds, effort.events)
         return {f'{kind}, {protocol}': found for kind, found in figures.items()}
 

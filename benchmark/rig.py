@@ -33,7 +33,8 @@ from trace_file import Line
 
 #: A process that has not done by then what it should never will, s.
 PATIENCE = 60.0
-_FOLDER = Path(__file__).parent
+#: Where these programs are.
+FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class Rig(contextlib.ExitStack):
 
     def start_script(self, name: str, *arguments: str, **how: int) -> subprocess.Popen[str]:
         """Start one of the programs beside this one."""
-        return self.start(sys.executable, str(_FOLDER / name), *arguments, **how)
+        return self.start(sys.executable, str(FOLDER / name), *arguments, **how)
 
     def watch(self, process: subprocess.Popen[str], seconds: float) -> Window:
         """Let time pass; return what the line carried and what the process cost meanwhile."""

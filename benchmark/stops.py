@@ -24,17 +24,21 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 import itertools
 from itertools import pairwise
+from pathlib import Path
 import random
 import signal
 import statistics
+import sys
 import threading
 import time
 
 from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
 from rclpy.qos import QoSProfile
+from rig import FOLDER
 from rig import PATIENCE
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
@@ -258,7 +262,22 @@ KINDS = (*_SERVICES, *_INJECTED, 'set-point time-out', 'SIGTERM')
 FEW_KINDS = ('service stop', 'fault', 'fault in a poll', 'set-point time-out', 'SIGTERM')
 
 
-def measure(rig: DriverRig, kinds: Sequence[str], count: int) -> dict[str, Figures]:
+class StopRig(DriverRig):
+    """A rig whose driver tells when its services are called."""
+
+    def _program(self) -> tuple[str, ...]:
+        return sys.executable, str(FOLDER / 'stamping_driver.py'), str(self._stamps)
+
+    @property
+    def _stamps(self) -> Path:
+        return Path(f'{self.port}.stamps')
+
+    def stamps(self) -> list[float]:
+        """Return when services were called, as the driver saw it."""
+        return [float(line) for line in self._stamps.read_text().splitlines()]
+
+
+def measure(rig: StopRig, kinds: Sequence[str], count: int) -> dict[str, Figures]:
     """
     Return the figures of each kind of event; the driver has ended then.
 
@@ -281,11 +300,19 @@ def measure(rig: DriverRig, kinds: Sequence[str], count: int) -> dict[str, Figur
         rig.driver.send_signal(signal.SIGTERM)
         rig.driver.wait(PATIENCE)
         events.append(_Event('SIGTERM', 0, at))
+    stamps = rig.stamps()
+    for kind in [kind for kind in kinds if kind in _SERVICES]:
+        # the same again from when the driver was called
+        events += [
+            replace(event, kind=f'{kind}, called', at=min(at for at in stamps if at > event.at))
+            for event in events
+            if event.kind == kind
+        ]
     frames = rig.frames()
     limit = trace_file.longest_transaction(window.frames, rig.line)
     wire = _Wire(rig.line.protocol)
     found = {}
-    for kind in kinds:
+    for kind in dict.fromkeys(event.kind for event in events):
         seen = [_seen(event, frames, wire) for event in events if event.kind == kind]
         delays = [delay for delay, _ in seen]
         found[kind] = {
@@ -354,7 +381,7 @@ def _stops(event: _Event, frames: list[Frame], wire: _Wire) -> Iterator[Frame]:
     units = (event.unit,) if event.unit else range(1, 95)
     if event.kind == 'set-point time-out':
         wanted = {wire.write(unit, wire.setpoint, 0) for unit in units}
-    elif event.kind == 'service quick_stop':
+    elif event.kind.startswith('service quick_stop'):
         wanted = {wire.write(unit, 'fieldbus.mode', Mode.STOP) for unit in units}
     else:
         wanted = {wire.write(unit, 'fieldbus.scmd', Scmd.STOP) for unit in units}

@@ -25,6 +25,7 @@ and nothing that a coroutine raises can end the worker.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
 from concurrent.futures import Future
@@ -43,6 +44,7 @@ from nfo_sinus_driver.jobs import Sleepers
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.jobs import read_in_steps
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Keeper
@@ -155,12 +157,14 @@ class Bus:
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
-    def read(self, unit: int, address: Address, priority: Priority) -> Transfer:
+    def read(self, unit: int, address: Address, priority: Priority) -> Awaitable[Reply]:
         """
-        Read one parameter (to be awaited).
+        Read one parameter (to be awaited), one transaction at a time.
 
         :raises LinkError: as the link does.
         """
+        if len(address.numbers) > 1:
+            return read_in_steps(unit, address, priority)
         return Transfer(unit, address, priority)
 
     def write(self, unit: int, address: Address, words: Words, priority: Priority) -> Transfer:

@@ -30,6 +30,7 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.link import in_steps
 
 
 class Priority(enum.IntEnum):
@@ -76,6 +77,23 @@ class Transfer:
 
     def __await__(self) -> Generator[Transfer, Reply, Reply]:
         return (yield self)
+
+
+async def read_in_steps(unit: int, address: Address, priority: Priority) -> Reply:
+    """
+    Read a parameter each of whose words is a transaction of its own, so that a stop may go between.
+
+    :raises LinkError: as the link does.
+    """
+    steps = in_steps(unit, address)
+    part = next(steps)
+    while True:
+        reply = await Transfer(unit, part, priority)
+        try:
+            part = steps.send(reply)
+        except StopIteration as end:
+            whole: Reply = end.value
+            return whole
 
 
 class Pause:

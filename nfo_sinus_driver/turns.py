@@ -44,7 +44,9 @@ _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 
 _SLOT: Literal['slot'] = 'slot'
-_Rank = Priority | Literal['slot']
+#: What makes a motor stop, ahead of what only looks whether one does.
+_COMMAND: Literal['command'] = 'command'
+_Rank = Priority | Literal['slot', 'command']
 
 
 class Waiting(NamedTuple):
@@ -58,16 +60,17 @@ class Turns:
     """
     What waits for the line, the next one in front.
 
-    A stop goes first and a set-point in a slot next, so either waits for the transaction on the
-    line and no other. The background, TELEMETRY and REFRESH, goes ahead of all else as long as it
-    is owed its share of the time; who is owed more goes first. Set-points may come faster than the
-    line can carry them, and who then no longer polls does not see the fault that should stop the
-    motor: so after each of them something else has a turn, the background's share included.
+    A stop goes first, its writes ahead of its reads, and a set-point in a slot next, so either
+    waits for the transaction on the line and no other. The background, TELEMETRY and REFRESH, goes
+    ahead of all else as long as it is owed its share of the time; who is owed more goes first.
+    Set-points may come faster than the line can carry them, and who then no longer polls does not
+    see the fault that should stop the motor: so after each of them something else has a turn, the
+    background's share included.
     """
 
     def __init__(self) -> None:
         self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (*Priority, _SLOT)
+            rank: deque() for rank in (_COMMAND, *Priority, _SLOT)
         }
         #: How much time the background is owed, s; it owes if that is negative.
         self._owed = dict.fromkeys(_BACKGROUND, 0.0)
@@ -76,8 +79,7 @@ class Turns:
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
-        rank = _SLOT if isinstance(entry, Slot) else entry.transfer.priority
-        self._queues[rank].append(entry)
+        self._queues[_rank(entry)].append(entry)
 
     def take(self) -> Slot | Waiting | None:
         """Take out what goes next; ``None`` if nothing waits."""
@@ -114,6 +116,7 @@ class Turns:
         return entries
 
     def _order(self) -> Iterator[_Rank]:
+        yield _COMMAND
         yield Priority.STOP
         if not self._slot_went:
             yield _SLOT
@@ -124,3 +127,11 @@ class Turns:
         yield from (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
         yield _SLOT
         yield from background
+
+
+def _rank(entry: Slot | Waiting) -> _Rank:
+    if isinstance(entry, Slot):
+        return _SLOT
+    transfer = entry.transfer
+    commands = transfer.priority is Priority.STOP and transfer.words is not None
+    return _COMMAND if commands else transfer.priority

@@ -32,6 +32,7 @@ from nfo_sinus_driver.link.keeper import Keeper
 from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.open import open_link
 from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.steps import in_steps
 
 __all__ = [
     'Address',
@@ -50,6 +51,7 @@ __all__ = [
     'Refused',
     'Reply',
     'Words',
+    'in_steps',
     'line_settings',
     'open_link',
 ]

@@ -48,6 +48,7 @@ from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.serial_link import Port
 from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.steps import in_steps
 
 #: SiProt of both firmwares [M0 §6.1.2], [M2 §4], [C5].
 CHAR_FORMATS = ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1')
@@ -59,8 +60,6 @@ _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
 #: How long drives may be busy with a broadcast, which none of them confirms, s.
 _TURNAROUND = 0.1
-#: How often the words of a value that changes meanwhile are read again.
-_TRIES = 5
 #: How old the inverter status may be to show that a serial fault is new, s.
 _FRESH = 1.0
 
@@ -148,18 +147,17 @@ class ClassicLink:
 
         :raises LinkError: as its subclasses say.
         """
-        number, *rest = reversed(address.numbers)
-        word, arrived = self._enquire(unit, number)
-        if not rest:
+        if len(address.numbers) == 1:
+            word, arrived = self._enquire(unit, address.numbers[0])
             return Reply((word,), arrived)
-        (low_number,) = rest
-        for _ in range(_TRIES):
-            high = word
-            low, _ = self._enquire(unit, low_number)
-            word, arrived = self._enquire(unit, number)
-            if word == high:
-                return Reply((low, high), arrived)
-        raise DamagedAnswer(f'unit {unit}: E{number:04X} never stood still')
+        steps = in_steps(unit, address)
+        part = next(steps)
+        while True:
+            try:
+                part = steps.send(self.read(unit, part))
+            except StopIteration as end:
+                whole: Reply = end.value
+                return whole
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
         """

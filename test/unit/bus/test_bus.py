@@ -41,6 +41,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -251,6 +252,20 @@ def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> Non
     ended.set()
     for talker in talkers:
         result(talker)
+
+
+def test_stop_goes_between_the_words_of_a_value(bus: Bus, link: FakeLink) -> None:
+    # over Classic each word is a transaction: the high one, the low one, the high one again
+    async def read() -> Words:
+        return (await bus.read(UNIT, Address((5, 6), 2), Priority.REFRESH)).words
+
+    with link.held():
+        value = bus.run(read())
+        link.wait_until_held()
+        stop = ask(bus, 1, Priority.STOP)
+    result(stop)
+    assert len(result(value)) == 2
+    assert link.numbers == [6, 1, 5, 6]
 
 
 def test_stop_goes_before_the_background_s_share(

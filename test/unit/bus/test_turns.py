@@ -104,6 +104,18 @@ def test_equals_go_in_the_order_they_came(kind: object) -> None:
     assert [turns.take() for _ in range(6)] == [*entries, None]
 
 
+def test_who_is_told_to_stop_goes_before_who_is_asked_whether_he_does() -> None:
+    turns = Turns()
+    look = entry(Priority.STOP, 'look')
+    address = Address((1,), 1)
+    stops = [
+        Waiting(cast(Task, name), Transfer(1, address, Priority.STOP, (0,))) for name in ('1', '2')
+    ]
+    for waiting in (look, *stops):
+        turns.add(waiting)
+    assert [turns.take() for _ in range(3)] == [*stops, look]
+
+
 # --- the background -------------------------------------------------------------------------------
 
 
