@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from bench import A_WHILE
@@ -32,6 +33,7 @@ from ways import needs
 import yaml
 
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 
@@ -78,7 +80,7 @@ def test_every_parameter_of_a_file_is_one_of_ours(name: str) -> None:
 def test_nodes_joints_and_topics_agree_everywhere() -> None:
     drives = sections(_FOLDER / 'drives.yaml')
     assert drives['nfo_sinus_bus']['drives'] == list(_WHEELS)
-    assert sections(_CONFIG / 'lifecycle_manager.yaml')['lifecycle_manager_drives'] == {
+    assert sections(_CONFIG / 'nav2' / 'lifecycle_manager.yaml')['lifecycle_manager_drives'] == {
         'node_names': list(_WHEELS), 'autostart': False, 'bond_timeout': 0.0,
     }
     parts = components(_FOLDER / 'robot.urdf')
@@ -122,6 +124,19 @@ def test_motors_can_do_what_the_controller_may_ask_for() -> None:
     # many cycles, so that one that is late stops nobody; and the controller stops before
     assert every['setpoint_timeout'] >= 10 / _RATE
     assert wheels['cmd_vel_timeout'] <= every['setpoint_timeout'] < every['drive_timeout']
+
+
+def test_worked_numbers_of_the_belt() -> None:
+    # docs/control.md
+    drum, gear, belt = 0.2, 20.0, 0.5
+    joint = Joint(lambda: 'drum', lambda: gear)
+    nominal = {'motor.f_nom': 50.0, 'motor.n_nom': 1440.0}
+    parameters = SimpleNamespace(values=nominal)
+    for mode, value in (('Speed', 955), ('Freque', 31.8)):
+        drive = SimpleNamespace(
+            snapshot=SimpleNamespace(control_mode=mode), parameters=parameters
+        )
+        assert joint.setpoint(2 * belt / drum, drive) == pytest.approx(value, rel=0.002)
 
 
 # --- two simulated drives ---------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Manager:
     """A stand-in for the lifecycle manager."""
 
     def __init__(self, bench: Bench) -> None:
-        nodes = yaml.safe_load((_CONFIG / 'lifecycle_manager.yaml').read_text())
+        nodes = yaml.safe_load((_CONFIG / 'nav2' / 'lifecycle_manager.yaml').read_text())
         parameters = nodes['/**/lifecycle_manager_drives']['ros__parameters']
         self.clients: list[Client] = [bench.client(f'/{n}') for n in parameters['node_names']]
 

@@ -20,6 +20,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 import re
+from xml.etree import ElementTree
 
 import pytest
 
@@ -30,6 +31,7 @@ SIMULATOR = ROOT / 'docs' / 'simulator.md'
 MESSAGES = ROOT / 'docs' / 'messages.md'
 DEVELOPMENT = ROOT / 'docs' / 'development.md'
 PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md')))
+PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 CONFIGS = sorted((ROOT / 'config').glob('*.yaml'))
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
 #: Arguments of remapping that look like parameters.
@@ -187,7 +189,7 @@ def named_targets(text: str) -> set[str]:
 def named_parameters(text: str) -> set[str]:
     """The parameters and launch arguments that the commands of a page set."""
     code = (*code_spans(text), *code_lines(text))
-    names = {name for piece in code for name in re.findall(r'(\w+):=', piece)}
+    names = {name for piece in code for name in re.findall(r'(?<![\w/])(\w+):=', piece)}
     return names - NO_PARAMETERS
 
 
@@ -256,7 +258,7 @@ def test_executables_are_documented() -> None:
 @pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
 def test_launch_file_is_documented(path: Path) -> None:
     names = launch_arguments(read(path))
-    assert 'namespace' in names
+    assert {'namespace', 'port'} & names
     assert names - documented(read(INTERFACE)) == set()
     assert f'ros2 launch nfo_sinus_driver {path.name}' in read(INTERFACE)
     compile(read(path), path, 'exec')
@@ -302,6 +304,14 @@ def test_what_a_page_names_exists(page: Path) -> None:
 def test_every_page_is_in_the_index() -> None:
     index = {file for file, _ in links(read(ROOT / 'docs' / 'README.md'))}
     assert {page.name for page in (ROOT / 'docs').glob('*.md')} - index == {'README.md'}
+
+
+@pytest.mark.parametrize('path', PICTURES, ids=lambda path: path.name)
+def test_picture_is_whole_and_shown_and_says_what_it_shows(path: Path) -> None:
+    drawing = ElementTree.parse(path).getroot()
+    assert {'title', 'desc'} <= {part.tag.rpartition('}')[2] for part in drawing}
+    shown = re.compile(rf'!\[[^\]]+\]\({re.escape(path.name)}\)')
+    assert any(shown.search(read(page)) for page in PAGES)
 
 
 @pytest.mark.parametrize('path', CONFIGS, ids=lambda path: path.name)
@@ -365,7 +375,8 @@ def test_checker_sees_what_does_not_exist(tmp_path: Path) -> None:
         'tea',
         'coffee',
     }
-    assert named_parameters('`-p sugar:=2` and\n\n    run milk:=1 -r __ns:=/x') == {'sugar', 'milk'}
+    parameters = '`-p sugar:=2` and\n\n    run milk:=1 -r __ns:=/x -r ~/tea:=/x'
+    assert named_parameters(parameters) == {'sugar', 'milk'}
     assert named_files('`config/no.yaml`, `no.yaml`, `/dev/x`') == {'config/no.yaml'}
 
 
