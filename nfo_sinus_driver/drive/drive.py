@@ -57,6 +57,9 @@ from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
 
+#: What the unit of set-points follows from.
+_MODE_KEYS = frozenset(('control.mode', 'pi_reg.unit'))
+
 
 class Drive:
     """
@@ -419,6 +422,8 @@ class Drive:
         if 'serial.sio_tot' in keys:
             # the drive may have to be kept alive more often from now on
             self._watch.wake()
+        if not _MODE_KEYS.isdisjoint(keys):
+            self._watch.read_mode_soon()
         self._listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:

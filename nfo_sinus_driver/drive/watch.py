@@ -121,6 +121,11 @@ class Watch:
         if self._task is not None:
             self._bus.wake(self._task)
 
+    def read_mode_soon(self) -> None:
+        """Read the control mode with the next poll: it may be another one now."""
+        self._mode_read_at = -math.inf
+        self.wake()
+
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
         self._misses = self._silences = 0
@@ -199,8 +204,9 @@ class Watch:
         seen = await self._look()
         if self._mode_is_due:
             self._mode_read_at = time.monotonic()
-            await inverter.read_control_mode(Priority.POLL)
-            if self._motion is not None:
+            before = inverter.control_mode
+            if await inverter.read_control_mode(Priority.POLL) != before and self._motion:
+                # before it is told: a set-point never has the unit of another mode
                 self._motion.watch(seen)
         inverter.frequency = frequency = await self._measure('status.frq_act')
         inverter.speed = speed = await self._measure('status.spd_act')

@@ -172,6 +172,13 @@ class Motor:
         return -1 if falls else 1
 
     @property
+    def reached(self) -> bool:
+        """Whether what is regulated is as demanded."""
+        if self.regulation is Regulation.TORQUE:
+            return self.driven and not self.limited and self.torque == self.demand
+        return self.driven and self.trend == 0
+
+    @property
     def settled(self) -> bool:
         """Whether nothing will change soon, so that time may pass in longer steps."""
         if not self.driven:

@@ -331,7 +331,7 @@ class G2Runner(Runner):
             status |= Status.CTRL_FROM_NET
             if self.word & Control.NET_REF:
                 status |= Status.REF_FROM_NET
-        if self.machine.phase is Phase.OPERATION_ENABLED and self._motor.trend == 0:
+        if self.machine.phase is Phase.OPERATION_ENABLED and self._motor.reached:
             status |= Status.SETPOINT_REACHED
         if self._motor.limited:
             status |= Status.LIMIT_ACTIVE

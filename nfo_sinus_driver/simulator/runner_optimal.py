@@ -206,7 +206,7 @@ class OptimalRunner(Runner):
             Status.DISABLED: not self.run_input,
             Status.ALARM_ACTIVE: alarm,
             Status.CONTROL_FROM_BUS: self._bus,
-            Status.SETPOINT_REACHED: motor.driven and self._running and motor.trend == 0,
+            Status.SETPOINT_REACHED: self._running and motor.reached,
             Status.LIMIT_ACTIVE: motor.limited,
             Status.SLEEP_ACTIVE: self._sleeping,
             Status.STOPMODE_BRAKE: self._brakes,

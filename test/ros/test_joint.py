@@ -25,6 +25,7 @@ from bench import wait_until
 from nfo_sinus_msgs.msg import Setpoint
 import pytest
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float32
 
 _RADIANS = 2 * math.pi
 #: The simulated motor has two pole pairs: 20 Hz are 10 turns a second without slip.
@@ -102,6 +103,33 @@ def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
     fresh.header.stamp = now
     with Publisher(client, topic, fresh):
         wait_until(lambda: simulator.state()['frequency'] < -1.0, 'it turns the other way')
+
+
+def test_newest_valid_set_point_counts_whichever_topic_it_came_from(bench: Bench) -> None:
+    simulator, client = start(bench, '-p', 'setpoint_timeout:=0.0', '-p', 'joint_name:=belt')
+    assert client.enable().success
+    stamped = '/nfo_sinus/setpoint_stamped'
+    belt = JointState(name=['belt'], velocity=[_RADIANS * _TURNS])
+    for topic, message, frequency in (
+        ('/nfo_sinus/setpoint', Float32(data=10.0), 10.0),
+        (stamped, Setpoint(value=15.0, unit=Setpoint.HZ), 15.0),
+        ('/nfo_sinus/joint_command', belt, 20.0),
+        ('/nfo_sinus/setpoint', Float32(data=-5.0), -5.0),
+    ):
+        with Publisher(client, topic, message):
+            wait_until(
+                lambda wanted=frequency: abs(simulator.state()['frequency'] - wanted) < 0.1,
+                f'{topic} is followed',
+            )
+    # one that is not valid is no newer than any other
+    for topic, message, reason in (
+        (stamped, Setpoint(value=40.0, unit=Setpoint.PERCENT_TORQUE), 'torque ignored'),
+        ('/nfo_sinus/setpoint', Float32(data=math.nan), 'not a finite number'),
+        ('/nfo_sinus/joint_command', JointState(name=['belt']), 'it has no velocity'),
+    ):
+        with Publisher(client, topic, message):
+            wait_until(lambda said=reason: said in bench.log, 'it is told')
+    assert abs(simulator.state()['frequency'] + 5.0) < 0.1
 
 
 def test_gear_ratio_of_nothing_is_refused(bench: Bench) -> None:
