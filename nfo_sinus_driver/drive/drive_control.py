@@ -182,7 +182,13 @@ class OptimalDriveControl:
         return bool(word & words_optimal.Status.CONTROL_FROM_BUS)
 
     async def take_control(self) -> None:
-        """Take control with neither Enable nor Switch on."""
+        """
+        Take control with neither Enable nor Switch on.
+
+        Who lost it to keypad or terminals has to ask anew: the bit may still stand in the word.
+        """
+        if not await self.in_control(Priority.SERVICE):
+            await self._registers.write(_WORD, words_optimal.Control(0), Priority.SERVICE)
         await self._registers.write(_WORD, _OPTIMAL_READY, Priority.SERVICE)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:

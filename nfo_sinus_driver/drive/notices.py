@@ -43,6 +43,8 @@ class Notices:
         self._inverter = inverter
         #: When each was last there.
         self._seen_at: dict[str, float] = {}
+        #: An alarm stood when it was last looked at, with a code that is no alarm's.
+        self._unnamed = False
 
     def take(self, seen: InverterStatus) -> None:
         """Tell what has begun."""
@@ -51,6 +53,7 @@ class Notices:
             self._seen_at[name] = seen.at
             if seen.at - before > _AGAIN_AFTER:
                 self._inverter.tell(_SEVERITIES[name.partition(' ')[0]], text)
+        self._unnamed = seen.kind is Kind.ALARM and not seen.listed.remedy
 
     def _texts(self, seen: InverterStatus) -> Mapping[str, str]:
         """Return what is there, each alarm by its code."""
@@ -60,10 +63,11 @@ class Notices:
         if limited and not seen.faulted:
             remedy = self._inverter.model.inv_st(codes.current_limit).remedy
             texts['limit'] = f'the current limit holds the motor back ({told}): {remedy}'
-        elif seen.kind is Kind.ALARM:
-            # the bit may come with a code that is no alarm's: of that nothing more is known
-            meaning = f'{entry.description}. {entry.remedy}' if entry.remedy else 'see its display'
-            texts[f'alarm {seen.code}'] = f'alarm {told}: {meaning}'
+        elif seen.kind is Kind.ALARM and entry.remedy:
+            texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'
+        elif seen.kind is Kind.ALARM and self._unnamed:
+            # once only, it came or went between the two readings
+            texts['alarm'] = f'alarm, and the status does not say which ({told}): see its display'
         if Fact.SLEEPING in seen.facts:
             texts['sleep'] = (
                 f'the drive sleeps ({told}), for its set-point is below its sleep frequency: '

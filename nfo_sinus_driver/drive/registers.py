@@ -48,6 +48,8 @@ class Registers:
         self._bus = bus
         self._unit = unit
         self._retries = retries
+        #: How many requests nobody answered.
+        self.unanswered = 0
         #: How parameters are addressed on this line.
         self.protocol = Protocol(bus.space)
         bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
@@ -178,7 +180,8 @@ class Registers:
                 if words is None:
                     return await self._bus.read(self._unit, address, priority)
                 return await self._bus.write(self._unit, address, words, priority)
-            except (NoAnswer, DamagedAnswer):
+            except (NoAnswer, DamagedAnswer) as error:
+                self.unanswered += isinstance(error, NoAnswer)
                 tries -= 1
                 if not tries:
                     raise

@@ -97,6 +97,8 @@ class Watch:
         self._mode_read_at = 0.0
         self._complaint = ''
         self._told_fault = 0
+        #: How many requests nobody had answered when it was last looked at.
+        self._unanswered = 0
         self._notices = Notices(inverter)
 
     @property
@@ -190,10 +192,11 @@ class Watch:
         # a request that fails is not repeated at once, so that a silent drive costs its
         # neighbours no more than one time-out in each of their cycles
         inverter = self._inverter
-        silent = not inverter.answering
+        silent = not inverter.answering or self._registers.unanswered > self._unanswered
         alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
         seen = await inverter.look(Priority.POLL, once=True, alarming=alarming)
         inverter.answering, inverter.was_silent = True, silent
+        self._unanswered = self._registers.unanswered
         told = self._motion is not None and self._motion.watch(seen)
         self._tell_fault(seen, told)
         self._notices.take(seen)
