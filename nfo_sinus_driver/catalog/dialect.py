@@ -63,10 +63,12 @@ class Codes:
 
     :ivar bus_standby: motor off, waiting for a command over the bus.
     :ivar bus_running: running under bus control.
-    :ivar bus_slowing: those of them in which the speed decreases, be it to a stop.
+    :ivar slowing: those in which the speed may decrease under bus control, be it to a stop.
     :ivar terminals: standing by or running under terminal control.
     :ivar keypad: running where neither the bus nor the terminals have control.
-    :ivar passing: shown by a running motor instead of who runs it.
+    :ivar local_running: those of these two in which the motor is driven.
+    :ivar running: the motor is driven, on whose command ever.
+    :ivar anonymous: they do not say who controls.
     :ivar start_delay: the run command is there and the start is delayed.
     :ivar tuning: a tuning procedure is going on.
     :ivar tuned: one has ended well.
@@ -78,14 +80,16 @@ class Codes:
 
     bus_standby: frozenset[int]
     bus_running: frozenset[int]
-    bus_slowing: frozenset[int]
+    slowing: frozenset[int]
     terminals: frozenset[int]
     keypad: frozenset[int]
+    local_running: frozenset[int]
+    running: frozenset[int]
+    anonymous: frozenset[int]
     start_delay: int
     tuning: int
     tuned: frozenset[int]
     tuning_failed: frozenset[int]
-    passing: frozenset[int] = inv_st.PASSING
     current_limit: int = inv_st.CURRENT_LIMIT
     sio_fail: int = inv_st.SIO_FAIL
     bus_fail: int = inv_st.BUS_FAIL
@@ -182,9 +186,15 @@ DIALECTS: Mapping[str, Dialect] = {
         codes=Codes(
             bus_standby=inv_st.BUS_STANDBY,
             bus_running=inv_st.BUS_RUNNING,
-            bus_slowing=inv_st.BUS_SLOWING,
+            # the chopper takes what a motor gives back that slows down
+            slowing=inv_st.BUS_SLOWING | {inv_st.BRAKE_CHOPPER},
             terminals=inv_st.TERMINALS,
             keypad=inv_st.KEYPAD,
+            local_running=inv_st.LOCAL_RUNNING,
+            running=frozenset({inv_st.BRAKE_CHOPPER, inv_st.CURRENT_LIMIT}),
+            anonymous=frozenset(
+                {inv_st.START_DELAY, inv_st.BRAKE_CHOPPER, inv_st.CURRENT_LIMIT}
+            ),
             start_delay=inv_st.START_DELAY,
             tuning=inv_st.TUNING,
             tuned=frozenset({45, 46, 47}),
@@ -216,10 +226,13 @@ DIALECTS: Mapping[str, Dialect] = {
         codes=Codes(
             bus_standby=frozenset({37}),
             bus_running=frozenset({38, 39, 40}),
-            bus_slowing=frozenset({40}),
+            slowing=frozenset({26, 32, 40}),
             terminals=inv_st.TERMINALS,
             # of Final Freq, Accel and Decel [M1] does not say who controls: nobody else is left
             keypad=frozenset({30, 31, 32}),
+            local_running=frozenset({34, 35, 36}),
+            running=frozenset({26, 27, 30, 31, 32}),
+            anonymous=frozenset({24, 25, 26, 27, 30, 31, 32, 54}),
             start_delay=54,
             tuning=28,
             tuned=frozenset({44, 45, 46, 47}),

@@ -52,8 +52,10 @@ BUS_SLOWING = frozenset({40, 44})
 TERMINALS = frozenset({33, 34, 35, 36})
 #: Running under keypad control, be it at standstill [M0 table 19].
 KEYPAD = frozenset({29, 30, 31, 32})
-#: What a running motor may show instead of who runs it: brake chopper on, current limit reached.
-PASSING = frozenset({26, 27})
+#: Of both, those in which the motor is driven.
+LOCAL_RUNNING = KEYPAD | TERMINALS - {33}
+#: The motor is driven, but these do not say on whose command [M0 table 19].
+BRAKE_CHOPPER = 26
 CURRENT_LIMIT = 27
 START_DELAY = 25
 TUNING = 28

@@ -40,10 +40,12 @@ from nfo_sinus_driver.drive.log_watch import LogWatch
 from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
@@ -231,9 +233,16 @@ class Drive:
         """Reset the kWh counter; the motor must stand."""
         return self._run(lambda: self._unless_barred(self._error_log.reset_energy_now))
 
-    def tune(self, procedure: Procedure) -> Future[Tuned]:
-        """Have the drive measure or calculate its motor; minutes may pass until the result."""
-        return self._run(lambda: self._tune(procedure))
+    def tune(
+        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
+    ) -> Future[Tuned]:
+        """
+        Have the drive measure or calculate its motor; minutes may pass until the result.
+
+        :param progress: told on the bus what the drive says, and how long it takes already, s:
+            whenever the inverter status changes, and twice a second.
+        """
+        return self._run(lambda: self._tune(procedure, progress))
 
     def cancel_tuning(self) -> Future[str]:
         """Stop a tuning; does nothing else, and nothing if there is none."""
@@ -300,11 +309,18 @@ class Drive:
             raise DriveError('the driver is ending')
         return await errand()
 
-    async def _tune(self, procedure: Procedure) -> Tuned:
+    async def _tune(
+        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None
+    ) -> Tuned:
         # as with enable, the motor may turn
         if self._barred or not self._watch.active:
             raise DriveError('the drive is not active')
-        return await self._tuning.tune_now(procedure)
+
+        def tell(seen: InverterStatus, elapsed: float) -> None:
+            if progress is not None:
+                progress(take_picture(self._inverter, self._setpoint, seen), elapsed)
+
+        return await self._tuning.tune_now(procedure, tell)
 
     async def _connect_first(self, patient: bool, parameters: bool) -> str:
         if not self._watch.begun:

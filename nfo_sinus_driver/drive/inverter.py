@@ -26,6 +26,7 @@ import math
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
@@ -108,8 +109,6 @@ class Inverter:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter ([M2], [C21]).
         self._older = False
-        #: The last inverter status that told who runs the motor.
-        self._last_telling: int | None = None
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
@@ -160,9 +159,11 @@ class Inverter:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
         assert isinstance(code, int)
-        if code not in self.model.dialect.codes.passing:
-            self._last_telling = code
-        return self._saw(InverterStatus(at, None, code, self.model, self._last_telling))
+        seen = InverterStatus(at, None, code, self.model)
+        if code in seen.codes.anonymous:
+            mode = await self._registers.read_number('fieldbus.mode', priority, once=once)
+            seen = replace(seen, by_mode=mode == Mode.BUS)
+        return self._saw(seen)
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later

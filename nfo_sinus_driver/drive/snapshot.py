@@ -60,15 +60,15 @@ class InverterStatus:
     :ivar word: DriveStatus, the low 16 bits [C24]; ``None`` if the drive has none [C21].
     :ivar code: the inverter status code, read without acknowledging.
     :ivar model: whose words these are.
-    :ivar under: without a status word, the last code that told who runs the motor: others may
-        stand in for it, such as that of the current limit.
+    :ivar by_mode: where there is no status word and the code does not say who controls: MODE says
+        that the bus does.
     """
 
     at: float
     word: int | None
     code: int
     model: Model
-    under: int | None = None
+    by_mode: bool = False
 
     @property
     def listed(self) -> InvStCode:
@@ -85,8 +85,8 @@ class InverterStatus:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
             return self.model.dialect.facts(self.word, self.listed.kind)
-        facts = Fact.OPERATION_ENABLED if self._code in self.codes.bus_running else Fact(0)
-        if self._code in self.codes.bus_running | self.codes.bus_standby:
+        facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
+        if self._from_bus_by_code:
             facts |= Fact.NETWORK_CONTROL
         if self.kind is Kind.ALARM:
             facts |= Fact.ALARM
@@ -117,11 +117,6 @@ class InverterStatus:
         return Fact.FAULT in self.facts
 
     @property
-    def _code(self) -> int:
-        """What tells who runs the motor."""
-        return self.code if self.under is None else self.under
-
-    @property
     def standby(self) -> bool:
         """It waits for a command over the bus."""
         return self.code in self.codes.bus_standby
@@ -129,15 +124,13 @@ class InverterStatus:
     @property
     def from_bus(self) -> bool:
         """The bus has control."""
-        codes = self.codes
-        by_code = self._code in codes.bus_running or self._code in codes.bus_standby
-        return by_code or Fact.NETWORK_CONTROL in self.facts
+        return self._from_bus_by_code or Fact.NETWORK_CONTROL in self.facts
 
     @property
     def runs(self) -> bool:
         """The motor is driven and not on its way to a stop."""
         if self.state is State.UNKNOWN:
-            return self._code in self.codes.bus_running
+            return self._driven_by_code
         return self.state is State.OPERATION_ENABLED
 
     @property
@@ -149,15 +142,30 @@ class InverterStatus:
     def keeps_running(self) -> bool:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing tells a stop from a lower reference
-        may_stop = self.word is None and self._code in self.codes.bus_slowing
+        may_stop = self.word is None and self.code in self.codes.slowing
         return self.runs_by_bus and not may_stop
 
     @property
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN:
-            return self._code in self.codes.bus_running
+            return self._driven_by_code
         return self.state in _DRIVEN
+
+    @property
+    def _from_bus_by_code(self) -> bool:
+        codes = self.codes
+        if self.code in codes.anonymous:
+            return self.by_mode
+        return self.code in codes.bus_running or self.code in codes.bus_standby
+
+    @property
+    def _driven_by_code(self) -> bool:
+        codes = self.codes
+        return any(
+            self.code in driven
+            for driven in (codes.bus_running, codes.local_running, codes.running)
+        )
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import enum
 import time
@@ -34,14 +35,21 @@ from nfo_sinus_driver.drive.motion import Loan
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
+#: How often it is told how far it is while nothing changes, s.
+_TELL_PERIOD = 0.5
 #: Longer than any tuning takes; a drive that is still at it then is stopped, s.
 _LONGEST = 900.0
 #: What the motor plate says; a drive cannot tune without.
 _PLATE = ('p_nom', 'u_nom', 'f_nom', 'n_nom', 'i_nom', 'cos_phi')
+
+
+#: Told of the status and of how long the procedure takes already, s; on the bus.
+Progress = Callable[[InverterStatus, float], None]
 
 
 class Procedure(enum.Enum):
@@ -97,12 +105,13 @@ class Tuning:
         self._parameters = parameters
         self._errands = errands
 
-    async def tune_now(self, procedure: Procedure) -> Tuned:
+    async def tune_now(self, procedure: Procedure, progress: Progress) -> Tuned:
         """
         Have the drive tune, wait for the end, and read what it changed.
 
         The motor gets current and may turn, whatever the set-point is.
 
+        :param progress: told whenever the inverter status changes, and twice a second.
         :raises DriveError: it was not begun, and why; or nobody knows how it ended.
         """
         what = procedure.value
@@ -113,7 +122,7 @@ class Tuning:
             async with self._errands.sent(what) as loan:
                 self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
                 await self._errands.tell(_COMMANDS[procedure])
-                success, text = await self._outcome(what, loan)
+                success, text = await self._outcome(what, loan, progress)
             result = Tuned(success, text, await changes())
         grave = Severity.INFO if success else Severity.ERROR
         self._inverter.tell(grave, str(result))
@@ -125,14 +134,18 @@ class Tuning:
             if not await self._registers.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(f'{what} needs {key}: set it as the motor plate says')
 
-    async def _outcome(self, what: str, loan: Loan) -> tuple[bool, str]:
+    async def _outcome(self, what: str, loan: Loan, progress: Progress) -> tuple[bool, str]:
         """Wait until the drive says how it ended."""
         inverter = self._inverter
         started = time.monotonic()
         begun = False
+        told_code, told_at = -1, 0.0
         while True:
             seen = await inverter.look(Priority.POLL)
             elapsed = time.monotonic() - started
+            if seen.code != told_code or elapsed > told_at + _TELL_PERIOD:
+                told_code, told_at = seen.code, elapsed
+                progress(seen, elapsed)
             told = inverter.describe()
             if seen.faulted:
                 fault = inverter.model.inv_st(seen.code)

@@ -120,7 +120,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._commands = Commands(self)
         self._setpoints = Setpoints(self, line, joint)
         ErrorLogServices(self, self._commands, self._reporter.stamp)
-        self._tuning = TuningServices(self)
+        self._tuning = TuningServices(self, self._reporter.stamp)
         self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
         self._autostarting = False
         self._autostart_complaint = ''

@@ -17,11 +17,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-import time
+import contextlib
+import queue
 from typing import TYPE_CHECKING
 
+from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.action import Tune
 from rclpy.action import ActionServer
 from rclpy.action import CancelResponse
@@ -30,6 +33,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
 from nfo_sinus_driver.node.messages import inv_st
 
@@ -51,17 +55,20 @@ _PROCEDURES = {
     Tune.Goal.STATOR_RESISTANCE: Procedure.STATOR_RESISTANCE,
     Tune.Goal.CALCULATE: Procedure.CALCULATE,
 }
-#: How often feedback is sent while nothing new is to be told, s.
-_FEEDBACK_PERIOD = 0.5
 #: How often it is looked whether there is something new, s.
 _LOOK_PERIOD = 0.05
 
 
 class TuningServices:
-    """Offers ``~/tune_full`` and its like, and the action ``~/tune``."""
+    """
+    Offers ``~/tune_full`` and its like, and the action ``~/tune``.
 
-    def __init__(self, node: DriveNode) -> None:
+    :param stamp: gives the node's time of a moment of ``time.monotonic``.
+    """
+
+    def __init__(self, node: DriveNode, stamp: Callable[[float], Time]) -> None:
         self._node = node
+        self._stamp = stamp
         # reentrant, so that a second one is refused at once and a cancel need not wait
         group = ReentrantCallbackGroup()
         for name, procedure in _SERVICES.items():
@@ -79,16 +86,18 @@ class TuningServices:
 
     def _service_of(self, procedure: Procedure):  # type: ignore[no-untyped-def]
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            tuned = self._result(lambda: self._begin(procedure).result())
+            tuned = self._result(lambda: self._begin(procedure, lambda *_: None).result())
             response.success, response.message = tuned.success, str(tuned)
             return response
 
         return answer
 
-    def _begin(self, procedure: Procedure) -> Future[Tuned]:
+    def _begin(
+        self, procedure: Procedure, progress: Callable[[Snapshot, float], None]
+    ) -> Future[Tuned]:
         if self._node.state != 'active':
             raise DriveError(self._node.why_not_active())
-        return self._node.drive.tune(procedure)
+        return self._node.drive.tune(procedure, progress)
 
     def _result(self, tune) -> Tuned:  # type: ignore[no-untyped-def]
         try:
@@ -120,23 +129,23 @@ class TuningServices:
         if procedure is None:
             raise DriveError(f'there is no procedure {goal.request.procedure}: 0 to 3')
         drive = self._node.drive
-        started = time.monotonic()
-        future = self._begin(procedure)
-        told_at, told_code = 0.0, -1
-        cancelling: Future[str] | None = None
+        # the bus tells how far it is, and nobody may keep it waiting
+        news: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
+        future = self._begin(procedure, lambda *told: news.put(told))
+        cancelling = False
         while True:
-            try:
-                return future.result(_LOOK_PERIOD)
-            except FutureTimeoutError:
-                now = time.monotonic()
-            if goal.is_cancel_requested and cancelling is None:
-                cancelling = drive.cancel_tuning()
-            seen = drive.snapshot
-            if seen.status is None or (
-                seen.status.code == told_code and now < told_at + _FEEDBACK_PERIOD
-            ):
-                continue
-            told_at, told_code = now, seen.status.code
-            stamp = self._node.get_clock().now().to_msg()
-            status = inv_st(seen, stamp, self._node.get_parameter('frame_id').value)
-            goal.publish_feedback(Tune.Feedback(status=status, elapsed=now - started))
+            ended = future.done()
+            while not news.empty():
+                self._tell(goal, *news.get())
+            if ended:
+                return future.result()
+            if goal.is_cancel_requested and not cancelling:
+                cancelling = True
+                drive.cancel_tuning()
+            with contextlib.suppress(FutureTimeoutError):
+                future.exception(_LOOK_PERIOD)
+
+    def _tell(self, goal: ServerGoalHandle, snapshot: Snapshot, elapsed: float) -> None:
+        stamp = self._stamp(snapshot.at)
+        status = inv_st(snapshot, stamp, self._node.get_parameter('frame_id').value)
+        goal.publish_feedback(Tune.Feedback(status=status, elapsed=elapsed))

@@ -16,12 +16,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
+import pytest
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.open import line_settings
@@ -51,3 +56,127 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
             assert not drive.stop_unconfirmed
         finally:
             bus.close()
+
+
+# --- who controls, where only the inverter status tells -------------------------------------------
+
+
+@pytest.fixture
+def far() -> Iterator[Simulator]:
+    settings = {'control.accel': 0.3, 'control.retard': 0.3}
+    with Simulator(protocol='classic', dialect='5.0', boot_time=0.2, settings=settings) as far:
+        yield far
+
+
+@pytest.fixture
+def notes() -> Notes:
+    return Notes()
+
+
+@pytest.fixture
+def drive(far: Simulator, notes: Notes) -> Iterator[Drive]:
+    """An active drive without a status word."""
+    bus = Bus(open_link('classic', far.port, line_settings('classic', response_timeout=2.0)))
+    drive = Drive(bus, DriveSettings(classic_dialect='v5.0'), notes)
+    bus.start()
+    try:
+        drive.connect().result(PATIENCE)
+        drive.activate()
+        wait_until(lambda: drive.snapshot.status)
+        yield drive
+    finally:
+        bus.close()
+
+
+def show(far: Simulator, monkeypatch: pytest.MonkeyPatch, code: int | None) -> None:
+    """Have the drive say this of itself, whatever it does; ``None``: what it does."""
+    monkeypatch.undo()
+    if code is not None:
+        monkeypatch.setattr(type(far.drives[1].runner), 'inv_st', property(lambda _: code))
+
+
+def turning(far: Simulator, drive: Drive) -> None:
+    drive.enable().result(PATIENCE)
+    drive.set_setpoint(20.0)
+    wait_until(lambda: far.drives[1].motor.frequency > 19.0)
+
+
+def polls(notes: Notes, count: int) -> None:
+    before = len(notes.snapshots)
+    wait_until(lambda: len(notes.snapshots) > before + count)
+
+
+@pytest.mark.parametrize('code', [26, 27])
+def test_a_chopper_and_a_current_limit_are_nobody_elses_take_over(
+    far: Simulator, drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    turning(far, drive)
+    show(far, monkeypatch, code)
+    wait_until(lambda: drive.snapshot.status.code == code)
+    drive.set_setpoint(20.0)
+    polls(notes, 5)
+    assert drive.armed, notes.events
+    assert far.drives[1].motor.driven
+    status = drive.snapshot.status
+    assert status.runs_by_bus and status.driven
+    assert Fact.NETWORK_CONTROL | Fact.OPERATION_ENABLED in status.facts
+    show(far, monkeypatch, None)
+    drive.set_setpoint(20.0)
+    polls(notes, 5)
+    assert drive.armed, notes.events
+
+
+@pytest.mark.parametrize('press', ['press_start', 'press_ext', 'press_stop'])
+def test_a_take_over_behind_a_current_limit_is_noticed(
+    far: Simulator, drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch, press: str
+) -> None:
+    turning(far, drive)
+    show(far, monkeypatch, 27)
+    wait_until(lambda: drive.snapshot.status.code == 27)
+    assert drive.armed
+    with far.lock:
+        getattr(far.drives[1], press)()
+    wait_until(lambda: not drive.armed)
+    assert notes.told('took control (27 Cur Limt)')
+
+
+def test_a_motor_that_starts_against_its_current_limit(
+    far: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = type(far.drives[1].runner).inv_st
+    limited = property(lambda runner: 27 if runner._motor.driven else code.fget(runner))
+    monkeypatch.setattr(type(far.drives[1].runner), 'inv_st', limited)
+    assert 'enabled' in drive.enable().result(PATIENCE)
+    assert drive.armed
+
+
+def test_a_stop_is_not_confirmed_by_a_current_limit(
+    far: Simulator, drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    turning(far, drive)
+    runner = type(far.drives[1].runner)
+    monkeypatch.setattr(runner, 'command', lambda self, scmd: None)
+    show_only = property(lambda _: 27)
+    monkeypatch.setattr(runner, 'inv_st', show_only)
+    with pytest.raises(DriveError, match='NOT confirmed'):
+        drive.stop().result(PATIENCE)
+    monkeypatch.undo()
+    wait_until(lambda: not drive.stop_unconfirmed)
+    wait_until(lambda: not far.drives[1].motor.driven)
+
+
+@pytest.mark.parametrize('press', ['press_start', 'press_ext'])
+def test_a_motor_that_others_run_is_seen_to_run(
+    far: Simulator, drive: Drive, notes: Notes, press: str
+) -> None:
+    with far.lock:
+        getattr(far.drives[1], press)()
+    wait_until(lambda: drive.snapshot.status.driven)
+    with pytest.raises(DriveError, match='stop it where it is controlled, by keypad or RUN input'):
+        drive.stop().result(PATIENCE)
+    assert far.drives[1].motor.driven
+    assert not drive.snapshot.status.runs_by_bus
+    polls(notes, 5)
+    # it is left alone
+    assert not notes.told('nobody enabled it')
+    assert far.drives[1].motor.driven

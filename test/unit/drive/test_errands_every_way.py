@@ -1,0 +1,239 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tuning, error log, acknowledging and energy over every way in; what a drive has not, it says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+
+from drive_rig import PATIENCE
+from drive_rig import Notes
+from drive_rig import wait_until
+import pytest
+from ros.ways import WAYS
+from ros.ways import Way
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.link import line_settings
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.simulator.faults import LogEntry
+from nfo_sinus_driver.simulator.simulator import Simulator
+
+_TUNING = 28
+#: InvSt when it is finished.
+_DONE = {
+    Procedure.FULL: 45,
+    Procedure.BASIC: 45,
+    Procedure.STATOR_RESISTANCE: 46,
+    Procedure.CALCULATE: 47,
+}
+
+
+class Rig:
+    """A simulated drive, and a driver that goes one way into it."""
+
+    def __init__(self, way: Way) -> None:
+        self.way = way
+        self.simulator = Simulator(**way.simulator, boot_time=0.2)
+        self.notes = Notes()
+
+    def start(self) -> None:
+        """Connect and activate."""
+        way = self.way
+        self.simulator.start()
+        line = line_settings(way.protocol, baud_rate=way.baud_rate, response_timeout=2.0)
+        self.bus = Bus(open_link(way.protocol, self.simulator.port, line))
+        self.bus.start()
+        dialect = str(way.driver.get('classic_dialect', ''))
+        settings = DriveSettings(model=way.model, classic_dialect=dialect)
+        self.drive = Drive(self.bus, settings, self.notes)
+        self.drive.connect().result(PATIENCE)
+        self.drive.activate()
+
+    def stop(self) -> None:
+        self.bus.close()
+        assert self.simulator.failure is None
+        self.simulator.stop()
+
+    @property
+    def far(self):
+        return self.simulator.drives[1]
+
+    @property
+    def optimal(self) -> bool:
+        return self.way.model == 'sinus_optimal'
+
+    def trip(self, code: int) -> None:
+        with self.simulator.lock:
+            self.far.trip(code)
+
+    def refused(self, future) -> str:
+        with pytest.raises(DriveError) as error:
+            future.result(PATIENCE)
+        return str(error.value)
+
+
+@pytest.fixture(params=WAYS.values(), ids=WAYS)
+def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
+    rig = Rig(request.param)
+    rig.start()
+    try:
+        yield rig
+    finally:
+        rig.stop()
+
+
+def test_acknowledging(rig: Rig) -> None:
+    rig.trip(5)
+    wait_until(lambda: rig.drive.snapshot.text == 'Overload')
+    assert rig.far.ack_reads == 0
+    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert not rig.far.faults
+    assert (rig.far.ack_reads, rig.far.sio_err_reads, rig.far.mode_ext_writes) == (1, 0, 0)
+    assert 'nothing to acknowledge' in rig.drive.acknowledge().result(PATIENCE)
+
+
+def test_a_fault_whose_cause_lasts(rig: Rig) -> None:
+    with rig.simulator.lock:
+        rig.far.trip(5, cause_present=True)
+    assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+
+
+def test_the_error_log(rig: Rig) -> None:
+    with rig.simulator.lock:
+        rig.far.faults.log[:] = [LogEntry(1 + n % 12, 1200.0 - n) for n in range(130)]
+        del rig.far.faults.log[rig.far.firmware.log_size :]
+    if rig.optimal:
+        assert 'not documented' in rig.refused(rig.drive.error_log())
+        assert 'is not known of this model' in rig.refused(rig.drive.erase_error_log())
+        return
+    entries = rig.drive.error_log().result(PATIENCE)
+    assert [entry.operating_time for entry in entries] == [1200.0 - n for n in range(32)]
+    assert [entry.code for entry in entries] == [1 + n % 12 for n in range(32)]
+    assert entries[0].age == pytest.approx(34.5, abs=0.2)
+    # only the older firmware has more of them [C4]
+    every = rig.drive.error_log(1000).result(PATIENCE)
+    assert len(every) == (128 if rig.way.name == 'classic_v5' else 32)
+    assert rig.drive.erase_error_log().result(PATIENCE) == 'the error log is erased'
+    assert rig.far.faults.log == []
+    assert not rig.far.faults
+    assert rig.drive.error_log().result(PATIENCE) == ()
+
+
+def test_a_new_entry(rig: Rig) -> None:
+    wait_until(lambda: rig.optimal or rig.drive._log_watch._known is not None)
+    rig.trip(5)
+    if rig.optimal:
+        wait_until(lambda: rig.drive.snapshot.text == 'Overload')
+        assert rig.drive.last_error is None
+        return
+    wait_until(lambda: rig.notes.entries)
+    (entry,) = rig.notes.entries
+    assert (entry.code, entry.text) == (5, 'Overload')
+    assert not math.isnan(entry.at)
+    assert rig.far.ack_reads == rig.far.sio_err_reads == 0
+
+
+def test_the_energy(rig: Rig) -> None:
+    if rig.optimal:
+        assert 'is not known of this model' in rig.refused(rig.drive.reset_energy())
+    elif rig.way.name == 'classic_v5':
+        message = rig.refused(rig.drive.reset_energy())
+        assert 'came with firmware 4.38; this drive has an older one' in message
+        assert rig.far.counters.e_out > 1
+    else:
+        assert rig.drive.reset_energy().result(PATIENCE) == 'status.e_out: 1.234 -> 0.000 kWh'
+        assert rig.far.counters.e_out == 0
+    assert rig.far.mode_ext_writes == 0
+    assert not rig.far.faults
+
+
+@pytest.mark.parametrize('procedure', _DONE)
+def test_tuning(rig: Rig, procedure: Procedure) -> None:
+    told: list[tuple[Snapshot, float]] = []
+    future = rig.drive.tune(procedure, lambda *news: told.append(news))
+    if rig.optimal:
+        message = rig.refused(future)
+        assert 'is not known of this model' in message and 'at the keypad' in message
+        assert not told
+        return
+    before = {key: rig.far.peek(key) for key in rig.far.settings}
+    result = future.result(PATIENCE)
+    assert result.success, result
+    assert {change.key for change in result.changes} == {
+        key for key in before if rig.far.peek(key) != before[key]
+    }
+    # every stage, as the drive says
+    codes = [snapshot.status.code for snapshot, _ in told]
+    assert list(dict.fromkeys(codes))[-1] == _DONE[procedure]
+    assert _TUNING in codes or procedure is Procedure.CALCULATE
+    assert told[-1][0].text == rig.far.model.inv_st_text(_DONE[procedure], rig.far.version)
+    times = [elapsed for _, elapsed in told]
+    assert times == sorted(times)
+    assert not rig.far.faults
+
+
+def test_a_tuning_is_cancelled(rig: Rig) -> None:
+    if rig.optimal:
+        pytest.skip('nothing to cancel')
+    future = rig.drive.tune(Procedure.FULL)
+    wait_until(lambda: rig.far.inv_st == _TUNING)
+    rig.drive.cancel_tuning().result(PATIENCE)
+    result = future.result(PATIENCE)
+    assert not result.success and 'was stopped' in result.text
+    assert rig.far.runner.tuning is None
+    assert rig.far.runner.mode == 1
+    assert not rig.far.faults
+
+
+def test_a_tuning_that_fails(rig: Rig) -> None:
+    if rig.optimal:
+        pytest.skip('nothing can fail')
+    rig.simulator.inject('tuning-fails', 17)
+    result = rig.drive.tune(Procedure.STATOR_RESISTANCE).result(PATIENCE)
+    assert not result.success and '17 TunFailM' in result.text
+    # nothing begins while a fault stands
+    assert '17 TunFailM stands' in rig.refused(rig.drive.tune(Procedure.FULL))
+    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 17 TunFailM'
+
+
+def test_tuning_is_refused_while_the_motor_runs(rig: Rig) -> None:
+    if rig.optimal:
+        pytest.skip('it is refused anyway')
+    rig.drive.enable().result(PATIENCE)
+    assert 'the motor is enabled' in rig.refused(rig.drive.tune(Procedure.FULL))
+    assert rig.drive.armed
+    rig.drive.stop().result(PATIENCE)
+    wait_until(lambda: not rig.far.motor.driven)
+    with rig.simulator.lock:
+        rig.far.press_start()
+    assert 'the motor runs' in rig.refused(rig.drive.tune(Procedure.FULL))
+    assert rig.far.motor.driven
+
+
+def test_tuning_is_refused_without_motor_data(rig: Rig) -> None:
+    if rig.optimal:
+        pytest.skip('it is refused anyway')
+    with rig.simulator.lock:
+        rig.far.memory.put('motor.n_nom', 0)
+    message = rig.refused(rig.drive.tune(Procedure.FULL))
+    assert 'motor.n_nom: set it as the motor plate says' in message
+    assert not rig.far.faults
