@@ -328,7 +328,8 @@ class Drive:
             if parameters:
                 try:
                     await self.parameters.read_now()
-                except LinkError:
+                except BaseException:
+                    # nobody watches it yet
                     self._inverter.connected = False
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())

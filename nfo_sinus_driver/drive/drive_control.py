@@ -146,11 +146,22 @@ class DriveControl:
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
     async def acknowledge(self, code: int) -> None:
-        """Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16]."""
-        for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
-            await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
+        """
+        Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16].
+
+        While a serial fault stands only MODE = Stop is taken, which acknowledges it; over Classic
+        nothing can be written while any fault stands, so that reading has to do [M0 §6.1.5].
+        """
+        registers = self._registers
         if code == SIO_FAIL:
-            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+            if registers.reaches('fieldbus.sio_err'):
+                await registers.acknowledge('fieldbus.sio_err', Priority.SERVICE)
+            await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+        try:
+            for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
+                await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
+        except Refused:
+            await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
 
     async def _change(self, keep: Control, add: Control, priority: Priority) -> None:
         """Change some bits of the control word and leave the others to who has control."""

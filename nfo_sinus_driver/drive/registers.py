@@ -28,8 +28,15 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
+
+#: How often a drive that is busy is asked again, s, and how many times.
+_BUSY_PERIOD = 0.05
+_BUSY_TRIES = 10
+#: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
+_SHORT = frozenset(('status.op_time', 'status.rn_time', 'status.br_time'))
 
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
@@ -84,6 +91,9 @@ class Registers:
 
         :raises ValueError: a code that the manual does not list, where the type has no room for it.
         """
+        if key in _SHORT and self.protocol is Protocol.CLASSIC:
+            low, high = words
+            words = (low, high & 0xFF)
         return self.model[key].decode(words, self.protocol)
 
     def reaches(self, key: str) -> bool:
@@ -175,6 +185,8 @@ class Registers:
         self, address: Address, priority: Priority, words: Words | None, once: bool
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
+        # what is busy has done nothing; a stop is tried on by who wants it
+        busy = 0 if priority is Priority.STOP else _BUSY_TRIES
         while True:
             try:
                 if words is None:
@@ -185,4 +197,9 @@ class Registers:
                 tries -= 1
                 if not tries:
                     raise
-                self._bus.note_retry()
+            except Refused as error:
+                if error.code != Refused.BUSY or not busy:
+                    raise
+                busy -= 1
+                await self._bus.sleep(_BUSY_PERIOD)
+            self._bus.note_retry()

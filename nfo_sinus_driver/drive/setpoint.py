@@ -36,6 +36,8 @@ from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s.
 _REWRITE_PERIOD = 1.0
+#: A drive may be too busy for a set-point so long, s.
+_LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
 _WATCH_PERIOD = 0.25
 
@@ -72,6 +74,7 @@ class Setpoint:
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
+        self._busy_since = math.inf
         self._clamp_told = False
         #: What the drive was last given, in the unit of the control mode.
         self.commanded = NAN
@@ -117,6 +120,7 @@ class Setpoint:
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
+        self._busy_since = math.inf
         if self._reference is not None:
             self._watch = self._bus.spawn(self._watch_age())
 
@@ -176,10 +180,11 @@ class Setpoint:
             return
         if error is None:
             assert transfer.words is not None
+            self._busy_since = math.inf
             self._written = transfer.words
             self._written_at = time.monotonic()
             self.commanded = self._value(transfer.words)
-        elif isinstance(error, Refused):
+        elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.words is not None
             self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
         else:
@@ -187,6 +192,14 @@ class Setpoint:
             self._inverter.answering = False
             self._waits_for_answer = True
             self._written = ()
+
+    def _may_be_busy(self, error: Refused) -> bool:
+        """Tell whether a refusal only means that the drive is busy, and not for long yet."""
+        if error.code != Refused.BUSY:
+            return False
+        now = time.monotonic()
+        self._busy_since = min(self._busy_since, now)
+        return now < self._busy_since + _LONGEST_BUSY
 
     def _value(self, words: Words) -> float:
         """Return the set-point that words mean to the drive, after its own rounding."""

@@ -27,6 +27,7 @@ from ros.ways import WAYS
 from ros.ways import Way
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
@@ -35,6 +36,10 @@ from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.faults import LogEntry
+from nfo_sinus_driver.simulator.faults import SioErr
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 _TUNING = 28
@@ -50,8 +55,9 @@ _DONE = {
 class Rig:
     """A simulated drive, and a driver that goes one way into it."""
 
-    def __init__(self, way: Way) -> None:
+    def __init__(self, way: Way, method: str = 'mode_scmd') -> None:
         self.way = way
+        self.method = method
         self.simulator = Simulator(**way.simulator, boot_time=0.2)
         self.notes = Notes()
 
@@ -63,7 +69,9 @@ class Rig:
         self.bus = Bus(open_link(way.protocol, self.simulator.port, line))
         self.bus.start()
         dialect = str(way.driver.get('classic_dialect', ''))
-        settings = DriveSettings(model=way.model, classic_dialect=dialect)
+        settings = DriveSettings(
+            model=way.model, control_method=self.method, classic_dialect=dialect
+        )
         self.drive = Drive(self.bus, settings, self.notes)
         self.drive.connect().result(PATIENCE)
         self.drive.activate()
@@ -101,6 +109,19 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
         rig.stop()
 
 
+@pytest.fixture
+def strict_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While a fault stands, no control word is taken either: [M0 §6.1.5] makes no exception."""
+    write = G2Runner._write_control
+
+    def refuse(runner: G2Runner, word: Control) -> None:
+        if runner._faults:
+            raise Refused(Reason.STATE, 'a fault stands')
+        write(runner, word)
+
+    monkeypatch.setattr(G2Runner, '_write_control', refuse)
+
+
 def test_acknowledging(rig: Rig) -> None:
     rig.trip(5)
     wait_until(lambda: rig.drive.snapshot.text == 'Overload')
@@ -115,6 +136,36 @@ def test_a_fault_whose_cause_lasts(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.trip(5, cause_present=True)
     assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+
+
+@pytest.mark.parametrize(
+    ('name', 'method'),
+    [
+        ('modbus_rtu', 'mode_scmd'),
+        ('modbus_rtu', 'drive_control'),
+        ('classic_v2', 'mode_scmd'),
+        ('classic_v2', 'drive_control'),
+        ('classic_v5', 'mode_scmd'),
+    ],
+)
+@pytest.mark.parametrize(('code', 'text'), [(14, 'Sio Fail'), (5, 'Overload')])
+def test_a_drive_that_takes_no_word_while_a_fault_stands(
+    name: str, method: str, code: int, text: str, strict_faults: None
+) -> None:
+    rig = Rig(WAYS[name], method)
+    rig.start()
+    try:
+        rig.drive.enable().result(PATIENCE)
+        rig.trip(code)
+        wait_until(lambda: not rig.drive.armed)
+        assert rig.drive.acknowledge().result(PATIENCE) == f'acknowledged {code} {text}'
+        assert not rig.far.faults
+        # a stop that came before was blocked, which is no fault of its own
+        assert not rig.far.faults.sio_err & ~SioErr.BLOCKED
+        wait_until(lambda: not rig.drive.stop_unconfirmed)
+        rig.drive.enable().result(PATIENCE)
+    finally:
+        rig.stop()
 
 
 def test_the_error_log(rig: Rig) -> None:

@@ -30,6 +30,8 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.open import line_settings
+from nfo_sinus_driver.simulator.classic import Classic
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 
@@ -180,3 +182,22 @@ def test_a_motor_that_others_run_is_seen_to_run(
     # it is left alone
     assert not notes.told('nobody enabled it')
     assert far.drives[1].motor.driven
+
+
+def test_counters_have_24_bits_over_classic(
+    drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    enquiry = Classic._enquiry
+
+    def filled(self: Classic, simulated: SimulatedDrive, number: int) -> int:
+        word = enquiry(self, simulated, number)
+        # nobody says what the rest of the second word of a counter has [C26]
+        return word | 0xA500 if number in (0x0127, 0x0128, 0x00DE) else word
+
+    monkeypatch.setattr(Classic, '_enquiry', filled)
+    before = len(notes.telemetry)
+    wait_until(lambda: len(notes.telemetry) > before + 8)
+    values = notes.telemetry[-1].values
+    assert values['status.op_time'] == pytest.approx(1234.5, abs=0.2)
+    assert 0 <= values['status.rn_time'] < 1e5
+    assert 0 <= values['status.br_time'] < 1e5

@@ -34,6 +34,7 @@ from parameters_rig import watch_only
 from parameters_rig import written
 import pytest
 
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import parameters as parameters_module
 from nfo_sinus_driver.simulator.refusal import Reason
@@ -292,3 +293,19 @@ def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig
     connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
     assert rig.drive._inverter.sio_tot == 3
     assert rig.drive._inverter.auto_stop
+
+
+@pytest.mark.parametrize('error', [DriveError('it is wrong'), RuntimeError('a mistake')])
+def test_a_first_reading_that_fails_leaves_nothing_connected(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    async def fail() -> None:
+        raise error
+
+    monkeypatch.setattr(rig.drive.parameters, 'read_now', fail)
+    with pytest.raises(type(error)):
+        rig.drive.connect(parameters=True).result(PATIENCE)
+    with pytest.raises(DriveError, match='is not connected'):
+        rig.drive.acknowledge().result(PATIENCE)
+    monkeypatch.undo()
+    assert connect(rig).values
