@@ -84,6 +84,8 @@ class Tuned:
     changes: tuple[Change, ...]
 
     def __str__(self) -> str:
+        if not self.success and not self.changes:
+            return self.text
         changed = ', '.join(str(change) for change in self.changes) or 'no parameter'
         return f'{self.text}; changed: {changed}'
 

@@ -28,10 +28,10 @@ from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.srv import GetErrorLog
 import pytest
-from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
+from tuner import Tuner
 from ways import needs
 
 #: The other ways in have their tests beside those of the drive, without ROS.
@@ -44,33 +44,6 @@ def start(bench: Bench, *arguments: str) -> tuple:
     simulator = bench.simulator()
     bench.driver('-p', 'poll_rate:=50.0', *arguments)
     return simulator, bench.client().connected()
-
-
-class Tuner:
-    """A client of the action."""
-
-    def __init__(self, client: Client, name: str = '/nfo_sinus') -> None:
-        self._action = ActionClient(client.node, Tune, f'{name}/tune')
-        client.callback(self._action.destroy)
-        wait_until(self._action.server_is_ready, 'there is an action server')
-        self.feedback: list[Tune.Feedback] = []
-
-    def begin(self, procedure: int):
-        """Send a goal, and return its handle when it is accepted."""
-        future = self._action.send_goal_async(
-            Tune.Goal(procedure=procedure),
-            feedback_callback=lambda message: self.feedback.append(message.feedback),
-        )
-        wait_until(future.done, 'the goal is answered')
-        assert future.result().accepted
-        return future.result()
-
-    @staticmethod
-    def result(handle):
-        """Wait for the end; return status and result."""
-        future = handle.get_result_async()
-        wait_until(future.done, 'there is a result')
-        return future.result().status, future.result().result
 
 
 def _last_error(client: Client) -> str:

@@ -1,0 +1,139 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The errands through ROS, over every way into a drive; what a drive has not, the answer says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from action_msgs.msg import GoalStatus
+from bench import Bench
+from bench import Client
+from bench import seconds
+from bench import wait_until
+from nfo_sinus_msgs.action import Tune
+from nfo_sinus_msgs.msg import ErrorLogEntry
+from nfo_sinus_msgs.srv import GetErrorLog
+import pytest
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import QoSProfile
+from tuner import Tuner
+from ways import WAYS
+from ways import Way
+
+from nfo_sinus_driver.node.domain import own_domain
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+_KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_TUNING = 28
+_NOT_THERE = 'is not known of this model'
+
+
+class Rig:
+    """One drive and its driver, which polls so seldom that polls miss stages."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.way = bench.way
+        self.drive: Simulated = bench.simulator('--boot-time', '0.5', paced=False)
+        bench.driver('-p', 'poll_rate:=2.0')
+        self.client: Client = bench.client().connected()
+        self.client.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', _KEPT)
+
+    @property
+    def tunes(self) -> bool:
+        return self.way.model == 'sinus_g2'
+
+
+@pytest.fixture(scope='module', params=WAYS.values(), ids=WAYS)
+def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    way: Way = request.param
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+        yield Rig(bench)
+
+
+def test_a_fault_is_logged_published_and_acknowledged(rig: Rig) -> None:
+    reads = rig.drive.state()['ack_reads']
+    rig.drive.inject('fault', 5)
+    rig.client.wait_for('inv_st', lambda status: status.code == 5, 'the fault')
+    if rig.tunes:
+        entry = rig.client.wait_for('entry', lambda entry: entry.code == 5, 'its entry')
+        assert entry.text == 'Overload' and seconds(entry.stamp) > 0
+        log = rig.client.call('get_error_log', GetErrorLog)
+        assert log.success and log.entries[0].code == 5
+    else:
+        log = rig.client.call('get_error_log', GetErrorLog)
+        assert not log.success and 'not documented' in log.message
+    assert rig.drive.state()['ack_reads'] == reads
+    assert rig.client.call('fault_ack').message == 'acknowledged 5 Overload'
+    assert rig.drive.state()['fault'] == 0
+    erased = rig.client.call('erase_error_log')
+    assert erased.success is rig.tunes, erased.message
+    assert rig.tunes or _NOT_THERE in erased.message
+
+
+def test_the_energy_is_reset_or_the_answer_says_why_not(rig: Rig) -> None:
+    answer = rig.client.call('reset_energy')
+    if rig.way.name == 'classic_v5':
+        assert not answer.success and 'firmware 4.38' in answer.message
+    elif rig.tunes:
+        assert answer.success and answer.message.endswith('-> 0.000 kWh'), answer.message
+        assert rig.drive.state()['parameters']['status.e_out'] == 0
+    else:
+        assert not answer.success and _NOT_THERE in answer.message
+
+
+def test_the_action_tells_every_stage(rig: Rig) -> None:
+    tuner = Tuner(rig.client)
+    status, result = tuner.result(tuner.begin(Tune.Goal.STATOR_RESISTANCE))
+    if not rig.tunes:
+        assert status == GoalStatus.STATUS_ABORTED
+        assert _NOT_THERE in result.message and 'at the keypad' in result.message
+        return
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.message
+    assert any(text.startswith('motor.r_stat: ') for text in result.changed)
+    # feedback is on its way beside the result
+    wait_until(lambda: tuner.feedback[-1].status.text == 'RsMeasOK', 'the last stage')
+    codes = [one.status.code for one in tuner.feedback]
+    assert _TUNING in codes
+    times = [one.elapsed for one in tuner.feedback]
+    assert times == sorted(times) and times[0] < times[-1]
+
+
+def test_the_action_is_cancelled(rig: Rig) -> None:
+    if not rig.tunes:
+        pytest.skip('it does not tune')
+    tuner = Tuner(rig.client)
+    handle = tuner.begin(Tune.Goal.FULL)
+    rig.drive.wait_for(lambda state: state['inv_st'] == _TUNING)
+    handle.cancel_goal_async()
+    status, result = tuner.result(handle)
+    assert status == GoalStatus.STATUS_CANCELED
+    assert not result.success and 'was stopped' in result.message
+    assert rig.drive.state()['mode'] == 1
+
+
+def test_tuning_is_refused_with_the_reason(rig: Rig) -> None:
+    if not rig.tunes:
+        assert _NOT_THERE in rig.client.call('tune_full').message
+        return
+    with rig.client.run_at(8.0):
+        assert 'the motor is enabled' in rig.client.call('tune_full').message
+    rig.drive.inject('fault', 5)
+    rig.client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
+    message = rig.client.call('tune_basic').message
+    assert message.startswith('fault 5 Overload stands: ')
+    assert message.endswith('then call ~/fault_ack')
+    assert rig.client.call('fault_ack').success

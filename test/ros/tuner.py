@@ -1,0 +1,50 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A client of the action Tune."""
+
+from __future__ import annotations
+
+from bench import Client
+from bench import wait_until
+from nfo_sinus_msgs.action import Tune
+from rclpy.action import ActionClient
+
+
+class Tuner:
+    """A client of the action."""
+
+    def __init__(self, client: Client, name: str = '/nfo_sinus') -> None:
+        self._action = ActionClient(client.node, Tune, f'{name}/tune')
+        client.callback(self._action.destroy)
+        wait_until(self._action.server_is_ready, 'there is an action server')
+        self.feedback: list[Tune.Feedback] = []
+
+    def begin(self, procedure: int):
+        """Send a goal, and return its handle when it is accepted."""
+        future = self._action.send_goal_async(
+            Tune.Goal(procedure=procedure),
+            feedback_callback=lambda message: self.feedback.append(message.feedback),
+        )
+        wait_until(future.done, 'the goal is answered')
+        assert future.result().accepted
+        return future.result()
+
+    @staticmethod
+    def result(handle):
+        """Wait for the end; return status and result."""
+        future = handle.get_result_async()
+        wait_until(future.done, 'there is a result')
+        return future.result().status, future.result().result
