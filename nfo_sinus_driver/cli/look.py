@@ -19,11 +19,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable
 from collections.abc import Mapping
+from collections.abc import Sequence
 import json
 import math
 
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.cli.erase import erase
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.session import Remote
@@ -35,6 +37,7 @@ from nfo_sinus_driver.cli.values import readable
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import shown
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.link import Refused
 
 _NAMEPLATE = ('motor.p_nom', 'motor.u_nom', 'motor.f_nom', 'motor.n_nom', 'motor.i_nom')
@@ -116,42 +119,51 @@ def get(options: argparse.Namespace) -> int:
 
 
 def errors(options: argparse.Namespace) -> int:
-    """Show the error log."""
+    """Show the error log, or erase it."""
     with Session(options) as session:
         drive = session.drive()
         drive.identify(thoroughly=False)
-        entries = drive.error_log(options.count)
+        entries = drive.error_log(0 if options.erase else options.count)
+        if options.erase and drive.look().driven:
+            raise Trouble(f'the motor runs ({drive.inverter.describe()}): stop it first')
+    rows = [_as_row(entry) for entry in entries]
+    if options.erase:
+        for line in _as_lines(entries) if not options.json else ():
+            put(line)
+        return erase(options, entries, rows)
     if options.json:
-        # JSON has no NaN
-        rows = [
-            {
-                'code': entry.code,
-                'text': entry.text,
-                'operating_time': entry.operating_time,
-                'age': _known(entry.age),
-                'time': entry.wall_time,
-            }
-            for entry in entries
-        ]
         put(json.dumps(rows, ensure_ascii=False, indent=2))
         return 0
-    for line in columns(
-        [
-            (
-                f'{entry.operating_time:.1f} h',
-                str(entry.code),
-                entry.text,
-                _ago(entry.age),
-                entry.wall_time,
-            )
-            for entry in entries
-        ],
-        right=(0, 1),
-    ):
+    for line in _as_lines(entries):
         put(line)
     if not entries:
         put('the error log is empty')
     return 0
+
+
+def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
+    rows = [
+        (
+            f'{entry.operating_time:.1f} h',
+            str(entry.code),
+            entry.text,
+            _ago(entry.age),
+            entry.wall_time,
+        )
+        for entry in entries
+    ]
+    return columns(rows, right=(0, 1))
+
+
+def _as_row(entry: LogEntry) -> dict[str, object]:
+    return {
+        'code': entry.code,
+        'text': entry.text,
+        'operating_time': entry.operating_time,
+        # JSON has no NaN
+        'age': _known(entry.age),
+        'time': entry.wall_time,
+    }
 
 
 def _known(number: float) -> float | None:
@@ -166,8 +178,6 @@ def as_json(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> str
     """Return parameters with their units, for a script."""
     shown_ = {key: {'value': values[key], 'unit': wanted[key].unit} for key in wanted}
     return json.dumps(shown_, ensure_ascii=False, indent=2)
-
-
 
 
 def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:

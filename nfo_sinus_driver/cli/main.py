@@ -27,6 +27,8 @@ import sys
 import threading
 
 from nfo_sinus_driver.cli.change import set_
+from nfo_sinus_driver.cli.command import ack
+from nfo_sinus_driver.cli.command import stop
 from nfo_sinus_driver.cli.compare import diff
 from nfo_sinus_driver.cli.look import errors
 from nfo_sinus_driver.cli.look import get
@@ -34,12 +36,15 @@ from nfo_sinus_driver.cli.look import info
 from nfo_sinus_driver.cli.look import list_
 from nfo_sinus_driver.cli.options import parse
 from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.run import run
 from nfo_sinus_driver.cli.scan import scan
 from nfo_sinus_driver.cli.transfer import dump
 from nfo_sinus_driver.cli.transfer import load
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.cli.tune import tune
 from nfo_sinus_driver.cli.watch import monitor
+from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.drive import DriveError
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
@@ -53,6 +58,10 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     'diff': diff,
     'errors': errors,
     'monitor': monitor,
+    'ack': ack,
+    'run': run,
+    'stop': stop,
+    'tune': tune,
 }
 
 _FAILED = 1
@@ -77,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         remark(str(error))
         return _USAGE
     except (Trouble, DriveError) as error:
-        remark(str(error))
+        remark(in_our_words(str(error)))
         return failed
     except BrokenPipeError:
         # who read the output has gone, and Python would complain of it once more at the end

@@ -18,9 +18,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+import math
 import shlex
 
 from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.cli.tune import PROCEDURES
+from nfo_sinus_driver.drive import CONTROL_METHODS
+from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
@@ -175,6 +180,8 @@ def _parser() -> argparse.ArgumentParser:
         help='at most so many entries; more than 32 where a drive has them (default: 0, which is '
         'all, or 32)',
     )
+    _add_yes(errors)
+    errors.add_argument('--erase', action='store_true', help='erase it, after it was shown')
     monitor = verb('monitor', 'show what the drive does, until Ctrl-C', json=True)
     monitor.add_argument(
         '--period',
@@ -184,7 +191,80 @@ def _parser() -> argparse.ArgumentParser:
         help='from one line to the next (default: 0.5)',
     )
     monitor.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+    verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
+    _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))
+    stop = verb('stop', 'stop a motor that the bus runs, and give control back', json=True)
+    stop.add_argument(
+        '--quick', action='store_true', help='release the motor at once: it coasts'
+    )
+    tune = verb('tune', 'have the drive measure or calculate its motor', json=True)
+    tune.add_argument(
+        'procedure',
+        choices=PROCEDURES,
+        help='full or basic tuning, rs: only the stator resistance, calculate: from the motor '
+        'plate alone',
+    )
+    _add_yes(tune)
     return parser
+
+
+def _add_yes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('--yes', action='store_true', help='do it without asking')
+
+
+def _add_run(run: argparse.ArgumentParser) -> None:
+    add = run.add_argument
+    add(
+        'setpoint',
+        nargs='?',
+        type=_setpoint,
+        metavar='SETPOINT',
+        help='in the unit of the control mode: Hz, rpm, % of nominal torque, or that of the '
+        'process; negative is reverse',
+    )
+    add(
+        '--for',
+        dest='seconds',
+        type=_ride_seconds,
+        metavar='SECONDS',
+        help='stop after so long (default: run until Ctrl-C)',
+    )
+    add(
+        '--method',
+        choices=CONTROL_METHODS[:2],
+        default='mode_scmd',
+        help='how the drive is commanded (default: mode_scmd)',
+    )
+    add(
+        '--reference',
+        choices=REFERENCES,
+        metavar='REFERENCE',
+        default='fieldbus',
+        help=f'what the motor follows: {", ".join(REFERENCES)} (default: fieldbus, which is '
+        'SETPOINT)',
+    )
+    add(
+        '--control-mode',
+        choices=CONTROL_MODES,
+        default='',
+        help='refuse to run in another one; an Optimal, which does not tell it, is taken to be in '
+        'this one (default: any; an Optimal: Freque)',
+    )
+    add(
+        '--drive-timeout',
+        type=float,
+        default=0.0,
+        metavar='SECONDS',
+        help="set the drive's own time-out (SioTot, with AutoStop on), so that it stops by itself "
+        'when the line is cut (default: leave it as it is)',
+    )
+    add(
+        '--period',
+        type=_seconds,
+        default=0.5,
+        metavar='SECONDS',
+        help='from one status to the next (default: 0.5)',
+    )
 
 
 def _add_load(load: argparse.ArgumentParser) -> None:
@@ -225,6 +305,20 @@ def _seconds(text: str) -> float:
     seconds = float(text)
     if not 0.01 <= seconds <= 3600:
         raise argparse.ArgumentTypeError(f'{text} is not possible: 0.01 s at least')
+    return seconds
+
+
+def _setpoint(text: str) -> float:
+    setpoint = float(text)
+    if not math.isfinite(setpoint):
+        raise argparse.ArgumentTypeError(f'{text} is no set-point')
+    return setpoint
+
+
+def _ride_seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 < seconds < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: more than 0 s')
     return seconds
 
 

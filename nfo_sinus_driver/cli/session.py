@@ -35,10 +35,12 @@ from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.drive import Listener
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -47,6 +49,7 @@ from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.methods import method_in_charge
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import LinkError
@@ -119,6 +122,10 @@ class Remote:
         errands = Errands(self._bus, self.inverter, self.registers, None)
         log = ErrorLog(self.inverter, self.registers, errands)
         return self.do(lambda: log.read_now(most))
+
+    def method_in_charge(self) -> str:
+        """Return the control method by which the bus runs it, or would be able to stop it."""
+        return self.do(lambda: method_in_charge(self.inverter, self.registers, Priority.SERVICE))
 
     def measure(self, key: str) -> Value:
         """Read one value."""
@@ -194,12 +201,25 @@ class Session:
         """Return the drive at an address, or at the one that the options name; nothing is sent."""
         return Remote(self._bus, self._settings(address or self._options.address))
 
-    def _settings(self, address: int) -> DriveSettings:
+    def command(self, listener: Listener, **settings: Any) -> Drive:
+        """
+        Return the drive that the options name as the driver has it; nothing is sent.
+
+        :param settings: fields of ``DriveSettings`` that are not as usual.
+        :raises UsageError: they make no sense.
+        """
+        try:
+            return Drive(self._bus, self._settings(self._options.address, **settings), listener)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+
+    def _settings(self, address: int, **others: Any) -> DriveSettings:
         options = self._options
-        return DriveSettings(
-            address=address,
-            model=options.model,
-            control_method='mode_scmd' if self._writes else 'monitor',
-            retries=options.retries,
-            allow_communication_changes=getattr(options, 'allow_communication_changes', False),
-        )
+        usual: dict[str, Any] = {
+            'address': address,
+            'model': options.model,
+            'control_method': 'mode_scmd' if self._writes else 'monitor',
+            'retries': options.retries,
+            'allow_communication_changes': getattr(options, 'allow_communication_changes', False),
+        }
+        return DriveSettings(**{**usual, **others})

@@ -16,10 +16,14 @@
 
 from __future__ import annotations
 
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import words_optimal
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.drive_control import DriveControl
 from nfo_sinus_driver.drive.drive_control import OptimalDriveControl
+from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.mode_scmd import ModeScmd
 from nfo_sinus_driver.drive.mode_scmd import ModeSmode
 from nfo_sinus_driver.drive.registers import Registers
@@ -47,3 +51,22 @@ def make_control_method(settings: DriveSettings, registers: Registers) -> Contro
     # the two commands that the Optimal has are the same numbers on both
     method = ModeSmode if optimal else ModeScmd
     return method(registers, _COMMANDS[settings.reference])
+
+
+async def method_in_charge(inverter: Inverter, registers: Registers, priority: Priority) -> str:
+    """
+    Return by which control method the bus has control of a drive, from whom was here before.
+
+    On the Optimal what one has started the other does not stop ([M1] forbids to mix them).
+
+    :param inverter: what was seen of the drive last.
+    :returns: ``mode_scmd`` where the bus has no control.
+    """
+    if inverter.model.name == 'sinus_optimal':
+        word = int(await registers.read_number('fieldbus.drive_control', priority))
+        by_word = bool(word & words_optimal.Control.SWITCH_ON)
+    elif inverter.seen is None or not inverter.seen.from_bus:
+        by_word = False
+    else:
+        by_word = await registers.read('fieldbus.mode', priority) != Mode.BUS
+    return 'drive_control' if by_word else 'mode_scmd'

@@ -132,10 +132,11 @@ class Withdrawal:
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
-        while not self._again and self._inverter.connected:
+        while not self._again:
+            # a drive that is only being connected to has no polls yet, and others want the line too
             await self._bus.sleep(_RETRY_PERIOD)
             seen = self._inverter.seen
-            if seen is not None and not seen.faulted:
+            if not self._inverter.connected or (seen is not None and not seen.faulted):
                 return
 
     async def _tried(self) -> bool:

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
 import json
 import os
 from pathlib import Path
@@ -39,7 +41,10 @@ ROOT = Path(__file__).resolve().parents[3]
 PATIENCE = 60.0
 #: The functions that write [M0 §6.2.3].
 WRITES = {6, 16, 23}
-_COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+
+
+MakeBench = Callable[..., 'Bench']
 
 
 class Done(NamedTuple):
@@ -50,6 +55,20 @@ class Done(NamedTuple):
     err: str
 
 
+#: Short ramps: nobody wants to wait for a motor; but its stop is to be seen.
+QUICK = {'control.accel': 0.2, 'control.retard': 2.5}
+_RUN = 0x101
+_BUS = 3
+
+
+def wait_until(condition: Callable[[], object]) -> None:
+    """Wait until a condition holds; fail when it does not in time."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, 'it never came true'
+        time.sleep(0.005)
+
+
 class Bench:
     """Simulated drives at addresses 1 and 2, with a trace of all that is said."""
 
@@ -58,6 +77,9 @@ class Bench:
         options.setdefault('serial_numbers', ['NFO1001', 'NFO1002'])
         self.simulator = Simulator([1, 2], trace=str(trace), boot_time=0.1, **options)
         self.options = ('--port', self.simulator.port, '--response-timeout', '2.0')
+        for name in ('protocol', 'model'):
+            if name in options:
+                self.options += (f'--{name}', options[name])
 
     def __enter__(self) -> Bench:
         self.simulator.__enter__()
@@ -77,6 +99,26 @@ class Bench:
     def set(self, key: str, value: object, address: int = 1) -> None:
         """Change a parameter at the keypad."""
         self.simulator.inject('set', key, value, address=address)
+
+    def state(self) -> dict[str, Any]:
+        """Everything about the drive at address 1, as it is now."""
+        return self.simulator.state(1)
+
+    @property
+    def stopped(self) -> bool:
+        """The motor stands, and nobody has control of it."""
+        state = self.state()
+        return not state['driven'] and not state['turning'] and state['source'] == 'stop'
+
+    def run_by_bus(self, hertz: float = 10.0) -> None:
+        """Let the motor run as if another master had told it."""
+        with self.simulator.lock:
+            drive = self.drive()
+            drive.write_raw('fieldbus.mode', _BUS)
+            optimal = drive.model.name == 'sinus_optimal'
+            drive.memory.set(drive.runner.setpoint_key, hertz)
+            drive.write_raw('fieldbus.smode' if optimal else 'fieldbus.scmd', _RUN)
+        wait_until(lambda: self.state()['driven'] and self.state()['frequency'] > hertz / 2)
 
     def writes(self) -> list[bytes]:
         """Every request so far that writes."""
@@ -121,7 +163,7 @@ class Bench:
     def run(self, *arguments: object, text: str | None = None) -> Done:
         """Run the command as a process of its own."""
         done = subprocess.run(
-            [*_COMMAND, *self.options, *map(str, arguments)],
+            [*COMMAND, *self.options, *map(str, arguments)],
             cwd=ROOT,
             input=text,
             capture_output=True,
@@ -134,12 +176,33 @@ class Bench:
     def begin(self, *arguments: object) -> subprocess.Popen[str]:
         """Begin to run it."""
         return subprocess.Popen(
-            [*_COMMAND, *self.options, *map(str, arguments)],
+            [*COMMAND, *self.options, *map(str, arguments)],
             cwd=ROOT,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
+
+    @contextlib.contextmanager
+    def begun(self, *arguments: object) -> Iterator[subprocess.Popen[str]]:
+        """Begin to run it; the process is gone afterwards, come what may."""
+        process = self.begin(*arguments)
+        try:
+            yield process
+        finally:
+            process.kill()
+            process.wait()
+            for stream in (process.stdout, process.stderr):
+                assert stream is not None
+                stream.close()
+
+    @contextlib.contextmanager
+    def riding(self, *arguments: object) -> Iterator[subprocess.Popen[str]]:
+        """The motor turns by the command, at 10 Hz."""
+        with self.begun('run', 10, *arguments) as process:
+            wait_until(lambda: process.poll() is not None or self.state()['frequency'])
+            assert process.poll() is None, process.communicate()
+            yield process
 
     def on_terminal(self, *arguments: object, ask: str = '', answer: str = '') -> Done:
         """Run it on a terminal, and answer what it asks."""
@@ -147,7 +210,7 @@ class Bench:
         if not process:
             os.chdir(ROOT)
             os.environ['TERM'] = 'xterm'
-            command = [*_COMMAND, *self.options, *map(str, arguments)]
+            command = [*COMMAND, *self.options, *map(str, arguments)]
             os.execv(command[0], command)
         said = ''
         deadline = time.monotonic() + PATIENCE

@@ -26,11 +26,10 @@ from typing import Any
 from cli_bench import ROOT
 from cli_bench import Bench
 from cli_bench import Done
+from cli_bench import MakeBench
 import pytest
 
 from nfo_sinus_driver.cli.main import main
-
-MakeBench = Callable[..., Bench]
 
 
 @pytest.fixture

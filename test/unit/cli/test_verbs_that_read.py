@@ -301,9 +301,9 @@ def test_an_optimal(make_bench: Callable[..., Bench]) -> None:
         done = bench.run(verb, *optimal)
         assert done.status == 1 and done.out == ''
         assert 'of a sinus_optimal no settings are known' in done.err
-    done = bench.run('info')
+    done = bench.run('info', '--model', 'sinus_g2')
     assert done.status == 1
     assert 'not as a sinus_g2 does' in done.err and '--model' in done.err
-    done = bench.run('scan', '--addresses', '1')
+    done = bench.run('scan', '--addresses', '1', '--model', 'sinus_g2')
     assert done.status == 0 and 'no sinus_g2?' in done.out
     assert bench.writes() == []

@@ -339,6 +339,18 @@ def test_motor_that_runs_already_is_stopped(rig: Rig) -> None:
     assert rig.far.memory.raw('status.frq_set') == 0
 
 
+def test_a_fault_that_holds_a_run_command_keeps_nobody_from_connecting(rig: Rig) -> None:
+    # the stop that is refused must leave the line to others, although nothing is polled yet
+    with rig.simulator.lock:
+        rig.far.write_raw('fieldbus.mode', Mode.BUS)
+        rig.far.write_raw('fieldbus.scmd', Scmd.FIELDBUS)
+    rig.simulator.inject('fault', OVERLOAD)
+    rig.connect()
+    rig.acknowledged = 1
+    rig.drive.acknowledge().result(PATIENCE)
+    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP and not rig.drive.stop_unconfirmed)
+
+
 def test_motor_that_somebody_else_starts_is_stopped(rig: Rig) -> None:
     rig.connect()
     rig.publish(20.0)

@@ -1,0 +1,156 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verbs ``stop`` and ``ack``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.cli.helm import Helm
+from nfo_sinus_driver.cli.helm import at_the_helm
+from nfo_sinus_driver.cli.status_line import as_line
+from nfo_sinus_driver.cli.stopping import Stopping
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import InverterStatus
+
+#: What connecting to a drive says, and what does not matter to who stops it or acknowledges.
+_MUTE = ('the drive has no time-out', 'the motor runs under bus control from before', 'fault ')
+#: How long a drive may take to answer to all that a command consists of, s.
+_LONGEST = 15.0
+_STATUS_PERIOD = 0.2
+
+
+def stop(options: argparse.Namespace) -> int:
+    """Stop a motor that the bus runs."""
+    with at_the_helm(options, mute=_MUTE, live=not options.json) as helm:
+        try:
+            done, answer = _stop(helm, options)
+        except DriveError as error:
+            done, answer = False, (
+                f'the stop is NOT confirmed: {in_our_words(str(error))}. '
+                'Use the RUN input or the emergency stop if the motor turns'
+            )
+        if options.json:
+            facts = {'confirmed': done, 'message': answer}
+            helm.screen.put(json.dumps(facts, ensure_ascii=False))
+        elif done:
+            helm.screen.put(answer)
+    if not done:
+        raise Trouble(answer)
+    return 0
+
+
+def _stop(helm: Helm, options: argparse.Namespace) -> tuple[bool, str]:
+    """Return whether it is stopped, and what to say of it."""
+    remote = helm.remote
+    remote.identify(thoroughly=False)
+    seen = remote.look()
+    told = remote.inverter.describe()
+    if not seen.from_bus:
+        if seen.driven or seen.code == seen.codes.start_delay:
+            return False, (
+                f'keypad or terminals run the motor ({told}), so the bus cannot stop it: '
+                'press STOP at the keypad, or open its RUN input'
+            )
+        return True, f'the motor does not run ({told})'
+    drive = _in_charge(helm)
+    shown_at = -math.inf
+
+    def show() -> None:
+        nonlocal shown_at
+        if helm.screen.live and time.monotonic() > shown_at + _STATUS_PERIOD:
+            shown_at = time.monotonic()
+            helm.screen.status(as_line(drive.snapshot, helm.ear.values))
+
+    stopping = Stopping(helm, drive, show)
+    helm.finish(drive.connect(), _LONGEST)
+    drive.activate()
+    if not stopping.stop(quick=options.quick):
+        return False, stopping.answer
+    how = stopping.answer
+    if not options.json:
+        helm.screen.say(how)
+    given_back = stopping.give_back()
+    if not given_back:
+        return False, f'{how}, but control was not given back'
+    return True, stopping.answer
+
+
+def _in_charge(helm: Helm) -> Drive:
+    """Return the drive, to be commanded by whichever method has control of it already."""
+    method = helm.remote.method_in_charge()
+    # the reference does not matter to who starts nothing; this one goes with the control word
+    reference = 'terminal' if method == 'drive_control' else 'fieldbus'
+    return helm.drive(control_method=method, reference=reference)
+
+
+def ack(options: argparse.Namespace) -> int:
+    """Acknowledge a fault or an alarm."""
+    with at_the_helm(options, mute=_MUTE) as helm:
+        remote = helm.remote
+        remote.identify(thoroughly=False)
+        seen = remote.look()
+        told = remote.inverter.describe()
+        error = ''
+        if not seen.faulted and seen.kind is Kind.STATUS:
+            answer = f'nothing to acknowledge ({told})'
+        else:
+            try:
+                answer = _acknowledge(helm, seen)
+            except DriveError as failure:
+                error = answer = in_our_words(str(failure))
+        if options.json:
+            now = remote.look()
+            facts = {
+                'acknowledged': answer.startswith('acknowledged'),
+                'code': seen.code,
+                'text': remote.inverter.text_of(seen.code),
+                'code_now': now.code,
+                'text_now': remote.inverter.text,
+                'message': answer,
+            }
+            helm.screen.put(json.dumps(facts, ensure_ascii=False))
+        elif not error:
+            helm.screen.put(answer)
+    if error:
+        raise Trouble(error)
+    return 0
+
+
+def _acknowledge(helm: Helm, seen: InverterStatus) -> str:
+    """
+    Acknowledge, and leave nothing behind that could start the motor.
+
+    :raises DriveError: the fault still stands, or the motor runs.
+    """
+    remote = helm.remote
+    if seen.driven:
+        raise DriveError(
+            f'the motor runs ({remote.inverter.describe()}), and to acknowledge would stop it: '
+            'type nfo-sinus stop first'
+        )
+    drive = _in_charge(helm)
+    helm.finish(drive.connect(), _LONGEST)
+    answer = helm.finish(drive.acknowledge(), _LONGEST)
+    # nobody is here afterwards to keep the drive from timing out
+    released = helm.finish(drive.disconnect(1.0), _LONGEST)
+    return f'{answer}; control given back' if 'given back' in released else answer

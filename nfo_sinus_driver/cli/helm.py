@@ -1,0 +1,193 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands one drive; the signals that would end the tool are held until it may end."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Iterator
+from collections.abc import Sequence
+from concurrent.futures import Future
+import contextlib
+import sys
+import time
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.cli.held_signals import HeldSignals
+from nfo_sinus_driver.cli.screen import Screen
+from nfo_sinus_driver.cli.session import Remote
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.signals import SUSPENDING
+from nfo_sinus_driver.signals import signal_name
+
+_T = TypeVar('_T')
+
+#: How often it is looked whether something is done, s.
+_LOOK_PERIOD = 0.02
+#: Often enough to be brisk; the line is not kept busy for nothing, Hz.
+_POLL_RATE = 20.0
+
+
+def spoken(name: str) -> str:
+    """Return a signal as a person knows it."""
+    return {'SIGINT': 'Ctrl-C', 'SIGTSTP': 'Ctrl-Z'}.get(name, name)
+
+
+class Ended(Exception):
+    """
+    Something ended it; the message says what.
+
+    :ivar status: the exit status, if all goes well from then on.
+    """
+
+    def __init__(self, why: str, status: int) -> None:
+        super().__init__(why)
+        self.status = status
+
+
+class Ear:
+    """
+    Hears what a drive has to tell, on the worker of the bus.
+
+    :param mute: how events begin that are of no interest here.
+    """
+
+    def __init__(self, say: Callable[[str], None], mute: Sequence[str]) -> None:
+        self._say = say
+        self._mute = tuple(mute)
+        #: What was said to a person.
+        self.told: list[str] = []
+        #: What was measured last, by catalog key.
+        self.values: dict[str, float] = {}
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        """Pass on what a person has to know."""
+        if severity is Severity.INFO or text.startswith(self._mute):
+            return
+        text = in_our_words(text)
+        self.told.append(text)
+        self._say(text)
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        """Nothing: it is looked at when it is shown."""
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Take measured values."""
+        self.values = telemetry.values
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        """Nothing: nobody looks at them."""
+
+    def on_log_entry(self, entry: LogEntry) -> None:
+        """Nothing: what matters of it is told as an event."""
+
+
+class Helm:
+    """
+    The means to command one drive.
+
+    :ivar remote: the same drive, to look at before it is commanded.
+    """
+
+    def __init__(
+        self, session: Session, screen: Screen, signals: HeldSignals, mute: Sequence[str]
+    ) -> None:
+        self._session = session
+        self._signals = signals
+        self.screen = screen
+        self.ear = Ear(screen.say, mute)
+        self.remote: Remote = session.drive()
+
+    def drive(self, **settings: Any) -> Drive:
+        """
+        Return the drive to be commanded; nothing is sent yet.
+
+        :param settings: fields of ``DriveSettings`` that are not as usual.
+        :raises UsageError: they make no sense.
+        """
+        return self._session.command(self.ear, poll_rate=_POLL_RATE, **settings)
+
+    def signal(self, timeout: float) -> str:
+        """Return the name of a signal that shall end it; ``''`` when none came in time, s."""
+        number = self._signals.next(timeout)
+        if number is None:
+            return ''
+        name = signal_name(number)
+        if number in SUSPENDING:
+            self.screen.say(
+                f'{spoken(name)} ignored: a suspended command would leave the motor running'
+            )
+            return ''
+        return name
+
+    def wait(self, future: Future[_T], show: Callable[[], object] = lambda: None) -> _T:
+        """
+        Return the result of a future.
+
+        :param show: called again and again meanwhile.
+        :raises Ended: a signal came first.
+        :raises DriveError: as the future does.
+        """
+        while not future.done():
+            show()
+            name = self.signal(_LOOK_PERIOD)
+            if name:
+                raise Ended(name, 130)
+        return future.result()
+
+    def finish(
+        self, future: Future[_T], timeout: float, show: Callable[[], object] = lambda: None
+    ) -> _T:
+        """
+        Return the result of a future, whatever signals come.
+
+        :raises DriveError: as the future does; or it takes longer than so many seconds.
+        """
+        deadline = time.monotonic() + timeout
+        while not future.done():
+            show()
+            if time.monotonic() > deadline:
+                raise DriveError(f'no answer within {timeout:g} s')
+            self.signal(_LOOK_PERIOD)
+        return future.result()
+
+
+@contextlib.contextmanager
+def at_the_helm(
+    options: argparse.Namespace, *, mute: Sequence[str] = (), live: bool = False
+) -> Iterator[Helm]:
+    """
+    Open the line to command a drive; signals are held while the ``with`` block lasts.
+
+    :param mute: how events begin that are of no interest.
+    :param live: whether the status may be one line of a terminal.
+    """
+    live = live and sys.stdout is not None and sys.stdout.isatty()
+    with (
+        HeldSignals() as signals,
+        Screen(live=live) as screen,
+        Session(options, writes=True) as session,
+    ):
+        yield Helm(session, screen, signals, mute)

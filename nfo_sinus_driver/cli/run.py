@@ -1,0 +1,212 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verb ``run``: the motor follows a set-point until somebody or something ends it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+
+from nfo_sinus_driver.cli.helm import Ended
+from nfo_sinus_driver.cli.helm import Helm
+from nfo_sinus_driver.cli.helm import at_the_helm
+from nfo_sinus_driver.cli.helm import spoken
+from nfo_sinus_driver.cli.status_line import as_json
+from nfo_sinus_driver.cli.status_line import as_line
+from nfo_sinus_driver.cli.stopping import SHUTDOWN_TIMEOUT
+from nfo_sinus_driver.cli.stopping import Stopping
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive.reference import Reference
+
+#: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
+_PERIOD = 0.1
+#: How long the word may take why it was stopped, s.
+_LONGEST_WORD = 1.0
+_FAILED = 1
+_INTERRUPTED = 130
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the motor until it is ended; however that happens, the motor is stopped."""
+    follows = options.reference == 'fieldbus'
+    if follows and options.setpoint is None:
+        raise UsageError('which set-point? Such as: nfo-sinus run 10')
+    if not follows and options.setpoint is not None:
+        raise UsageError(
+            f'with --reference {options.reference} the drive follows its own reference: '
+            'leave the set-point out'
+        )
+    with at_the_helm(options, live=not options.json) as helm:
+        return _Ride(helm, options).go()
+
+
+class _Ride:
+    """One motor that runs, from enable to stop."""
+
+    def __init__(self, helm: Helm, options: argparse.Namespace) -> None:
+        self._helm = helm
+        self._options = options
+        self._screen = helm.screen
+        self._drive = helm.drive(
+            control_method=options.method,
+            reference=options.reference,
+            expected_control_mode=options.control_mode,
+            drive_timeout=options.drive_timeout,
+        )
+        self._stopping = Stopping(helm, self._drive, self._show)
+        self._shown_at = -math.inf
+        self._ends_at = math.inf
+
+    def go(self) -> int:
+        """
+        Run the motor and stop it; return the exit status.
+
+        :raises Trouble: it cannot be run, and nothing was written.
+        """
+        self._require_admitted()
+        # whatever happens from here on, it is stopped
+        status, why = _FAILED, 'an error in this command'
+        try:
+            self._start()
+            self._follow()
+        except Ended as end:
+            status, why = end.status, str(end)
+        except DriveError as error:
+            why = in_our_words(str(error))
+            self._screen.say(why)
+        finally:
+            confirmed = self._end(why)
+        return status if confirmed else _FAILED
+
+    def _require_admitted(self) -> None:
+        """See to it that the motor may be run so; nothing is written."""
+        remote, options = self._helm.remote, self._options
+        remote.identify(thoroughly=False)
+        seen = remote.look()
+        told = remote.inverter.describe()
+        if seen.driven:
+            by = 'the bus: nfo-sinus stop stops it' if seen.from_bus else 'keypad or terminals'
+            raise Trouble(f'the motor runs already ({told}), by {by}')
+        if seen.faulted:
+            fault = seen.listed
+            raise Trouble(
+                f'fault {told} stands: {fault.description}. {fault.remedy}; '
+                'then type nfo-sinus ack'
+            )
+        mode = remote.do(remote.inverter.read_control_mode)
+        if not remote.registers.reaches('control.mode'):
+            # nothing tells it, so it is what was typed
+            mode = options.control_mode or mode
+        if options.control_mode not in ('', mode):
+            raise Trouble(
+                f'the drive is in control mode {mode}, not {options.control_mode}: set '
+                'control.mode, or give another --control-mode'
+            )
+        if options.setpoint is None:
+            return
+        most = Reference(remote.registers, mode).most
+        if abs(options.setpoint) > most:
+            unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
+            raise Trouble(
+                f'set-point {options.setpoint:g} {unit} is out of range: '
+                f'in control mode {mode} {-most:g} to {most:g} {unit}'
+            )
+
+    def _start(self) -> None:
+        helm, drive = self._helm, self._drive
+        helm.wait(drive.connect())
+        drive.activate()
+        helm.wait(drive.enable(), self._show)
+        if self._options.seconds is not None:
+            self._ends_at = time.monotonic() + self._options.seconds
+
+    def _follow(self) -> None:
+        """
+        Keep the set-point fresh until something ends it.
+
+        :raises Ended: always; with what ended it.
+        """
+        options, drive = self._options, self._drive
+        while True:
+            if options.setpoint is not None:
+                drive.set_setpoint(options.setpoint)
+            self._show()
+            name = self._helm.signal(max(0.0, min(_PERIOD, self._left)))
+            if name:
+                # without --for this is how one ends it
+                wanted = name == 'SIGINT' and options.seconds is None
+                raise Ended(name, 0 if wanted else _INTERRUPTED)
+            if not drive.armed:
+                raise Ended(self._why_disarmed(), _FAILED)
+            if self._screen.gone:
+                raise Ended('nobody reads the output any more', _FAILED)
+            if self._left <= 0:
+                raise Ended(f'{options.seconds:g} s are over', 0)
+
+    @property
+    def _left(self) -> float:
+        return self._ends_at - time.monotonic()
+
+    def _why_disarmed(self) -> str:
+        """Return why the motor follows set-points no more; a person has been told."""
+        deadline = time.monotonic() + _LONGEST_WORD
+        while time.monotonic() < deadline:
+            for text in reversed(self._helm.ear.told):
+                if text.startswith(('stopped: ', 'lost: ')):
+                    return text
+            self._helm.signal(0.01)
+        return 'it was stopped'
+
+    def _end(self, why: str) -> bool:
+        """Stop the motor and give control back; true when all of it was confirmed."""
+        if self._drive.identity is None:
+            return True
+        confirmed = False
+        try:
+            if why.startswith('SIG'):
+                self._screen.say(f'{spoken(why)}: stopping the motor')
+            confirmed = self._stopping.stop()
+            if confirmed:
+                self._screen.say(self._stopping.answer)
+                told = self._stopping.answer
+                # who ended it so is in a hurry, or not there any more
+                hurry = (why.startswith('SIG') and why != 'SIGINT') or self._screen.gone
+                confirmed = self._stopping.give_back(SHUTDOWN_TIMEOUT if hurry else math.inf)
+                if confirmed and self._stopping.answer != told:
+                    self._screen.say(self._stopping.answer)
+        finally:
+            if self._options.json:
+                facts = {'ended': why, 'stop_confirmed': confirmed, 'stop': self._stopping.answer}
+                self._screen.put(json.dumps(facts, ensure_ascii=False))
+        return confirmed
+
+    def _show(self) -> None:
+        now = time.monotonic()
+        seen, values = self._drive.snapshot, self._helm.ear.values
+        nothing_yet = seen.status is None and self._shown_at < 0
+        if nothing_yet or now < self._shown_at + self._options.period:
+            return
+        self._shown_at = now
+        if self._options.json:
+            self._screen.status(as_json(seen, values))
+            return
+        timed = seen.enabled and self._left < math.inf
+        left = f'{math.ceil(max(0.0, self._left))} s left' if timed else ''
+        self._screen.status(as_line(seen, values, left))

@@ -1,0 +1,127 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is printed while a motor is commanded; nobody ever waits for a terminal or a reader."""
+
+from __future__ import annotations
+
+from collections import deque
+import os
+import shutil
+import sys
+import threading
+from typing import TextIO
+
+_CLEAR_LINE = '\r\x1b[K'
+#: How long the last words may take, s.
+_LAST_WORDS = 2.0
+#: So many lines may wait for a reader that does not read; then the oldest are dropped.
+_MOST_WAITING = 1000
+
+
+class Screen:
+    """
+    Prints by a thread of its own, while the ``with`` block lasts.
+
+    After Ctrl-S in the terminal, or with a reader that does not read, only that thread waits.
+
+    :ivar live: the status is one line of a terminal, and not a line each time.
+    """
+
+    def __init__(self, *, live: bool) -> None:
+        self.live = live
+        self._waiting: deque[tuple[bool, str]] = deque(maxlen=_MOST_WAITING)
+        self._status: str | None = None
+        self._status_stands = False
+        self._work_there = threading.Event()
+        self._closing = False
+        self._thread = threading.Thread(target=self._work, name='screen', daemon=True)
+        #: Nobody can read the output any more.
+        self.gone = False
+
+    def __enter__(self) -> Screen:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._closing = True
+        self._work_there.set()
+        self._thread.join(_LAST_WORDS)
+
+    def status(self, text: str) -> None:
+        """Show what is so now; on a live line the newest replaces the others."""
+        if self.live:
+            self._status = text
+            self._work_there.set()
+        else:
+            self.put(text)
+
+    def put(self, text: str) -> None:
+        """Print a line of output."""
+        self._enter(False, text)
+
+    def say(self, text: str) -> None:
+        """Say something to a person, on standard error."""
+        self._enter(True, f'nfo-sinus: {text}')
+
+    def _enter(self, to_error: bool, text: str) -> None:
+        self._waiting.append((to_error, text))
+        self._work_there.set()
+
+    def _work(self) -> None:
+        while not self._closing:
+            self._work_there.wait()
+            self._work_there.clear()
+            self._print_all()
+        self._print_all()
+        if self._status_stands:
+            self._print(sys.stdout, '\n')
+
+    def _print_all(self) -> None:
+        while self._waiting:
+            to_error, text = self._waiting.popleft()
+            stream = sys.stderr if to_error else sys.stdout
+            cleared = _CLEAR_LINE if self._status_stands and _is_terminal(stream) else ''
+            self._status_stands = self._status_stands and not cleared
+            self._print(stream, f'{cleared}{text}\n')
+        status, self._status = self._status, None
+        if status is not None:
+            width = shutil.get_terminal_size().columns - 1
+            self._print(sys.stdout, f'{_CLEAR_LINE}{status[:width]}')
+            self._status_stands = True
+
+    def _print(self, stream: TextIO | None, text: str) -> None:
+        try:
+            _write(stream, text)
+        except (OSError, ValueError):
+            self.gone = self.gone or stream is sys.stdout
+
+
+def _is_terminal(stream: TextIO | None) -> bool:
+    return stream is not None and stream.isatty()
+
+
+def _write(stream: TextIO | None, text: str) -> None:
+    """Write past the buffer, for nobody could flush it at the end while a write waits."""
+    if stream is None:
+        return
+    try:
+        number = stream.fileno()
+    except OSError:
+        # it is none of the system's
+        stream.write(text)
+        return
+    data = text.encode(stream.encoding or 'utf-8', 'replace')
+    while data:
+        data = data[os.write(number, data) :]

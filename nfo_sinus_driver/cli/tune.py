@@ -1,0 +1,144 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verb ``tune``: the drive measures its motor, or calculates it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+
+from nfo_sinus_driver.cli.helm import Ended
+from nfo_sinus_driver.cli.helm import Helm
+from nfo_sinus_driver.cli.helm import at_the_helm
+from nfo_sinus_driver.cli.helm import spoken
+from nfo_sinus_driver.cli.question import require_yes
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Tuned
+
+PROCEDURES = {
+    'full': Procedure.FULL,
+    'basic': Procedure.BASIC,
+    'rs': Procedure.STATOR_RESISTANCE,
+    'calculate': Procedure.CALCULATE,
+}
+#: How long connecting may take, and a cancelled tuning until it has ended, s.
+_LONGEST = 15.0
+_STATUS_PERIOD = 0.2
+_INTERRUPTED = 130
+
+
+def tune(options: argparse.Namespace) -> int:
+    """Tune, and tell which parameters have changed."""
+    procedure = PROCEDURES[options.procedure]
+    what = procedure.value
+    with Session(options) as session:
+        drive = session.drive()
+        drive.identify(thoroughly=False)
+        if not drive.inverter.has('fieldbus.scmd'):
+            raise Trouble(
+                f'{what} is not known of this model ({drive.model.name}): [M1] lists no command '
+                'for it; do it at the keypad'
+            )
+        if drive.look().driven:
+            raise Trouble(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
+    require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
+    # what becomes of it is told as the result
+    mute = ('the drive has no time-out', 'fault ', what)
+    with at_the_helm(options, mute=mute, live=not options.json) as helm:
+        return _Tuning(helm, options, procedure).go()
+
+
+def _warning(procedure: Procedure) -> str:
+    if procedure is Procedure.CALCULATE:
+        return 'the drive changes its motor parameters.'
+    return 'the motor gets current and may turn, for minutes.'
+
+
+class _Tuning:
+    """One procedure, from beginning to end."""
+
+    def __init__(
+        self, helm: Helm, options: argparse.Namespace, procedure: Procedure
+    ) -> None:
+        self._helm = helm
+        self._options = options
+        self._procedure = procedure
+        self._drive = helm.drive()
+        self._begun = time.monotonic()
+        self._shown = ''
+        self._shown_at = 0.0
+
+    def go(self) -> int:
+        """Tune; return the exit status."""
+        screen, status = self._helm.screen, 1
+        try:
+            tuned, status = self._tuned()
+        except Ended as end:
+            tuned, status = Tuned(False, f'{end}: not begun', ()), end.status
+        except DriveError as error:
+            tuned = Tuned(False, str(error), ())
+        text = in_our_words(tuned.text)
+        if self._options.json:
+            facts = {
+                'success': tuned.success,
+                'message': text,
+                'seconds': round(time.monotonic() - self._begun, 1),
+                'changed': [
+                    {'name': one.key, 'old': one.old, 'new': one.new, 'unit': one.unit}
+                    for one in tuned.changes
+                ],
+            }
+            screen.put(json.dumps(facts, ensure_ascii=False))
+        else:
+            for change in tuned.changes:
+                screen.put(str(change))
+            if tuned.success and not tuned.changes:
+                screen.put('no parameter has changed')
+        screen.say(text)
+        return status
+
+    def _tuned(self) -> tuple[Tuned, int]:
+        """Return how it ended, and the exit status."""
+        helm, drive = self._helm, self._drive
+        helm.wait(drive.connect())
+        drive.activate()
+        future = drive.tune(self._procedure)
+        self._begun = time.monotonic()
+        try:
+            tuned = helm.wait(future, self._show)
+        except Ended as end:
+            helm.screen.say(f'{spoken(str(end))}: stopping it')
+            helm.finish(drive.cancel_tuning(), _LONGEST)
+            return helm.finish(future, _LONGEST, self._show), _INTERRUPTED
+        return tuned, int(not tuned.success)
+
+    def _show(self) -> None:
+        seen = self._drive.snapshot
+        if seen.status is None:
+            return
+        screen, now = self._helm.screen, time.monotonic()
+        stage = f'{seen.status.code} {seen.text}'
+        line = f'{self._procedure.value}  {stage}  {now - self._begun:.0f} s'
+        if screen.live and now > self._shown_at + _STATUS_PERIOD:
+            self._shown_at = now
+            screen.status(line)
+        elif not screen.live and stage != self._shown:
+            self._shown = stage
+            screen.say(line)

@@ -1,0 +1,444 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``stop``, ``ack``, ``tune`` and ``errors --erase``, judged by the simulated drive itself."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+import json
+import re
+import signal
+from typing import Any
+
+from cli_bench import PATIENCE
+from cli_bench import QUICK
+from cli_bench import ROOT
+from cli_bench import Bench
+from cli_bench import Done
+from cli_bench import MakeBench
+from cli_bench import wait_until
+import pytest
+
+from nfo_sinus_driver.catalog import Control
+from nfo_sinus_driver.catalog import words_optimal
+from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.simulator.refusal import Reason
+
+Nfo = Callable[..., Done]
+OVERLOAD, SIO_FAIL = 5, 14
+HASTY = ('--response-timeout', 0.1, '--retries', 0)
+OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
+WAYS: dict[str, dict[str, Any]] = {
+    'modbus_rtu': {},
+    'modbus_ascii': {'protocol': 'modbus_ascii'},
+    'modbus_tcp': {'protocol': 'modbus_tcp'},
+    'classic': {'protocol': 'classic'},
+    'optimal': OPTIMAL,
+}
+#: Those of a drive that tunes and has an error log.
+WAYS_OF_THE_G2 = {name: options for name, options in WAYS.items() if name != 'optimal'}
+
+
+@pytest.fixture
+def bench(make_bench: MakeBench) -> Bench:
+    """A line with drives that have short ramps."""
+    return make_bench(settings=QUICK)
+
+
+# --- stop -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_stop(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(settings=QUICK, **WAYS[way])
+    bench.run_by_bus()
+    done = bench.run('stop')
+    assert done.status == 0, done.err
+    assert 'stopping: it ramps down' in done.err
+    assert 'control given back' in done.out
+    assert bench.stopped
+
+
+#: What is written into the control word, step by step, until the motor runs.
+_READY = (
+    Control.NET_CTRL
+    | Control.NET_REF
+    | Control.ENABLE_VOLTAGE
+    | Control.DISABLE_QUICK_STOP
+    | Control.ENABLE_RFG
+    | Control.UNLOCK_RFG
+    | Control.USE_REF_FOR_RFG
+)
+_ENABLED = words_optimal.Control.BUS_CONTROL | words_optimal.Control.ENABLE
+STEPS = {
+    'sinus_g2': (
+        _READY,
+        _READY | Control.SWITCH_ON,
+        _READY | Control.SWITCH_ON | Control.ENABLE_OP,
+    ),
+    'sinus_optimal': (
+        words_optimal.Control.BUS_CONTROL,
+        _ENABLED,
+        _ENABLED | words_optimal.Control.SWITCH_ON,
+    ),
+}
+
+
+@pytest.mark.parametrize('way', ['modbus_rtu', 'classic', 'optimal'])
+def test_stop_of_what_the_control_word_runs(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(settings=QUICK, **WAYS[way])
+    drive = bench.drive()
+    with bench.simulator.lock:
+        drive.memory.set(drive.runner.setpoint_key, 20.0)
+    for word in STEPS[drive.model.name]:
+        begun = bench.state()['time']
+        with bench.simulator.lock:
+            drive.write_raw('fieldbus.drive_control', int(word))
+        # the drive takes its time for each step
+        wait_until(lambda begun=begun: bench.state()['time'] > begun + 0.3)
+    wait_until(lambda: bench.state()['driven'])
+    done = bench.run('stop')
+    assert done.status == 0, done.err
+    assert not bench.state()['driven']
+
+
+def test_stop_that_coasts(make_bench: MakeBench) -> None:
+    bench = make_bench(settings={**QUICK, 'control.st_mode': 'Release'})
+    bench.run_by_bus()
+    done = bench.run('stop')
+    assert done.status == 0
+    assert not bench.state()['driven']
+    assert 'stopp' in done.err
+
+
+@pytest.mark.parametrize('way', ['modbus_rtu', 'classic'])
+def test_quick_stop(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(settings={'control.retard': 500, 'control.accel': 0.2}, **WAYS[way])
+    bench.run_by_bus()
+    done = bench.run('stop', '--quick')
+    assert done.status == 0, done.err
+    assert 'released: the motor coasts' in done.out
+    state = bench.state()
+    assert not state['driven'] and state['source'] == 'stop'
+
+
+def test_quick_stop_of_an_optimal(make_bench: MakeBench) -> None:
+    bench = make_bench(settings=QUICK, **OPTIMAL)
+    bench.run_by_bus()
+    done = bench.run('stop', '--quick')
+    assert done.status == 0
+    assert 'this drive has no quick stop' in done.err
+    assert not bench.state()['driven']
+
+
+def test_stop_of_a_motor_that_does_not_run(bench: Bench, nfo: Nfo) -> None:
+    done = nfo('stop')
+    assert done == Done(0, 'the motor does not run (24 Stop)\n', '')
+    assert json.loads(nfo('stop', '--json').out)['confirmed'] is True
+    assert bench.writes() == []
+
+
+@pytest.mark.parametrize('key', ['start', 'ext'])
+def test_stop_of_what_is_run_at_the_drive(bench: Bench, nfo: Nfo, key: str) -> None:
+    bench.simulator.inject('keypad', key, address=1)
+    wait_until(lambda: bench.state()['driven'])
+    done = nfo('stop')
+    assert done.status == 1 and done.out == ''
+    assert 'keypad or terminals run the motor' in done.err
+    assert 'the bus cannot stop it: press STOP at the keypad' in done.err
+    assert bench.state()['driven'] and bench.writes() == []
+
+
+def test_stop_waits_for_the_ramp(make_bench: MakeBench) -> None:
+    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 5})
+    bench.run_by_bus(20)
+    done = bench.run('stop', '--json')
+    assert done.status == 0
+    assert not bench.state()['driven'] and bench.state()['source'] == 'stop'
+    assert json.loads(done.out) == {
+        'confirmed': True,
+        'message': 'stopped (37 Bus Stby); control given back',
+    }
+
+
+def test_stop_that_is_not_confirmed(bench: Bench) -> None:
+    bench.run_by_bus()
+    bench.refuse('fieldbus.scmd', Reason.STATE)
+    with bench.begun('stop') as process:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        assert 'emergency stop' in said
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1 and out == ''
+    assert 'the stop is NOT confirmed' in said + err
+    assert 'ending WITHOUT a confirmed stop' in err
+    assert bench.state()['driven']
+
+
+def test_stop_of_a_drive_that_is_silent(bench: Bench) -> None:
+    bench.run_by_bus()
+    bench.simulator.inject('silence', 600, address=1)
+    done = bench.run('stop', *HASTY)
+    assert done.status == 1
+    assert 'the stop is NOT confirmed: nobody answers at address 1' in done.err
+    assert 'emergency stop' in done.err
+    assert json.loads(bench.run('stop', '--json', *HASTY).out)['confirmed'] is False
+
+
+# --- ack ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_ack(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(**WAYS[way])
+    bench.simulator.inject('fault', OVERLOAD, address=1)
+    code = bench.state()['inv_st']
+    done = bench.run('ack')
+    assert done.status == 0, done.err
+    assert re.match(f'acknowledged {code} ', done.out)
+    assert done.err == ''
+    assert bench.state()['fault'] == 0
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_ack_under_a_run_command_that_stands_starts_nothing(
+    make_bench: MakeBench, way: str
+) -> None:
+    bench = make_bench(settings=QUICK, **WAYS[way])
+    bench.run_by_bus()
+    bench.simulator.inject('fault', OVERLOAD, address=1)
+    done = bench.run('ack')
+    assert done.status == 0, done.err
+    assert 'control given back' in done.out
+    state = bench.state()
+    assert not state['driven'] and state['source'] == 'stop' and state['fault'] == 0
+
+
+def test_ack_of_a_serial_fault(make_bench: MakeBench) -> None:
+    settings = {**QUICK, 'serial.sio_tot': 1, 'serial.auto_stop': True}
+    bench = make_bench(settings=settings)
+    bench.run_by_bus()
+    wait_until(lambda: bench.state()['fault'] == SIO_FAIL)
+    done = bench.run('ack')
+    assert done.status == 0
+    assert done.out.startswith('acknowledged 14 Sio Fail')
+    assert bench.state()['source'] == 'stop' and bench.state()['fault'] == 0
+
+
+def test_ack_of_a_fault_that_still_stands(bench: Bench, nfo: Nfo) -> None:
+    bench.simulator.inject('fault', OVERLOAD, address=1, standing=True)
+    done = nfo('ack')
+    assert done.status == 1 and done.out == ''
+    assert '5 Overload still stands' in done.err and 'Reduce the load' in done.err
+    facts = json.loads(nfo('ack', '--json').out)
+    assert facts['acknowledged'] is False and facts['code_now'] == OVERLOAD
+    bench.simulator.inject('ack-cause-gone', address=1)
+    facts = json.loads(nfo('ack', '--json').out)
+    assert facts['acknowledged'] is True
+    assert facts['code'] == OVERLOAD and facts['text'] == 'Overload' and facts['code_now'] == 24
+
+
+def test_ack_of_nothing(bench: Bench, nfo: Nfo) -> None:
+    assert nfo('ack') == Done(0, 'nothing to acknowledge (24 Stop)\n', '')
+    bench.run_by_bus()
+    done = nfo('ack')
+    assert done.status == 0 and 'nothing to acknowledge' in done.out
+    assert bench.state()['driven'] and bench.writes() == []
+
+
+# --- tune -----------------------------------------------------------------------------------------
+
+TUNINGS = {
+    'full': '45 TuningOK',
+    'basic': '45 TuningOK',
+    'rs': '46 RsMeasOK',
+    'calculate': '47 ParClcOK',
+}
+
+
+@pytest.mark.parametrize('procedure', TUNINGS)
+def test_tune(bench: Bench, procedure: str) -> None:
+    before = {key: bench.value(key) for key in bench.drive().settings}
+    done = bench.run('tune', procedure, '--yes')
+    assert done.status == 0, done.err
+    assert TUNINGS[procedure] in done.err.splitlines()[-1]
+    # the calculation is over before one has looked
+    assert '28 Tuning' in done.err or procedure == 'calculate'
+    after = {key: bench.value(key) for key in before}
+    changed = {key for key in before if before[key] != after[key]}
+    assert {line.split(':')[0] for line in done.out.splitlines()} == changed
+    assert all(' -> ' in line for line in done.out.splitlines())
+    assert bench.state()['source'] == 'stop'
+
+
+@pytest.mark.parametrize('way', WAYS_OF_THE_G2)
+def test_tune_every_way(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(**WAYS[way])
+    done = bench.run('tune', 'rs', '--yes', '--json')
+    assert done.status == 0, done.err
+    facts = json.loads(done.out)
+    assert facts['success'] is True and facts['seconds'] > 0
+    (changed,) = facts['changed']
+    assert changed['name'] == 'motor.r_stat' and changed['new'] == bench.value('motor.r_stat')
+
+
+def test_tune_that_fails(bench: Bench) -> None:
+    bench.simulator.inject('tuning-fails', 17, address=1)
+    done = bench.run('tune', 'basic', '--yes')
+    assert done.status == 1
+    assert done.err.count('17 TunFailM:') == 1
+    assert 'type nfo-sinus ack first' in done.err and '~/' not in done.err
+    assert bench.run('ack').status == 0
+
+
+def test_tune_without_its_run_input(make_bench: MakeBench) -> None:
+    bench = make_bench(run_input=False)
+    done = bench.run('tune', 'rs', '--yes', '--json')
+    assert done.status == 1
+    facts = json.loads(done.out)
+    assert facts['success'] is False and 'RUN input' in facts['message']
+    assert facts['changed'] == []
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_cancels_a_tuning(bench: Bench, number: signal.Signals) -> None:
+    before = {key: bench.value(key) for key in bench.drive().settings}
+    with bench.begun('tune', 'full', '--yes') as process:
+        wait_until(lambda: bench.state()['inv_st'] == 28)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, err
+    name = 'Ctrl-C' if number is signal.SIGINT else number.name
+    assert f'{name}: stopping it' in err
+    assert 'full tuning was stopped before it was finished' in err
+    assert 'no parameter has changed' not in out
+    state = bench.state()
+    assert state['inv_st'] != 28 and state['source'] == 'stop'
+    assert {key: bench.value(key) for key in before} == before
+
+
+@pytest.mark.parametrize(('answer', 'tunes'), [('y\n', True), ('n\n', False), ('\n', False)])
+def test_tune_asks_on_a_terminal(bench: Bench, answer: str, tunes: bool) -> None:
+    before = bench.value('motor.r_stat')
+    done = bench.on_terminal('tune', 'rs', ask='[y/N] ', answer=answer)
+    assert 'the motor gets current and may turn' in done.out
+    assert done.status == (0 if tunes else 1)
+    assert (bench.value('motor.r_stat') != before) is tunes
+    if tunes:
+        assert 'stator resistance measurement  28 Tuning' in done.err
+    else:
+        assert 'nothing was done' in done.out and bench.writes() == []
+
+
+def test_tune_does_not_begin_unasked(bench: Bench) -> None:
+    done = bench.run('tune', 'rs', text='y\n')
+    assert done.status == 2
+    assert 'Nobody can be asked here: say so with --yes' in done.err
+    assert bench.writes() == []
+
+
+def test_tune_of_an_optimal(make_bench: MakeBench) -> None:
+    done = make_bench(**OPTIMAL).run('tune', 'full', '--yes')
+    assert done.status == 1
+    assert 'not known of this model (sinus_optimal)' in done.err and 'keypad' in done.err
+
+
+@pytest.mark.parametrize('by', ['bus', 'keypad'])
+@pytest.mark.parametrize('verb', [('tune', 'rs'), ('errors', '--erase')])
+def test_a_motor_that_runs_is_left_alone(bench: Bench, nfo: Nfo, by: str, verb: Any) -> None:
+    if by == 'bus':
+        bench.run_by_bus()
+    else:
+        bench.simulator.inject('keypad', 'start', address=1)
+    done = nfo(*verb, '--yes')
+    assert done.status == 1
+    assert 'the motor runs' in done.err and 'stop it first' in done.err
+    assert bench.state()['driven'] and bench.writes() == []
+
+
+# --- errors --erase -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('way', WAYS_OF_THE_G2)
+def test_erase(make_bench: MakeBench, way: str) -> None:
+    bench = make_bench(**WAYS[way])
+    for code in (5, 12):
+        bench.simulator.inject('fault', code, address=1)
+    assert bench.run('ack').status == 0
+    done = bench.run('errors', '--erase', '--yes')
+    assert done.status == 0, done.err
+    first, second, last = done.out.splitlines()
+    assert 'Cur High' in first and 'Overload' in second
+    assert last == 'erased: 2 entries'
+    assert bench.state()['error_log'] == []
+    assert bench.state()['source'] == 'stop'
+    assert bench.run('errors', '--erase', '--yes').out == 'the error log is empty already\n'
+
+
+def test_erase_as_json(bench: Bench, nfo: Nfo) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    assert nfo('ack').status == 0
+    (erased,) = json.loads(nfo('errors', '--erase', '--yes', '--json').out)['erased']
+    assert erased['code'] == 5
+    assert json.loads(nfo('errors', '--erase', '--yes', '--json').out) == {'erased': []}
+
+
+@pytest.mark.parametrize(('answer', 'erased'), [('y\n', True), ('n\n', False)])
+def test_erase_asks_on_a_terminal(bench: Bench, answer: str, erased: bool) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    assert bench.run('ack').status == 0
+    before = bench.state()['error_log']
+    done = bench.on_terminal('errors', '--erase', ask='[y/N] ', answer=answer)
+    assert 'Erase the error log (1 entry) of address 1?' in done.out
+    assert done.status == (0 if erased else 1)
+    assert bench.state()['error_log'] == ([] if erased else before)
+
+
+def test_erase_does_not_begin_unasked(bench: Bench) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    done = bench.run('errors', '--erase')
+    assert done.status == 2 and '--yes' in done.err
+    assert len(bench.state()['error_log']) == 1
+
+
+def test_erase_while_a_fault_stands(bench: Bench, nfo: Nfo) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    done = nfo('errors', '--erase', '--yes')
+    assert done.status == 1
+    assert 'fault 5 Overload stands' in done.err and 'type nfo-sinus ack' in done.err
+    assert len(bench.state()['error_log']) == 1
+
+
+def test_erase_of_an_optimal(make_bench: MakeBench) -> None:
+    done = make_bench(**OPTIMAL).run('errors', '--erase', '--yes')
+    assert done.status == 1 and 'not documented' in done.err
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def test_no_message_of_the_drive_layer_names_what_only_ros_has() -> None:
+    said = [
+        node.value
+        for path in sorted((ROOT / 'nfo_sinus_driver' / 'drive').glob('*.py'))
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    services = [text for text in said if '~/' in text]
+    assert services
+    for text in services:
+        assert '~/' not in in_our_words(text)

@@ -1,0 +1,533 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``run``: the motor follows, and every way out stops it; judged by the simulated drive itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+import os
+from pathlib import Path
+import pty
+import select
+import signal
+import subprocess
+from typing import Any
+
+from cli_bench import COMMAND
+from cli_bench import PATIENCE
+from cli_bench import QUICK
+from cli_bench import ROOT
+from cli_bench import Bench
+from cli_bench import Done
+from cli_bench import MakeBench
+from cli_bench import wait_until
+import pytest
+
+Nfo = Callable[..., Done]
+RUN = (0x02, 0x98)
+#: A line that is cut is noticed soon.
+HASTY = ('--response-timeout', 0.3, '--retries', 2)
+OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
+#: Every protocol, model and control method.
+WAYS: dict[str, tuple[dict[str, Any], tuple[object, ...]]] = {
+    'modbus_rtu': ({}, ()),
+    'modbus_ascii': ({'protocol': 'modbus_ascii'}, ()),
+    'modbus_tcp': ({'protocol': 'modbus_tcp'}, ()),
+    'classic': ({'protocol': 'classic'}, ()),
+    'drive_control': ({}, ('--method', 'drive_control')),
+    'classic_drive_control': ({'protocol': 'classic'}, ('--method', 'drive_control')),
+    'optimal': (OPTIMAL, ()),
+}
+
+
+@pytest.fixture
+def bench(make_bench: MakeBench) -> Bench:
+    """A line with drives that have short ramps."""
+    return make_bench(settings=QUICK)
+
+
+def read_until(stream: Any, text: str) -> str:
+    """Read lines until one says this."""
+    said = ''
+    for line in stream:
+        said += line
+        if text in line:
+            return said
+    raise AssertionError(said)
+
+
+def nothing_commanded(bench: Bench) -> bool:
+    """Nobody has told the drive anything."""
+    return bench.writes() == [] and not bench.state()['command_writes']
+
+
+# --- the ride -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_it_runs_for_a_while_and_stops(make_bench: MakeBench, way: str) -> None:
+    options, arguments = WAYS[way]
+    bench = make_bench(settings=QUICK, **options)
+    process = bench.begin('run', 10, '--for', 2, *arguments)
+    wait_until(lambda: bench.state()['frequency'] == pytest.approx(10, abs=0.2))
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+    assert bench.stopped
+    assert 'stopping: it ramps down' in err and 'control given back' in err
+    assert 'set  10.0 Hz' in out and '10.0 Hz' in out
+
+
+def test_an_optimal_by_its_control_word(make_bench: MakeBench) -> None:
+    bench = make_bench(settings=QUICK, **OPTIMAL)
+    method = ('--method', 'drive_control')
+    done = bench.run('run', 10, *method)
+    assert done.status == 2 and 'it must be terminal' in done.err
+    process = bench.begin('run', *method, '--reference', 'terminal', '--for', 1)
+    wait_until(lambda: bench.state()['frequency'] > 20)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+    assert not bench.state()['driven']
+
+
+@pytest.mark.parametrize('typed', [('-10',), ('--', '-10')])
+def test_backwards(bench: Bench, typed: tuple[str, ...]) -> None:
+    process = bench.begin('run', '--for', 1, *typed)
+    wait_until(lambda: bench.state()['frequency'] < -9)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0 and bench.stopped
+
+
+def test_a_reference_of_its_own(bench: Bench) -> None:
+    with bench.begun('run', '--reference', 'fix2_reverse') as process:
+        wait_until(lambda: bench.state()['frequency'] == pytest.approx(-15, abs=0.2))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+    assert bench.stopped
+
+
+def test_the_set_point_stays_fresh(bench: Bench) -> None:
+    # the driver gives one up after 2.5 s, and so does a drive of its own accord
+    arguments = ('--for', 4, '--drive-timeout', 1)
+    with bench.riding(*arguments) as process:
+        out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+    assert 'no set-point' not in err and 'time-out' not in err
+    lines = [line for line in out.splitlines() if 'Bus Run' in line]
+    assert '10.0 Hz' in lines[-1] and '1 s left' in lines[-1]
+    assert bench.value('serial.sio_tot') == 1.0 and bench.value('serial.auto_stop') is True
+    assert bench.state()['fault'] == 0
+
+
+@pytest.mark.parametrize(
+    ('options', 'why'),
+    [({}, 'SioTot is 0'), ({'serial.sio_tot': 5}, 'AutoStop is OFF')],
+)
+def test_it_warns_once_of_a_drive_without_a_time_out(
+    make_bench: MakeBench, options: dict[str, Any], why: str
+) -> None:
+    bench = make_bench(settings={**QUICK, **options})
+    done = bench.run('run', 10, '--for', 0.3)
+    assert done.status == 0
+    assert done.err.count('the drive has no time-out of its own') == 1
+    assert why in done.err and '--drive-timeout' in done.err
+
+
+def test_it_does_not_warn_of_a_drive_that_has_one(make_bench: MakeBench) -> None:
+    settings = {**QUICK, 'serial.sio_tot': 5, 'serial.auto_stop': True}
+    done = make_bench(settings=settings).run('run', 10, '--for', 0.3)
+    assert done.status == 0 and 'time-out' not in done.err
+
+
+def test_json(bench: Bench) -> None:
+    done = bench.run('run', 10, '--for', 1, '--json', '--period', 0.1)
+    assert done.status == 0
+    *rides, end = [json.loads(line) for line in done.out.splitlines()]
+    assert {row['enabled'] for row in rides} == {True, False}
+    last = [row for row in rides if row['enabled']][-1]
+    assert last['setpoint'] == 10.0 and last['unit'] == 'Hz' and last['kind'] == 'status'
+    assert last['frequency'] == pytest.approx(10, abs=0.2)
+    assert end['ended'] == '1 s are over' and end['stop_confirmed'] is True
+
+
+def test_one_line_on_a_terminal(bench: Bench) -> None:
+    done = bench.on_terminal('run', 10, '--for', 1, '--period', 0.1)
+    assert done.status == 0
+    assert done.err.count('\r\x1b[K') > 5
+    lines = [line for line in done.out.splitlines() if 'Hz' in line and 'set' in line]
+    assert len(lines) <= 1
+
+
+# --- the ways out ---------------------------------------------------------------------------------
+
+SIGNALS = {
+    signal.SIGINT: 0,
+    signal.SIGTERM: 130,
+    signal.SIGHUP: 130,
+    signal.SIGQUIT: 130,
+    signal.SIGUSR1: 130,
+}
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_stops_the_motor(bench: Bench, number: signal.Signals) -> None:
+    with bench.riding() as process:
+        process.send_signal(number)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == SIGNALS[number]
+    assert bench.stopped
+    name = 'Ctrl-C' if number is signal.SIGINT else number.name
+    assert f'{name}: stopping the motor' in err
+    assert 'ramps down' in err and 'control given back' in err
+
+
+@pytest.mark.parametrize('way', ['classic', 'optimal', 'drive_control'])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_motor_every_way(
+    make_bench: MakeBench, way: str, number: signal.Signals
+) -> None:
+    options, arguments = WAYS[way]
+    bench = make_bench(settings=QUICK, **options)
+    with bench.riding(*arguments) as process:
+        process.send_signal(number)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == SIGNALS[number], err
+    assert bench.stopped
+
+
+def test_ctrl_c_before_the_time_is_over(bench: Bench) -> None:
+    with bench.riding('--for', 1000) as process:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 130
+    assert bench.stopped
+
+
+def test_ctrl_c_while_it_waits_for_the_start(make_bench: MakeBench) -> None:
+    bench = make_bench(settings={**QUICK, 'control.run_dly': 600})
+    with bench.begun('run', 10) as process:
+        wait_until(lambda: bench.state()['inv_st'] == 25)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 130
+    state = bench.state()
+    assert bench.stopped and state['inv_st'] != 25
+
+
+def test_output_that_nobody_reads_any_more(bench: Bench) -> None:
+    with bench.riding('--period', 0.05) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert process.wait(PATIENCE) == 1
+        assert 'ramps down' in process.stderr.read()
+    assert bench.stopped
+
+
+def test_output_that_is_not_read_keeps_nothing_waiting(bench: Bench) -> None:
+    with bench.riding('--period', 0.01, '--json') as process:
+        # a pipe holds 64 KiB, which is some hundred lines
+        wait_until(lambda: is_full(process))
+        before = bench.state()['frequency']
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 130
+    assert before > 5
+    assert bench.stopped
+
+
+def is_full(process: subprocess.Popen[str]) -> bool:
+    """Whether the pipe of the standard output takes no more."""
+    with open(f'/proc/{process.pid}/fd/1', 'wb', buffering=0) as pipe:
+        return not select.select([], [pipe], [], 0)[1]
+
+
+class Terminal:
+    """The command on a terminal of its own."""
+
+    def __init__(self, bench: Bench, *arguments: object) -> None:
+        self.pid, self.number = pty.fork()
+        if not self.pid:
+            os.chdir(ROOT)
+            os.environ['TERM'] = 'xterm'
+            command = [*COMMAND, *bench.options, *map(str, arguments)]
+            os.execv(command[0], command)
+        self.said = ''
+
+    def type(self, keys: str) -> None:
+        os.write(self.number, keys.encode())
+
+    def read(self, text: str = '') -> None:
+        """Read until it says this; or to its end."""
+        while not text or text not in self.said:
+            assert select.select([self.number], [], [], PATIENCE)[0], self.said
+            try:
+                data = os.read(self.number, 4096)
+            except OSError:
+                data = b''
+            if not data:
+                assert not text, self.said
+                return
+            self.said += data.decode(errors='replace')
+
+    def end(self) -> int:
+        """Wait for its end; return the exit status."""
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+
+def test_ctrl_c_on_a_terminal(bench: Bench) -> None:
+    terminal = Terminal(bench, 'run', 10)
+    terminal.read('38 Bus Run')
+    terminal.type('\x03')
+    terminal.read()
+    assert terminal.end() == 0
+    assert bench.stopped
+    assert 'control given back' in terminal.said
+
+
+def test_ctrl_z_does_not_freeze_it(bench: Bench) -> None:
+    terminal = Terminal(bench, 'run', 10)
+    terminal.read('38 Bus Run')
+    terminal.type('\x1a')
+    terminal.read('Ctrl-Z ignored')
+    state = Path(f'/proc/{terminal.pid}/stat').read_text(encoding='utf-8').split(')')[1].split()[0]
+    assert state != 'T'
+    assert bench.state()['driven']
+    terminal.type('\x03')
+    terminal.read()
+    assert terminal.end() == 0 and bench.stopped
+
+
+def test_a_terminal_that_is_closed(bench: Bench) -> None:
+    terminal = Terminal(bench, 'run', 10)
+    terminal.read('38 Bus Run')
+    os.close(terminal.number)
+    assert terminal.end() == 130
+    assert bench.stopped
+
+
+def test_a_terminal_that_stands_still(bench: Bench) -> None:
+    # Ctrl-S; and somebody elsewhere who wants it to end
+    terminal = Terminal(bench, 'run', 10)
+    terminal.read('38 Bus Run')
+    terminal.type('\x13')
+    os.kill(terminal.pid, signal.SIGTERM)
+    wait_until(lambda: bench.stopped)
+    assert terminal.end() == 130
+
+
+def test_a_fault(bench: Bench) -> None:
+    with bench.riding() as process:
+        bench.simulator.inject('fault', 5, address=1)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert 'stopped: fault 5 Overload' in err
+    assert 'type nfo-sinus ack' in err and '~/' not in err
+    assert not bench.state()['driven']
+    # and nothing starts when it is acknowledged
+    assert bench.run('ack').status == 0
+    assert bench.stopped
+
+
+@pytest.mark.parametrize(
+    ('what', 'value', 'said'),
+    [('run', 'off', 'RUN input'), ('keypad', 'stop', 'took control'), ('power-cycle', 1, '')],
+)
+def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -> None:
+    with bench.riding(*HASTY) as process:
+        bench.simulator.inject(what, value, address=1)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1, err
+    assert said in err and '~/' not in err
+    assert not bench.state()['driven']
+
+
+def test_a_fault_as_json(bench: Bench) -> None:
+    with bench.riding('--json') as process:
+        bench.simulator.inject('fault', 5, address=1)
+        out, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert 'fault 5 Overload' in json.loads(out.splitlines()[-1])['ended']
+
+
+# --- the line is cut ------------------------------------------------------------------------------
+
+
+def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
+    with bench.riding(*HASTY) as process:
+        bench.simulator.inject('line-dead', 600)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert 'lost: ' in err and 'the stop is NOT confirmed' in err
+    assert 'ending WITHOUT a confirmed stop, the motor may still run' in err
+    assert 'emergency stop' in err
+
+
+def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
+    with bench.riding(*HASTY) as process:
+        bench.simulator.inject('line-dead', 600)
+        assert process.stderr is not None
+        read_until(process.stderr, 'the stop is NOT confirmed')
+        assert bench.state()['driven']
+        bench.simulator.inject('heal')
+        err = process.stderr.read()
+        assert process.wait(PATIENCE) == 1
+    assert 'the stop is confirmed now' in err
+    assert bench.stopped
+
+
+def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
+    with bench.riding(*HASTY) as process:
+        bench.simulator.inject('line-dead', 600)
+        process.send_signal(signal.SIGINT)
+        assert process.stderr is not None
+        read_until(process.stderr, 'the stop is NOT confirmed')
+        process.send_signal(signal.SIGINT)
+        err = process.stderr.read()
+        assert process.wait(PATIENCE) == 1
+    assert 'ending WITHOUT a confirmed stop' in err
+
+
+# --- a long ramp ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('settings', 'said'),
+    [
+        ({}, 'left to its ramp'),
+        ({'serial.sio_tot': 2, 'serial.auto_stop': True}, 'released to coast'),
+    ],
+)
+def test_a_second_ctrl_c_ends_the_wait_for_a_ramp(
+    make_bench: MakeBench, settings: dict[str, Any], said: str
+) -> None:
+    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 500, **settings})
+    with bench.riding() as process:
+        process.send_signal(signal.SIGINT)
+        assert process.stderr is not None
+        read_until(process.stderr, 'ramps down')
+        assert bench.state()['driven']
+        process.send_signal(signal.SIGINT)
+        err = process.stderr.read()
+        assert process.wait(PATIENCE) == 0
+    assert said in err
+    state = bench.state()
+    # it stops by itself, and nothing stands that would run it
+    assert state['scmd'] == 0 and state['state'] != 'OPERATION_ENABLED'
+
+
+def test_sigterm_does_not_wait_for_a_long_ramp(make_bench: MakeBench) -> None:
+    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 500})
+    with bench.riding() as process:
+        process.send_signal(signal.SIGTERM)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert 'left to its ramp' in err
+    assert bench.state()['driven'] and bench.state()['state'] == 'SHUTDOWN'
+
+
+# --- refused, and nothing is written --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('settings', 'setpoint', 'said'),
+    [
+        ({}, 150.1, 'Freque -150 to 150 Hz'),
+        ({}, -151, 'set-point -151 Hz is out of range'),
+        ({'control.mode': 'Speed'}, 9001, 'Speed -9000 to 9000 rpm'),
+        ({'control.mode': 'Torque'}, 201, 'Torque -200 to 200 %'),
+    ],
+)
+def test_out_of_range(
+    make_bench: MakeBench, settings: dict[str, Any], setpoint: float, said: str
+) -> None:
+    bench = make_bench(settings=settings)
+    done = bench.run('run', setpoint)
+    assert done.status == 1 and said in done.err
+    assert nothing_commanded(bench)
+
+
+def test_out_of_range_of_an_optimal(make_bench: MakeBench) -> None:
+    bench = make_bench(**OPTIMAL)
+    assert '-150 to 150 Hz' in bench.run('run', 200).err
+    assert '-9000 to 9000 rpm' in bench.run('run', 10000, '--control-mode', 'Speed').err
+    assert nothing_commanded(bench)
+
+
+def test_another_control_mode(bench: Bench, nfo: Nfo) -> None:
+    done = nfo('run', 10, '--control-mode', 'Speed')
+    assert done.status == 1
+    assert 'in control mode Freque, not Speed' in done.err
+    assert nothing_commanded(bench)
+
+
+def test_a_motor_that_runs_already(bench: Bench, nfo: Nfo) -> None:
+    bench.simulator.inject('keypad', 'start', address=1)
+    done = nfo('run', 10)
+    assert done.status == 1 and 'by keypad or terminals' in done.err
+    assert bench.state()['driven']
+    bench.simulator.inject('keypad', 'stop', address=1)
+    bench.run_by_bus(20)
+    done = nfo('run', 10)
+    assert done.status == 1 and 'nfo-sinus stop stops it' in done.err
+    assert bench.state()['driven'] and bench.writes() == []
+
+
+def test_a_fault_that_stands(bench: Bench, nfo: Nfo) -> None:
+    bench.simulator.inject('fault', 5, address=1)
+    done = nfo('run', 10)
+    assert done.status == 1
+    assert 'fault 5 Overload stands' in done.err and 'type nfo-sinus ack' in done.err
+    assert nothing_commanded(bench)
+
+
+def test_no_run_input(make_bench: MakeBench) -> None:
+    bench = make_bench(run_input=False)
+    done = bench.run('run', 10)
+    assert done.status == 1
+    assert 'RUN input is not active' in done.err
+    assert bench.state()['source'] == 'stop'
+
+
+@pytest.mark.parametrize(
+    ('typed', 'said'),
+    [
+        ((), 'which set-point?'),
+        (('nan',), 'is no set-point'),
+        (('inf',), 'is no set-point'),
+        (('fast',), 'invalid'),
+        ((10, '--reference', 'terminal'), 'leave the set-point out'),
+        ((10, '--for', 0), 'more than 0 s'),
+        ((10, '--drive-timeout', 0.5), 'at least 1 s'),
+        (('--method', 'drive_control', '--reference', 'fix1'), 'must be fieldbus or terminal'),
+    ],
+)
+def test_what_makes_no_sense(
+    bench: Bench, nfo: Nfo, typed: tuple[object, ...], said: str
+) -> None:
+    done = nfo('run', *typed)
+    assert done.status == 2 and said in done.err
+    assert not bench.state()['command_writes']
+
+
+def test_nobody_answers(nfo: Nfo) -> None:
+    done = nfo('run', 10, '--address', 9, '--response-timeout', 0.1, '--retries', 0)
+    assert done.status == 1 and 'nobody answers at address 9' in done.err
+
+
+def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
+    with bench.riding() as process:
+        for arguments in (['run', 10], ['stop'], ['ack'], ['tune', 'rs', '--yes']):
+            done = nfo(*arguments)
+            assert done.status == 1 and f'(pid {process.pid})' in done.err
+        assert bench.state()['driven']
+        process.send_signal(signal.SIGINT)
+        process.wait(PATIENCE)
