@@ -78,9 +78,10 @@ class ControlMethod(Protocol):
     async def release(self) -> None:
         """Give control back; never by a MODE that can start the motor [C43], [C51]."""
 
-    async def acknowledge(self, code: int) -> None:
+    async def acknowledge(self, code: int) -> str:
         """
         Acknowledge a fault.
 
         :param code: the inverter status code that stands.
+        :returns: what more the drive said of it; ``''`` if nothing.
         """

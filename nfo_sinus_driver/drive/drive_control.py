@@ -145,23 +145,23 @@ class DriveControl:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> None:
+    async def acknowledge(self, code: int) -> str:
         """
         Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16].
 
         While a serial fault stands only MODE = Stop is taken, which acknowledges it; over Classic
         nothing can be written while any fault stands, so that reading has to do [M0 §6.1.5].
         """
-        registers = self._registers
+        registers, why = self._registers, ''
         if code == SIO_FAIL:
-            if registers.reaches('fieldbus.sio_err'):
-                await registers.acknowledge('fieldbus.sio_err', Priority.SERVICE)
+            why = await registers.acknowledge_serial_fault()
             await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
         try:
             for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
                 await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
         except Refused:
             await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+        return why
 
     async def _change(self, keep: Control, add: Control, priority: Priority) -> None:
         """Change some bits of the control word and leave the others to who has control."""
@@ -239,9 +239,10 @@ class OptimalDriveControl:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write(_WORD, _OPTIMAL_READY, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> None:
+    async def acknowledge(self, code: int) -> str:
         """Acknowledge a fault by one rising edge of bit 7 [M1]."""
         word = int(await self._registers.read_number(_WORD, Priority.SERVICE))
         low = word & ~(words_optimal.Control.FAULT_ACK | _OPTIMAL_RUN)
         for written in (low, low | words_optimal.Control.FAULT_ACK, low):
             await self._registers.write(_WORD, written, Priority.SERVICE)
+        return ''

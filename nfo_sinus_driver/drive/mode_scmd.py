@@ -113,14 +113,15 @@ class ModeScmd:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> None:
+    async def acknowledge(self, code: int) -> str:
         """Acknowledge a fault; a serial fault is ended by MODE = Stop [M0 §6.1.5], [C42]."""
         await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
-        if code == SIO_FAIL:
-            if self._registers.reaches('fieldbus.sio_err'):
-                # older firmware obeys no MODE while the fault stands [C9]
-                await self._registers.acknowledge('fieldbus.sio_err', Priority.SERVICE)
-            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+        if code != SIO_FAIL:
+            return ''
+        # older firmware obeys no MODE while the fault stands [C9]
+        why = await self._registers.acknowledge_serial_fault()
+        await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+        return why
 
 
 class ModeSmode(ModeScmd):
@@ -166,6 +167,7 @@ class ModeSmode(ModeScmd):
             await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
             await self._registers.write('fieldbus.mode', OptimalMode.MANUAL, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> None:
+    async def acknowledge(self, code: int) -> str:
         """Acknowledge a fault by reading the status that does [M1]."""
         await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+        return ''

@@ -224,7 +224,7 @@ class Motion:
                     withdrawal.PATIENCE,
                 )
         try:
-            await self._method.acknowledge(seen.code)
+            why = await self._method.acknowledge(seen.code)
         finally:
             # even if no answer came, the drive may be free to run now
             if ours:
@@ -240,7 +240,7 @@ class Motion:
             raise DriveError(
                 f'{first}{inverter.describe()} still stands: {stands.description}. {stands.remedy}'
             ) from None
-        return f'acknowledged {name}'
+        return f'acknowledged {name} ({why})' if why else f'acknowledged {name}'
 
     async def release(self, timeout: float) -> str:
         """

@@ -31,10 +31,13 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.link.classic_refusal import flag_names
 
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
+#: The flag of SioErr that says that a fault kept a message from being carried out [M2 table 4].
+_BLOCKED = 1
 #: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
 _SHORT = frozenset(('status.op_time', 'status.rn_time', 'status.br_time'))
 
@@ -147,10 +150,18 @@ class Registers:
         """
         return await self._bus.identify(self._unit, priority)
 
-    async def acknowledge(self, key: str, priority: Priority) -> None:
+    async def acknowledge(self, key: str, priority: Priority) -> Words:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        await self._ask(self.address(key), priority, None, once=True)
+        return (await self._ask(self.address(key), priority, None, once=True)).words
+
+    async def acknowledge_serial_fault(self) -> str:
+        """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
+        if not self.reaches('fieldbus.sio_err'):
+            return ''
+        (flags,) = await self.acknowledge('fieldbus.sio_err', Priority.SERVICE)
+        # that it refused a stop since then is no reason of it
+        return ', '.join(flag_names(flags & ~_BLOCKED))
 
     async def write(
         self, key: str, value: Value, priority: Priority, *, once: bool = False

@@ -168,6 +168,25 @@ def test_a_drive_that_takes_no_word_while_a_fault_stands(
         rig.stop()
 
 
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+@pytest.mark.parametrize('name', ['modbus_rtu', 'classic_v2', 'classic_v5'])
+def test_the_reason_of_a_serial_fault_is_told(name: str, method: str) -> None:
+    if (name, method) == ('classic_v5', 'drive_control'):
+        pytest.skip('it has no control word')
+    rig = Rig(WAYS[name], method)
+    rig.start()
+    try:
+        rig.drive.enable().result(PATIENCE)
+        rig.simulator.inject('sio-error', 4)
+        wait_until(lambda: not rig.drive.armed)
+        answer = rig.drive.acknowledge().result(PATIENCE)
+        # there is no SioErr over Modbus
+        reason = ' (time-out of the serial communication)' if 'classic' in name else ''
+        assert answer == f'acknowledged 14 Sio Fail{reason}'
+    finally:
+        rig.stop()
+
+
 def test_the_error_log(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.faults.log[:] = [LogEntry(1 + n % 12, 1200.0 - n) for n in range(130)]
