@@ -39,6 +39,7 @@ from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_watch import LogWatch
 from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.motion import Motion
+from nfo_sinus_driver.drive.own_timeout import OwnTimeout
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.registers import Registers
@@ -101,10 +102,12 @@ class Drive:
             lambda: self._connect(patient=False),
         )
         self._barred = False
-        self._told_timeout = ''
         #: The settings of the drive.
         self.parameters = Parameters(
             bus, self._inverter, self._registers, self._run, self._take_parameters
+        )
+        self._own_timeout = OwnTimeout(
+            self._inverter, self.parameters, commanded=self._motion is not None
         )
         self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         self._error_log = ErrorLog(self._inverter, self._registers, errands)
@@ -250,7 +253,7 @@ class Drive:
 
     def set_drive_timeout(self, seconds: float) -> Future[str]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return self._run(lambda: self._set_drive_timeout(seconds))
+        return self._run(lambda: self._own_timeout.set_now(seconds))
 
     def set_setpoint(self, value: float) -> None:
         """
@@ -352,7 +355,7 @@ class Drive:
         if self._motion is not None:
             await self._motion.connected()
             if inverter.settings.drive_timeout:
-                await self._set_drive_timeout(inverter.settings.drive_timeout)
+                await self._own_timeout.set_now(inverter.settings.drive_timeout)
         identity = await inverter.introduce()
         self._watch.connected()
         inverter.connected = inverter.answering = True
@@ -365,26 +368,7 @@ class Drive:
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')
-        self._warn_of_missing_timeout()
-
-    def _warn_of_missing_timeout(self) -> None:
-        inverter = self._inverter
-        if self._motion is None or (inverter.sio_tot and inverter.auto_stop):
-            return
-        if not inverter.can_time_out:
-            why, remedy = 'none is known of this model', 'use the RUN input'
-        elif inverter.sio_tot:
-            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
-        else:
-            why, remedy = 'SioTot is 0', 'set drive_timeout'
-        if why == self._told_timeout:
-            return
-        self._told_timeout = why
-        inverter.tell(
-            Severity.WARNING,
-            f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
-            f'is cut, the motor runs on; {remedy}',
-        )
+        self._own_timeout.warn_if_missing()
 
     async def _disconnect(self, timeout: float) -> str:
         try:
@@ -415,19 +399,6 @@ class Drive:
         if self._motion is None or not self._motion.concerned:
             return ''
         return await self._motion.stop(patience)
-
-    async def _set_drive_timeout(self, seconds: float) -> str:
-        if self._motion is None:
-            raise DriveError(MONITOR_REFUSAL)
-        if not seconds:
-            return ''
-        if not self._inverter.can_time_out:
-            raise DriveError('drive_timeout: this model has no SioTot, so it must be 0')
-        wanted = {'serial.sio_tot': seconds, 'serial.auto_stop': True}
-        changes = await self.parameters.change_now(
-            wanted, guarded=False, because=' (drive_timeout)'
-        )
-        return ', '.join(str(change) for change in changes)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""

@@ -175,7 +175,10 @@ def test_groups_of_status_codes() -> None:
     assert codes.bus_running == called('Bus ') - called('Bus Stby', 'Bus Fail')
     assert codes.terminals == called('Ext ')
     assert codes.keypad == called('Final Freq', 'Accel', 'Decel')
-    assert codes.passing == called('Brake Ch', 'Cur Limit')
+    assert codes.local_running == codes.terminals - called('Ext Stby')
+    unknown = called('Brake Ch', 'Cur Limit', 'Final Freq', 'Accel', 'Decel')
+    assert codes.running == unknown
+    assert codes.anonymous == unknown | called('Stop', 'Wait', 'Delay ')
     assert {codes.current_limit} == called('Cur Limit')
     assert {codes.start_delay} == called('Delay Run')
     assert {codes.tuning} == called('Tuning')
@@ -189,7 +192,9 @@ def test_groups_of_status_codes_of_the_g2() -> None:
     codes = G2.dialect.codes
     assert (codes.bus_standby, codes.bus_running) == ({37, 41}, {38, 39, 40, 42, 43, 44})
     assert (codes.keypad, codes.terminals) == (set(range(29, 33)), set(range(33, 37)))
-    assert (codes.passing, codes.current_limit) == ({26, 27}, 27)
+    assert codes.local_running == {29, 30, 31, 32, 34, 35, 36}
+    assert (codes.running, codes.anonymous) == ({26, 27}, {25, 26, 27})
+    assert codes.current_limit == 27
     assert (codes.start_delay, codes.tuning, codes.sio_fail, codes.bus_fail) == (25, 28, 14, 15)
     assert {G2.inv_st(code).text for code in codes.tuned} == {'TuningOK', 'RsMeasOK', 'ParClcOK'}
     assert {G2.inv_st(code).text for code in codes.tuning_failed} == {'TunFailP', 'TunFailM'}

@@ -99,6 +99,7 @@ def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
     Busy(rig, 10_000, register, writes=True)
     rig.publish(10.0)
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('refused set-point 10: the drive is busy', Severity.WARNING)
+    reason = 'refused set-point 10: the drive is busy'
+    wait_until(lambda: rig.notes.told(reason, Severity.WARNING))
     rig.tap.before = lambda register, words: None
     rig.wait_until_still()
