@@ -63,11 +63,12 @@ class Notices:
         if limited and not seen.faulted:
             remedy = self._inverter.model.inv_st(codes.current_limit).remedy
             texts['limit'] = f'the current limit holds the motor back ({told}): {remedy}'
-        elif seen.kind is Kind.ALARM and entry.remedy:
-            texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'
-        elif seen.kind is Kind.ALARM and self._unnamed:
-            # once only, it came or went between the two readings
-            texts['alarm'] = f'alarm, and the status does not say which ({told}): see its display'
+        if seen.kind is Kind.ALARM and seen.code != codes.current_limit:
+            if entry.remedy:
+                texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'
+            elif self._unnamed and not limited:
+                # once only, it came or went between the two readings
+                texts['alarm'] = f'alarm, the status does not say which ({told}): see its display'
         if Fact.SLEEPING in seen.facts:
             texts['sleep'] = (
                 f'the drive sleeps ({told}), for its set-point is below its sleep frequency: '
