@@ -67,21 +67,21 @@ def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) ->
     told = inverter.describe()
     if inverter.control_mode != control_mode:
         return (
-            f'the control mode was changed to {inverter.control_mode} at the drive, so that '
-            f'set-points would be in another unit ({inverter.unit or "?"}): check what sends them'
+            f'the control mode was changed to {inverter.control_mode or "?"} at the drive, and '
+            f'set-points are in {inverter.unit or "another unit"} now: check what sends them'
         )
     if seen.faulted:
         return explain_fault(inverter, seen)
     if seen.state is State.NOT_READY_TO_SWITCH_ON:
-        return f'the drive is starting ({told}), it was switched off and on: check its mains'
+        return f'the drive is starting ({told}): it was switched off and on; check its mains'
     if not seen.from_bus:
         return _explain_loss_of_control(inverter, seen)
     if Fact.RUN_INPUT_MISSING in seen.facts:
-        return f'its RUN input (DIN1) was lost ({told}): close it again'
+        return f'the RUN input (DIN1) of the drive was lost ({told}): close it'
     if not seen.runs:
         return (
-            f'the drive stopped by itself ({told}): its RUN input (DIN1) was lost, or another '
-            'master stopped it: close the input again'
+            f'the drive stopped by itself ({told}). Either its RUN input (DIN1) was lost or '
+            'another master stopped it: close the input'
         )
     return ''
 
@@ -89,7 +89,7 @@ def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) ->
 def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
     told = inverter.describe()
     if seen.code in seen.codes.terminals:
-        return f'the terminals have control now ({told}): press STOP at the drive to end that'
+        return f'the terminals have control now ({told}): press STOP at the drive'
     if seen.code in seen.codes.keypad:
         return f'the keypad has control now and runs the motor ({told}): press STOP there'
     if seen.runs:
@@ -97,10 +97,10 @@ def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
         return f'keypad or terminals have control now and run the motor ({told}): press STOP there'
     if inverter.was_silent:
         return (
-            f'the bus lost control while the drive did not answer ({told}): it was switched off '
-            'and on: check its mains and cable'
+            f'the drive did not answer for a moment, and the bus has lost control ({told}). It was '
+            'switched off and on: check its mains'
         )
     return (
-        f'the bus lost control ({told}): STOP was pressed at the keypad, or another master wrote '
-        'MODE: ask who did'
+        f'the bus has lost control ({told}). Somebody pressed STOP at the keypad, or another '
+        'master took it away: find out who'
     )

@@ -295,7 +295,7 @@ class Motion:
         elif self._lost_in_use and seen is not None and not seen.faulted:
             self._tell(
                 Severity.WARNING,
-                f'the bus lost control meanwhile ({self._inverter.describe()}): the drive was '
+                f'the bus has lost control meanwhile ({self._inverter.describe()}). The drive was '
                 'switched off and on, or somebody used its keypad: check its mains; then call '
                 '~/enable to go on',
             )
@@ -333,8 +333,8 @@ class Motion:
             reason = self._why_stopped(seen)
         elif not self.ours and not self.stopping and seen.keeps_running:
             reason = (
-                'it runs under bus control although nobody enabled it: does another master '
-                'command it? End that'
+                'it runs under bus control although nobody enabled it: find out whether another '
+                'master commands it'
             )
         if reason:
             self.secure(reason)

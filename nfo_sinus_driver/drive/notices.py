@@ -62,7 +62,7 @@ class Notices:
         limited = Fact.LIMIT_ACTIVE in seen.facts or seen.code == codes.current_limit
         if limited and not seen.faulted:
             remedy = self._inverter.model.inv_st(codes.current_limit).remedy
-            texts['limit'] = f'the current limit holds the motor back ({told}): {remedy}'
+            texts['limit'] = f'the current limit holds the motor back ({told}). {remedy}'
         if seen.kind is Kind.ALARM and seen.code != codes.current_limit:
             if entry.remedy:
                 texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'

@@ -230,7 +230,7 @@ class Setpoint:
                 self._tell(
                     Severity.WARNING,
                     f'no set-point for {timeout:g} s: the motor ramps to a stop '
-                    'until the next one arrives',
+                    'until the next one arrives; check what publishes them',
                 )
             assert self._reference is not None
             before = self._request

@@ -110,7 +110,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('run', 'off')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('its RUN input (DIN1) was lost, or', Severity.WARNING)
+    assert rig.notes.told('its RUN input (DIN1) was lost or', Severity.WARNING)
     rig.assert_stays_still()
     rig.simulator.inject('run', 'on')
     assert_only_enable_helps(rig)
@@ -130,7 +130,7 @@ def test_stop_key(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('keypad', 'stop')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('STOP was pressed at the keypad, or', Severity.WARNING)
+    assert rig.notes.told('pressed STOP at the keypad, or', Severity.WARNING)
     assert_only_enable_helps(rig)
 
 

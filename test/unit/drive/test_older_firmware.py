@@ -25,6 +25,7 @@ import pytest
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
@@ -201,3 +202,40 @@ def test_counters_have_24_bits_over_classic(
     assert values['status.op_time'] == pytest.approx(1234.5, abs=0.2)
     assert 0 <= values['status.rn_time'] < 1e5
     assert 0 <= values['status.br_time'] < 1e5
+
+
+def test_current_limit_is_no_stop() -> None:
+    # its code stands in for the one that says who runs the motor
+    settings = {'control.accel': 2.0, 'control.retard': 2.0}
+    line = line_settings('classic', response_timeout=2.0)
+    with Simulator(protocol='classic', dialect='5.0', boot_time=0.2, settings=settings) as far:
+        bus = Bus(open_link('classic', far.port, line))
+        notes = Notes()
+        drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
+        bus.start()
+        try:
+            drive.connect().result(PATIENCE)
+            drive.activate()
+            drive.enable().result(PATIENCE)
+            drive.set_setpoint(20.0)
+            wait_until(lambda: abs(far.drives[1].motor.frequency - 20.0) < 0.2)
+            with far.lock:
+                far.drives[1].motor.load = 6.0
+            wait_until(lambda: notes.snapshots[-1].text == 'Cur Limt')
+            polls = len(notes.snapshots)
+            wait_until(lambda: len(notes.snapshots) > polls + 3)
+            assert drive.armed
+            status = notes.snapshots[-1].status
+            assert status is not None and status.runs_by_bus and status.kind is Kind.ALARM
+            said = [text for _, text in notes.events if 'the current limit' in text]
+            assert len(said) == 1
+            assert drive.stop().result(PATIENCE).startswith('stop')
+            # somebody who takes it away is noticed all the same
+            with far.lock:
+                far.drives[1].motor.load = 0.3
+            wait_until(lambda: not far.drives[1].motor.driven)
+            drive.enable().result(PATIENCE)
+            far.inject('keypad', 'stop')
+            wait_until(lambda: not drive.armed)
+        finally:
+            bus.close()

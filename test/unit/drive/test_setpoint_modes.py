@@ -178,7 +178,7 @@ def test_mode_that_is_changed_at_the_keypad_disarms(
     said = [text for _, text in rig.notes.events if 'control mode' in text]
     assert len(said) == 1
     assert f'the control mode was changed to {after} at the drive' in said[0]
-    assert f'in another unit ({MODES[after].unit})' in said[0]
+    assert f'set-points are in {MODES[after].unit} now: check what sends them' in said[0]
     assert said[0].endswith('call ~/enable to go on')
     # what it was enabled for does not hold any more
     message = rig.refused(rig.drive.enable())
@@ -211,12 +211,12 @@ def test_mode_that_we_change_has_its_unit_at_once(
     assert rig.far.memory.raw('status.frq_set') == 0
 
 
-@every_way
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+@pytest.mark.parametrize('mode', MODES)
 def test_expected_control_mode_guards_enable(
-    make_rig: MakeRig, model: str, method: str, mode: str
+    make_rig: MakeRig, method: str, mode: str
 ) -> None:
-    if model == 'sinus_optimal':
-        pytest.skip('nothing tells its control mode [C58]')
+    # nothing tells that of an Optimal [C58]
     rig = make_rig(
         control_method=method, expected_control_mode=mode, parameters={'control.mode': mode}
     )

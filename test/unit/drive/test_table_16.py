@@ -268,7 +268,7 @@ MISLED = {
         [ON], [(E, B), (B, X)], 'the drive stopped by itself',
     ),
     'operation_enabled_leaves_on_local_control': (
-        [FORWARD & ~Control.NET_CTRL], [(E, Q), (Q, D)], 'the bus lost control',
+        [FORWARD & ~Control.NET_CTRL], [(E, Q), (Q, D)], 'the bus has lost control',
     ),
     'disable_leaves_on_voltage_disabled': (
         [ON, ON & ~Control.ENABLE_VOLTAGE], [(E, B), (B, Q)], 'the drive stopped by itself',

@@ -100,15 +100,14 @@ class Event:
     undo: Act = nothing
 
 
-STOPPED_BY_ITSELF = 'its RUN input (DIN1) was lost'
 EVENTS = {
     'run_input_lost': Event(
-        inject('run', 'off'), STOPPED_BY_ITSELF, 'close', undo=inject('run', 'on')
+        inject('run', 'off'), 'RUN input (DIN1)', 'close', undo=inject('run', 'on')
     ),
     'stop_at_the_keypad': Event(
         inject('keypad', 'stop'),
-        'STOP was pressed at the keypad, or another master wrote MODE',
-        'ask who did',
+        'the bus has lost control (24 Stop). Somebody pressed STOP at the keypad, or another',
+        'find out who',
         tells=lambda told: Fact.NETWORK_CONTROL not in facts(told) and told.text == 'Stop',
     ),
     'take_over_at_the_keypad': Event(
@@ -134,8 +133,8 @@ EVENTS = {
     ),
     'restart': Event(
         inject('power-cycle'),
-        'the bus lost control while the drive did not answer',
-        'check its mains and cable',
+        'the drive did not answer for a moment, and the bus has lost control (24 Stop)',
+        'check its mains',
         tells=lambda told: Fact.NETWORK_CONTROL not in facts(told),
     ),
 }
@@ -228,7 +227,7 @@ def test_what_ends_a_ride_by_a_stop_of_somebody_else(make_rig: MakeRig, method: 
     rig.next_snapshots(5)
     lines = said(rig)
     assert len(lines) == 1, lines
-    assert 'or another master stopped it' in lines[0]
+    assert 'or another master stopped it' in lines[0], lines
     assert '~/enable to go on' in lines[0]
     rig.wait_until_still()
 
@@ -314,7 +313,7 @@ def test_set_points_that_stop_coming(make_rig: MakeRig, model: str, method: str)
     lines = said(rig)
     assert len(lines) == 1, lines
     assert lines[0].startswith('no set-point for 0.2 s: the motor ramps to a stop')
-    assert 'until the next one arrives' in lines[0]
+    assert lines[0].endswith('until the next one arrives; check what publishes them')
     # this is no stop: the next one is followed
     assert rig.drive.armed
     rig.publish(10.0)
@@ -357,7 +356,7 @@ def test_drive_that_was_off_for_long(make_rig: MakeRig) -> None:
     assert len([text for text in lines if text.startswith('lost: ')]) == 1
     assert 'check the cable and that the drive has power' in lines[0]
     assert '~/enable after that to go on' in lines[0]
-    meanwhile = [text for text in lines if 'the bus lost control meanwhile (24 Stop)' in text]
+    meanwhile = [text for text in lines if 'the bus has lost control meanwhile (24 Stop)' in text]
     assert len(meanwhile) == 1
     assert 'was switched off and on' in meanwhile[0]
     rig.assert_stays_still()

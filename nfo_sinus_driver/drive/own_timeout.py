@@ -1,0 +1,76 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The time-out of the drive itself: what stops the motor when the driver is gone."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
+from nfo_sinus_driver.drive.snapshot import Severity
+
+
+class OwnTimeout:
+    """
+    SioTot with AutoStop of one drive [C91]; used on the bus alone.
+
+    :param commanded: this driver may command the drive, and not only watch it.
+    """
+
+    def __init__(self, inverter: Inverter, parameters: Parameters, *, commanded: bool) -> None:
+        self._inverter = inverter
+        self._parameters = parameters
+        self._commanded = commanded
+        self._told = ''
+
+    async def set_now(self, seconds: float) -> str:
+        """
+        Set and verify it; 0 leaves it as it is.
+
+        :returns: what was changed.
+        :raises DriveError: nothing is written to this drive, or it has none.
+        """
+        if not self._commanded:
+            raise DriveError(MONITOR_REFUSAL)
+        if not seconds:
+            return ''
+        if not self._inverter.can_time_out:
+            raise DriveError('drive_timeout: this model has no SioTot, so it must be 0')
+        wanted = {'serial.sio_tot': seconds, 'serial.auto_stop': True}
+        changes = await self._parameters.change_now(
+            wanted, guarded=False, because=' (drive_timeout)'
+        )
+        return ', '.join(str(change) for change in changes)
+
+    def warn_if_missing(self) -> None:
+        """Tell that the motor would run on without us, once for each reason in a row."""
+        inverter = self._inverter
+        if not self._commanded or (inverter.sio_tot and inverter.auto_stop):
+            return
+        if not inverter.can_time_out:
+            why, remedy = 'none is known of this model', 'use the RUN input'
+        elif inverter.sio_tot:
+            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
+        else:
+            why, remedy = 'SioTot is 0', 'set drive_timeout'
+        if why == self._told:
+            return
+        self._told = why
+        inverter.tell(
+            Severity.WARNING,
+            f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
+            f'is cut, the motor runs on; {remedy}',
+        )
