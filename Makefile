@@ -57,7 +57,7 @@ unit: setup ## tests without ROS, with the current and with the oldest pymodbus
 	@echo '== unit again, what uses pymodbus: the current one'
 	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n auto test/unit/link test/unit/simulator test/unit/cli
 
-ros: setup ## end-to-end tests with rclpy (all of them over another way: WAY=classic_v2)
+ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
 	@tools/run python $(PYTEST) -n 3 $(if $(WAY),--way $(WAY)) test/ros
 

@@ -44,6 +44,9 @@ _SHORT = frozenset(('status.op_time', 'status.rn_time', 'status.br_time'))
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
 _PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status', 'status.op_time')
+#: What is less on one protocol than on the other, whose register is the same: a drive with an
+#: address beyond those of Classic could not be asked again [C10].
+_HIGHEST = {(Protocol.CLASSIC, 'serial.address'): Fraction(94)}
 
 
 class Registers:
@@ -78,6 +81,9 @@ class Registers:
         parameter = self.model[key]
         if parameter.never_negative and not isinstance(value, str) and value < 0:
             raise ValueError(f'{key}: {value:g} is out of range, at least 0 {parameter.unit}')
+        highest = _HIGHEST.get((self.protocol, key))
+        if highest is not None and not isinstance(value, str) and value > highest:
+            raise ValueError(f'{key}: {value:g} is out of range, at most {highest} on this bus')
         return parameter.encode(value, self.protocol)
 
     def nearest_words(self, key: str, value: float) -> Words:
@@ -108,6 +114,7 @@ class Registers:
         parameter = self.model[key]
         low, high = parameter.span(self.protocol)
         low = max(low, Fraction(0)) if parameter.never_negative else low
+        high = _HIGHEST.get((self.protocol, key), high)
         return float(low), float(high), float(parameter.factor(self.protocol))
 
     def number(self, key: str, words: Words) -> float:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
+from collections.abc import Mapping
 import contextlib
 import json
 import os
@@ -69,6 +70,13 @@ TOPICS = {
     'actual_speed': (Float32, 10),
     'actual_frequency': (Float32, 10),
     'telemetry': (Telemetry, 10),
+}
+
+#: How unit and PDU are got out of a frame of Modbus.
+UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
+    'modbus_rtu': lambda frame: frame[:-2],
+    'modbus_ascii': lambda frame: bytes.fromhex(frame[1:-4].decode()),
+    'modbus_tcp': lambda frame: frame[6:],
 }
 
 
@@ -216,6 +224,11 @@ class Bench(contextlib.ExitStack):
         """Return what the simulator's line has traced so far."""
         lines = self.trace.read_text().splitlines()
         return [json.loads(line) for line in lines if line.endswith('}')]
+
+    def requests(self) -> list[str]:
+        """Return what Modbus requests arrived so far: unit and PDU in hexadecimal."""
+        arrived = [frame['hex'] for frame in self.frames() if frame['direction'] == 'request']
+        return [UNFRAMED[self.way.protocol](bytes.fromhex(hex_)).hex() for hex_ in arrived]
 
 
 class Client(contextlib.ExitStack):

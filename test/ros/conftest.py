@@ -35,30 +35,48 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
+#: What ``--way`` takes for all of them.
+_ALL = 'all'
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        '--way', default=DEFAULT, choices=WAYS, help='into the drive, for the tests of test/ros'
+        '--way', default=DEFAULT, choices=[*WAYS, _ALL],
+        help='into the drive, for the tests of test/ros',
     )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line('markers', 'needs(*features): of the way in, see ways.py')
+    config.addinivalue_line('markers', 'every_way: whichever way was asked for')
 
 
-@pytest.fixture(scope='session')
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Have a test that goes into a drive once for every way that was asked for."""
+    if 'way' in metafunc.fixturenames:
+        # the option is not there where the folder above is given
+        asked = metafunc.config.getoption('--way', DEFAULT)
+        every = asked == _ALL or metafunc.definition.get_closest_marker('every_way')
+        ways = WAYS if every else [asked]
+        metafunc.parametrize('way', ways, indirect=True, scope='module')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip a test that its way has nothing for."""
+    for item in items:
+        callspec = getattr(item, 'callspec', None)
+        if callspec is None or 'way' not in callspec.params:
+            continue
+        for marker in item.iter_markers('needs'):
+            reason = why_not(WAYS[callspec.params['way']], marker.args)
+            if reason:
+                item.add_marker(pytest.mark.skip(reason=reason))
+
+
+@pytest.fixture(scope='module')
 def way(request: pytest.FixtureRequest) -> Way:
-    """Return the way in that the tests are run over."""
-    # the option is not there where the folder above is given
-    return WAYS[request.config.getoption('--way', DEFAULT)]
-
-
-@pytest.fixture(autouse=True)
-def _makes_sense(request: pytest.FixtureRequest, way: Way) -> None:
-    """Skip a test that the way has nothing for."""
-    for marker in request.node.iter_markers('needs'):
-        reason = why_not(way, marker.args)
-        if reason:
-            pytest.skip(reason)
+    """Return the way in that a test is run over."""
+    return WAYS[request.param]
 
 
 @pytest.fixture

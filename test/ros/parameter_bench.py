@@ -21,11 +21,13 @@ from collections.abc import Callable
 from collections.abc import Mapping
 import contextlib
 from dataclasses import dataclass
+import functools
 import json
 import re
 from typing import Any
 from typing import TypeAlias
 
+from bench import UNFRAMED
 from bench import Bench
 from bench import Client
 from bench import Process
@@ -34,22 +36,17 @@ from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.parameter import parameter_value_to_python
+from support.classic_ends import OTHER_ON_CLASSIC
+from support.classic_ends import on_classic
 from support.parameter_ends import ENDS
+from support.parameter_ends import Ends
+from ways import Way
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 Value: TypeAlias = float | int | str | bool
 
-#: Every setting that has a register, by the name of its ROS parameter.
-SETTINGS = {ends.name: ends for ends in ENDS if ends.register is not None}
-#: Those whose ends or steps are others on Classic, and those that the older firmware has not.
-OTHER_ON_CLASSIC = frozenset({
-    'motor.p_nom', 'motor.i_nom', 'motor.cos_phi', 'motor.r_stat', 'motor.r_rot', 'motor.l_main',
-    'motor.i_magn', 'motor.i_limt', 'control.accel', 'control.retard', 'control.kp_spd',
-    'control.f_sleep', 'serial.address', 'error.short_c_err_cnt', 'serial.bus_type',
-    'serial.si_prot',
-})
 #: The one setting that has no register: Classic alone reaches it.
 ANY_BUS = 'control.any_bus'
 #: Little else is on the line, so that it is quick.
@@ -62,26 +59,31 @@ _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
 #: MODE, SCMD and the set-point: their Classic names [M0 §6.1], and their registers.
 _COMMANDS = {'E0029': 0x0294, 'E00AD': 0x0298, 'E001E': 0x03FC}
+_ENDS = {ends.name: ends for ends in ENDS}
+_BY_ID = {ends.classic[0]: ends for ends in ENDS}
 
 
 @dataclass(frozen=True, eq=False)
 class Write:
     """
-    A request to write that arrived at a drive; its words as on Modbus, the low one first.
+    A request to write that arrived at a drive; its words as on the bus, the low one first.
 
-    Of a setting that came by Classic the words are not told: its steps are others. Such a write is
-    like any to the same register.
+    Where the steps of a setting are others on Classic, a write by Classic is like any to the same
+    register that is given in the words of Modbus.
+
+    :ivar other_steps: the words are of Classic, and on Modbus they would be others.
     """
 
     unit: int
     register: int
-    words: tuple[int, ...] | None
+    words: tuple[int, ...]
+    other_steps: bool = False
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Write):
             return NotImplemented
         same = (self.unit, self.register) == (other.unit, other.register)
-        return same and (None in (self.words, other.words) or self.words == other.words)
+        return same and (self.other_steps != other.other_steps or self.words == other.words)
 
     def __lt__(self, other: Write) -> bool:
         return (self.unit, self.register) < (other.unit, other.register)
@@ -130,24 +132,40 @@ def _classic(data: bytes) -> Write | None:
     unit, name, word = select[1][0] - 0x20, select[2].decode(), int(select[3], 16)
     if name in _COMMANDS:
         return Write(unit, _COMMANDS[name], (word,))
-    # of two words the first stands for both
-    registers = [ends.register for ends in SETTINGS.values() if ends.classic[0] == name]
-    return Write(unit, registers[0], None) if registers else None
+    return written(_BY_ID[name].name, (word,), unit, classic=True) if name in _BY_ID else None
 
 
 _WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
-    'modbus_rtu': _modbus,
-    'modbus_ascii': lambda data: _modbus(bytes.fromhex(data[1:].decode())),
-    'modbus_tcp': lambda data: _modbus(data[6:]),
+    'modbus_rtu': lambda frame: _modbus(UNFRAMED['modbus_rtu'](frame)),
+    'modbus_ascii': lambda frame: _modbus(UNFRAMED['modbus_ascii'](frame)),
+    'modbus_tcp': lambda frame: _modbus(UNFRAMED['modbus_tcp'](frame)),
     'classic': _classic,
 }
 
 
-def written(name: str, words: tuple[int, ...], unit: int = 1) -> Write:
-    """Return the request that writes words to a setting."""
-    register = SETTINGS[name].register
-    assert register is not None
-    return Write(unit, register, words)
+@functools.cache
+def settings(way: Way) -> dict[str, Ends]:
+    """Return every setting that a way reaches, by its ROS parameter, with the ends it has there."""
+    if 'parameters' not in way.features:
+        return {}
+    return {
+        name: on_classic(ends, way.dialect) if way.protocol == 'classic' else ends
+        for name, ends in _ENDS.items()
+        if name not in way.beyond
+    }
+
+
+def register(name: str) -> int:
+    """Return the register of a setting; of the one that has none the number that none has."""
+    found = _ENDS[name].register
+    return -1 if found is None else found
+
+
+def written(
+    name: str, words: tuple[int, ...], unit: int = 1, *, classic: bool = False
+) -> Write:
+    """Return the request that writes words to a setting; those of Modbus, or of Classic."""
+    return Write(unit, register(name), words, classic and name in OTHER_ON_CLASSIC)
 
 
 def set_each(client: Client, *settings: tuple[str, Value | None]) -> list[Any]:
@@ -198,9 +216,11 @@ def refused(result: Any, *parts: str) -> None:
 class Stubborn(contextlib.ExitStack):
     """A simulated drive in this process, so that a test can make it behave as no manual says."""
 
-    def __init__(self, bench: Bench, **settings: Value) -> None:
+    def __init__(self, bench: Bench) -> None:
         super().__init__()
-        self.simulator = Simulator(**bench.line, trace=str(bench.trace), settings=settings)
+        #: What can be set the way that the bench goes.
+        self.names = tuple(settings(bench.way))
+        self.simulator = Simulator(**bench.line, trace=str(bench.trace))
         self.drive: SimulatedDrive = self.simulator.drives[1]
 
     def __enter__(self) -> Stubborn:
@@ -226,4 +246,4 @@ class Stubborn(contextlib.ExitStack):
     def parameters(self) -> dict[str, Value]:
         """Return what the drive has."""
         shown: dict[str, Value] = self.simulator.state()['parameters']
-        return {name: shown[name] for name in SETTINGS}
+        return {name: shown[name] for name in self.names}

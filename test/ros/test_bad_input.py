@@ -33,6 +33,7 @@ from bench import Process
 from bench import holds_for
 from bench import wait_until
 import pytest
+from ways import SILENCE
 from ways import needs
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -63,11 +64,12 @@ def _untouched(drive: Simulated) -> None:
 
 def test_an_absent_port_is_waited_for(bench: Bench) -> None:
     driver = bench.driver()
-    _says(driver, bench.port, 'does not exist', 'plugged in', 'trying again')
+    _says(driver, bench.port, *bench.way.absent, 'trying again')
     bench.simulator()
     bench.client().connected()
 
 
+@needs('serial')
 def test_a_busy_port_is_waited_for_and_its_holder_is_named(bench: Bench) -> None:
     drive = bench.simulator()
     holder = subprocess.Popen(
@@ -95,6 +97,7 @@ def test_a_busy_port_is_waited_for_and_its_holder_is_named(bench: Bench) -> None
     bench.client().connected()
 
 
+@needs('serial')
 def test_a_second_driver_on_the_port_is_told_who_has_it(bench: Bench) -> None:
     bench.simulator()
     first = bench.driver()
@@ -104,6 +107,7 @@ def test_a_second_driver_on_the_port_is_told_who_has_it(bench: Bench) -> None:
     assert first.running
 
 
+@needs('serial')
 def test_what_is_no_serial_port_is_named_so(bench: Bench) -> None:
     Path(bench.port).write_text('no port')
     _says(bench.driver(), bench.port, 'is not a serial port')
@@ -119,6 +123,7 @@ def _without_privileges() -> tuple[str, ...]:
     return through
 
 
+@needs('serial')
 def test_a_port_without_permission_names_the_remedy(bench: Bench) -> None:
     drive = bench.simulator()
     device = os.path.realpath(bench.port)
@@ -133,9 +138,8 @@ def test_a_port_without_permission_names_the_remedy(bench: Bench) -> None:
 # --- the line -----------------------------------------------------------------------------------
 
 
-def _checks_in_order(text: str) -> None:
-    line = next(line for line in text.splitlines() if 'BusType' in line)
-    words = ('BusType', 'jumper S5', 'the address,', 'baud', 'parity')
+def _checks_in_order(driver: Process, *words: str) -> None:
+    line = next(line for line in driver.text.splitlines() if words[0] in line)
     places = [line.index(word) for word in words]
     assert places == sorted(places)
 
@@ -143,8 +147,8 @@ def _checks_in_order(text: str) -> None:
 def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
-    _says(driver, 'nobody answers at address 4', 'BusType', 'trying again')
-    _checks_in_order(driver.text)
+    _says(driver, bench.way.nobody[0], '4', 'trying again')
+    _checks_in_order(driver, *bench.way.nobody)
     client = bench.client()
     assert 'has not answered yet' in client.enable().message
     _untouched(drive)
@@ -159,7 +163,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
     drive.wait_for(lambda state: not state['silent'], timeout=PATIENCE)
     driver = bench.driver()
     _says(driver, 'nobody answers at address 1')
-    _checks_in_order(driver.text)
+    _checks_in_order(driver, *SILENCE)
     _untouched(drive)
 
 
@@ -167,7 +171,8 @@ def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
     drive = bench.simulator()
     drive.inject('damage', 1000000)
     driver = bench.driver()
-    _says(driver, 'is no answer', 'baud rate', 'parity')
+    _says(driver, *bench.way.noise)
+    _checks_in_order(driver, *bench.way.noise)
     _untouched(drive)
     drive.inject('heal')
     bench.client().connected()
@@ -245,11 +250,26 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
         (['-p', 'poll_rate:=.nan'], ['poll_rate nan', '0 to 1000 Hz']),
         (['-p', 'response_timeout:=11.0'], ['response_timeout 11', '0.01 to 10 s']),
         (['-p', 'retries:=11'], ['retries 11', '0 to 10']),
-        (['-p', 'port:=foo://x'], ['port', 'there is no foo://', 'socket://host:port', 'rfc2217']),
-        (['-p', 'port:=10.0.0.1:502'], ['port', 'no device', 'write socket://10.0.0.1:502']),
-        (['-p', 'port:=""'], ['port is empty']),
+        pytest.param(
+            ['-p', 'port:=foo://x'],
+            ['port', 'there is no foo://', 'socket://host:port', 'rfc2217'],
+            marks=needs('serial'),
+        ),
+        pytest.param(
+            ['-p', 'port:=10.0.0.1:502'],
+            ['port', 'no device', 'write socket://10.0.0.1:502'],
+            marks=needs('serial'),
+        ),
+        pytest.param(['-p', 'port:=""'], ['port is empty'], marks=needs('serial')),
+        pytest.param(
+            ['-p', 'port:=/dev/ttyUSB0'], ['no gateway', 'host:port'], marks=needs('gateway')
+        ),
+        pytest.param(['-p', 'port:=""'], ['no gateway', 'host:port'], marks=needs('gateway')),
         pytest.param(
             ['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1'], marks=needs('rtu')
+        ),
+        pytest.param(
+            ['-p', 'char_format:=8E1'], ['char_format', '7 data bits', '7E1'], marks=needs('ascii')
         ),
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
@@ -283,11 +303,11 @@ def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
     _untouched(drive)
 
 
-@needs('rtu')
 def test_a_character_format_needs_no_quotes(bench: Bench) -> None:
+    text = '7E1' if bench.way.protocol in ('modbus_ascii', 'classic') else '8E1'
     bench.simulator()
-    bench.driver('-p', 'char_format:=8E1')
-    assert bench.client('/nfo_sinus_bus').parameter('char_format') == '8E1'
+    bench.driver('-p', f'char_format:={text}')
+    assert bench.client('/nfo_sinus_bus').parameter('char_format') == text
 
 
 def test_unknown_names_in_a_parameter_file_are_warned_about(bench: Bench) -> None:
@@ -338,7 +358,7 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     parameters.write_text(
         '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
         '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
-        f'{section}: {{ros__parameters: {{port: {bench.port}, baud_rate: {baud_rate}, '
+        f'{section}: {{ros__parameters: {{port: "{bench.port}", baud_rate: {baud_rate}, '
         f'protocol: {protocol}, address: 3, response_timeout: 0.5}}}}\n'
     )
     driver = bench.bare_driver(*renames, '--params-file', str(parameters))

@@ -32,6 +32,7 @@ from bench import Bench
 import matplotlib.image
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
+from ways import needs
 import yaml
 
 _DEMO = (sys.executable, '-m', 'nfo_sinus_driver.node.demo')
@@ -105,6 +106,7 @@ def test_the_demo_fails_if_it_cannot_record() -> None:
     assert 'FAILED: no bag can be written to /proc/demo/ride' in done.stderr
 
 
+@needs('own')
 def test_the_demo_leaves_the_drive_of_another_driver_alone(bench: Bench, tmp_path: Path) -> None:
     bench.simulator()
     bench.driver()

@@ -32,13 +32,14 @@ from parameter_bench import set_one
 import pytest
 from support.trace_laws import violations
 from unit.catalog import setting_names
-from ways import WAYS
 from ways import Way
 from ways import needs
 
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.node.domain import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
+
+pytestmark = pytest.mark.every_way
 
 #: So slow that a motor which is let go stands soon, Hz.
 _SPEED = 8.0
@@ -47,22 +48,6 @@ _QUICK = ('--set', 'control.accel=0.3', '--set', 'control.retard=0.3', '--boot-t
 _MODEST = ('-p', 'poll_rate:=50')
 
 _NAMES = {line.split(',')[2] for line in setting_names.SETTINGS.splitlines() if line}
-#: Which settings a way does not reach [M0 table 4], [C21]; the codes of SiProt are others in the
-#: older firmware [C5].
-_BEYOND = {
-    'modbus': {'control.any_bus'},
-    'classic_v2': set(),
-    'classic_v5': {
-        'control.f_sleep', 'error.short_c_err_cnt', 'serial.bus_type', 'serial.si_prot'
-    },
-}
-
-
-@pytest.fixture(scope='module', params=WAYS.values(), ids=WAYS)
-def way(request: pytest.FixtureRequest) -> Way:
-    """Every way, whichever one was asked for."""
-    return request.param
-
 
 def _simulator(bench: Bench) -> Simulated:
     return bench.simulator(*_QUICK, paced=False)
@@ -124,7 +109,7 @@ def test_the_drive_is_known(rig: Rig) -> None:
 @needs('parameters')
 def test_every_parameter_that_there_is_over_this_way_is_there(rig: Rig) -> None:
     has = rig.client.parameter_names() & _NAMES
-    assert _NAMES - has == _BEYOND.get(rig.way.name, _BEYOND['modbus'])
+    assert _NAMES - has == rig.way.beyond
     parameters = rig.drive.state()['parameters']
     for name in ('control.accel', 'freque.f_fix1', 'control.st_mode', 'motor.u_nom'):
         assert rig.client.parameter(name) == parameters[name]
@@ -145,9 +130,8 @@ def test_a_parameter_is_set_refused_and_followed(rig: Rig) -> None:
     assert sum(rig.drive.state()['writes'].values()) == writes + 1
 
 
+@needs('bare')
 def test_a_drive_without_parameters_refuses_them(rig: Rig) -> None:
-    if 'parameters' in rig.way.features:
-        pytest.skip('it has parameters')
     assert not rig.client.parameter_names() & _NAMES
     refused(set_one(rig.client, 'control.accel', 6.0), 'control.accel')
     refused(rig.client.set_parameters(drive_timeout=2.0), 'drive_timeout')

@@ -27,7 +27,7 @@ from lifecycle_msgs.msg import Transition
 import pytest
 from ways import needs
 
-pytestmark = needs('rtu')
+pytestmark = needs('identity')
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 _SERIAL = '0123456789ABCDEF'
@@ -35,15 +35,11 @@ _DEVICE, _SLAVE_ID = '012b0e0200', '0111'
 _STOP = '010602980000'
 
 
-def _requests(bench: Bench) -> list[str]:
-    return [frame['hex'] for frame in bench.frames() if frame['direction'] == 'request']
-
-
 def _asked(bench: Bench) -> list[str]:
     """The requests that ask who the drive is, in order."""
     identifying = (_DEVICE, _SLAVE_ID)
     return [
-        start for hex_ in _requests(bench) for start in identifying if hex_.startswith(start)
+        start for hex_ in bench.requests() for start in identifying if hex_.startswith(start)
     ]
 
 
@@ -128,10 +124,10 @@ def test_a_motor_found_running_is_stopped_before_anybody_asks_who_it_is(bench: B
         driver.signal(signal.SIGKILL)
         driver.wait()
         assert drive.state()['driven'], 'the drive runs on, and that makes this a test'
-        before = len(_requests(bench))
+        before = len(bench.requests())
         bench.driver()
         wait_until(lambda: 'connected: sinus_g2' in bench.log, 'a new driver is connected')
-    requests = _requests(bench)[before:]
+    requests = bench.requests()[before:]
     stops = [number for number, hex_ in enumerate(requests) if hex_.startswith(_STOP)]
     questions = [number for number, hex_ in enumerate(requests) if hex_.startswith(_DEVICE)]
     assert len(questions) == 1

@@ -31,9 +31,9 @@ from nfo_sinus_driver.node.listener import Listener
 
 
 @pytest.fixture
-def node(bench: Bench) -> Iterator[Node]:
+def node(domain: int) -> Iterator[Node]:
     """A node in the default context, as the driver has it."""
-    rclpy.init(domain_id=bench.domain, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     node = Node('test_listener')
     yield node
     node.destroy_node()

@@ -26,6 +26,7 @@ import sys
 from bench import Bench
 from bench import Process
 from bench import wait_until
+from ways import needs
 
 _DEMO_TIME = 100.0
 
@@ -53,6 +54,7 @@ def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
     assert not (tmp_path / 'here').exists()
 
 
+@needs('own')
 def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
     command = [sys.executable, '-m', 'nfo_sinus_driver.node.make_run']

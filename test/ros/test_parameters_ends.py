@@ -22,22 +22,41 @@ import re
 
 from bench import Bench
 from bench import Client
-from parameter_bench import OTHER_ON_CLASSIC
+from parameter_bench import ANY_BUS
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Value
 from parameter_bench import Wire
 from parameter_bench import refused
 from parameter_bench import set_one
+from parameter_bench import settings
 from parameter_bench import values
 from parameter_bench import written
 import pytest
+from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
+from ways import NEWER
 from ways import Way
+from ways import needs
 
 from nfo_sinus_driver.node.domain import own_domain
 
-EVERY = pytest.mark.parametrize('ends', SETTINGS.values(), ids=SETTINGS)
+pytestmark = needs('parameters')
+
+_ENDS = {ends.name: ends for ends in ENDS}
+
+
+def _each(*rows: Ends) -> pytest.MarkDecorator:
+    """Have a test for each setting, where it is to be had."""
+    marks = {
+        ANY_BUS: needs('classic'),
+        'serial.address': needs('later'),
+        'serial.si_baud': needs('later'),
+        **dict.fromkeys(NEWER, needs('newer')),
+    }
+    names = [ends.name for ends in rows]
+    return pytest.mark.parametrize(
+        'name', [pytest.param(name, id=name, marks=marks.get(name, ())) for name in names]
+    )
 
 
 class Rig:
@@ -50,6 +69,10 @@ class Rig:
         self.client: Client = bench.client().connected()
         self.wire = Wire(bench)
         self.wire.writes()
+
+    def ends(self, name: str) -> Ends:
+        """Return what a setting is this way."""
+        return settings(self.way)[name]
 
     def has(self, name: str, value: Value) -> None:
         """See that ROS and the drive have the same value, of the right type."""
@@ -65,11 +88,10 @@ def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
         yield Rig(bench)
 
 
-@EVERY
-def test_both_ends_arrive_and_nothing_beyond_them(rig: Rig, ends: Ends) -> None:
-    if 'fine' not in rig.way.features and ends.name in OTHER_ON_CLASSIC:
-        pytest.skip('its ends or steps are others on Classic')
-    name = ends.name
+@_each(*ENDS)
+def test_both_ends_arrive_and_nothing_beyond_them(rig: Rig, name: str) -> None:
+    ends = rig.ends(name)
+    classic = rig.way.protocol == 'classic'
     factory = values(rig.client, name)[name]
     present = factory
     try:
@@ -82,7 +104,8 @@ def test_both_ends_arrive_and_nothing_beyond_them(rig: Rig, ends: Ends) -> None:
         ):
             result = set_one(rig.client, name, value)
             assert result.successful, result.reason
-            assert rig.wire.writes() == ([] if value == present else [written(name, words)])
+            request = written(name, words, classic=classic)
+            assert rig.wire.writes() == ([] if value == present else [request])
             rig.has(name, value)
             present = value
         for value in ends.neighbours or ():
@@ -122,24 +145,25 @@ def _numbers(reason: str, name: str) -> set[float]:
     return {float(number) for number in said}
 
 
-@pytest.mark.parametrize(
-    'ends', [pytest.param(ends, id=name) for name, ends in SETTINGS.items() if ends.codes]
-)
-def test_every_label_arrives_as_its_code(rig: Rig, ends: Ends) -> None:
-    if ends.name not in rig.client.parameter_names():
-        pytest.skip('the older firmware has not got it')
-    factory = values(rig.client, ends.name)[ends.name]
+@_each(*(ends for ends in ENDS if ends.codes))
+def test_every_label_arrives_as_its_code(rig: Rig, name: str) -> None:
+    ends = rig.ends(name)
+    factory = values(rig.client, name)[name]
     codes = dict(ends.codes)
     present = factory
     try:
         for label, code in ends.codes:
-            result = set_one(rig.client, ends.name, label)
+            result = set_one(rig.client, name, label)
             assert result.successful, result.reason
-            words = () if label == present else (written(ends.name, (code,)),)
+            words = () if label == present else (written(name, (code,)),)
             assert tuple(rig.wire.writes()) == words, label
             present = label
+        for label in {label for label, _ in _ENDS[name].codes} - codes.keys():
+            refused(set_one(rig.client, name, label), name, f'the drive does not accept {label}')
+            rig.wire.writes()
+            rig.has(name, present)
     finally:
-        assert set_one(rig.client, ends.name, factory).successful
+        assert set_one(rig.client, name, factory).successful
         arrived = rig.wire.writes()
-    assert arrived in ([], [written(ends.name, (codes[factory],))])
-    rig.has(ends.name, factory)
+    assert arrived in ([], [written(name, (codes[factory],))])
+    rig.has(name, factory)

@@ -24,18 +24,19 @@ from bench import Bench
 from bench import Client
 from bench import holds_for
 from bench import wait_until
-from parameter_bench import ANY_BUS
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Stubborn
 from parameter_bench import Wire
 from parameter_bench import refused
 from parameter_bench import says_once
 from parameter_bench import set_one
+from parameter_bench import settings
 from parameter_bench import values
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
 from ways import needs
+
+pytestmark = needs('parameters')
 
 
 def _listening(bench: Bench, name: str = '/nfo_sinus') -> Client:
@@ -84,7 +85,7 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     wire = Wire(bench)
     unchanged = client.call('refresh_parameters')
     assert unchanged.success
-    count = len(client.parameter_names() & {*SETTINGS, ANY_BUS})
+    count = len(settings(bench.way))
     assert unchanged.message == f'{count} parameters read, changed: none'
     drive.inject('set', 'freque.f_fix7', 44.5)
     drive.inject('set', 'control.auto_start', True)
@@ -105,10 +106,11 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     assert wire.writes() == []
 
 
-@needs('fine')
 def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     stubborn = bench.enter_context(Stubborn(bench))
     memory = stubborn.drive.memory
+    # the most that the type carries
+    raw, most = (0x7FFF, 3276.7) if bench.way.protocol == 'classic' else (0xFFFF, 6553.5)
     # 200 Hz, 0 s, and a code that has no label
     memory.put('freque.f_fix1', 2000)
     memory.put('control.accel', 0)
@@ -120,20 +122,20 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     assert shown == {
         'freque.f_fix1': 200.0, 'control.accel': 0.0, 'speed.op_mode': '193'
     }
-    memory.put('freque.f_fix2', 0xFFFF)
-    memory.put('control.run_dly', 65535)
+    memory.put('freque.f_fix2', raw)
+    memory.put('control.run_dly', raw)
     memory.put('freque.op_mode', 193)
     assert client.call('refresh_parameters').success
-    wanted = {'freque.f_fix2': 6553.5, 'control.run_dly': 65535, 'freque.op_mode': '193'}
+    wanted = {'freque.f_fix2': most, 'control.run_dly': raw, 'freque.op_mode': '193'}
     wait_until(lambda: values(client, *wanted) == wanted, 'the new ones show', timeout=2.0)
     span = client.descriptor('freque.f_fix2').floating_point_range[0]
-    assert (span.from_value, span.to_value) == (0.0, 6553.5), 'the range takes it in'
+    assert (span.from_value, span.to_value) == (0.0, most), 'the range takes it in'
     assert wire.writes() == []
     # what the drive has may be given, so that a dump loads; anything else has to be allowed
     for name, value in {**shown, **wanted}.items():
         result = set_one(client, name, value)
         assert result.successful, result.reason
-    refused(set_one(client, 'freque.f_fix2', 6553.4), 'freque.f_fix2', '0 to 150')
+    refused(set_one(client, 'freque.f_fix2', most - 0.1), 'freque.f_fix2', '0 to 150')
     assert wire.writes() == []
     assert set_one(client, 'freque.f_fix2', 150.0).successful
     assert set_one(client, 'freque.op_mode', 'Fix-1 F').successful
@@ -142,7 +144,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     wait_until(lambda: client.parameter('freque.f_fix2') == 10.0, 'in range', timeout=2.0)
     span = client.descriptor('freque.f_fix2').floating_point_range[0]
     assert (span.from_value, span.to_value) == (0.0, 150.0), 'the range is that of the manual'
-    says_once(driver, 'changed at the drive: freque.f_fix2: 15 -> 6553.5 Hz')
+    says_once(driver, f'changed at the drive: freque.f_fix2: 15 -> {most} Hz')
 
 
 def test_a_code_without_any_meaning_is_told_and_does_no_harm(bench: Bench) -> None:
@@ -150,8 +152,8 @@ def test_a_code_without_any_meaning_is_told_and_does_no_harm(bench: Bench) -> No
     stubborn.drive.memory.put('control.auto_start', 7)
     driver = bench.driver(*QUIET)
     client = _listening(bench)
-    has = client.parameter_names() & set(SETTINGS)
-    assert has == set(SETTINGS) - {'control.auto_start'}
+    has = client.parameter_names() & set(stubborn.names)
+    assert has == set(stubborn.names) - {'control.auto_start'}
     says_once(driver, 'control.auto_start: the drive has code 7')
     stubborn.drive.memory.put('pi_reg.reg_amp', 3)
     assert client.call('refresh_parameters').success

@@ -21,16 +21,17 @@ from bench import Bench
 from bench import Client
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
-from parameter_bench import ANY_BUS
-from parameter_bench import OTHER_ON_CLASSIC
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Wire
 from parameter_bench import refused
 from parameter_bench import set_each
 from parameter_bench import set_one
+from parameter_bench import settings
 from parameter_bench import values
 from parameter_bench import written
+from ways import needs
+
+pytestmark = needs('parameters')
 
 
 def test_monitor_writes_nothing_whatever_is_asked(bench: Bench) -> None:
@@ -44,15 +45,15 @@ def test_monitor_writes_nothing_whatever_is_asked(bench: Bench) -> None:
         '-p', 'drive_timeout:=3.0',
     )
     client = bench.client().connected()
-    assert set(SETTINGS) <= client.parameter_names()
+    assert set(settings(bench.way)) <= client.parameter_names()
     assert client.parameter('control.accel') == 5.0
     wait_until(lambda: 'control_method is monitor' in driver.text, 'it says why not')
-    for name, ends in SETTINGS.items():
-        if 'fine' not in bench.way.features and name in OTHER_ON_CLASSIC:
+    for name, ends in settings(bench.way).items():
+        if ends.low == ends.high:
             continue
         other = ends.high if client.parameter(name) == ends.low else ends.low
         refused(set_one(client, name, other), name, 'monitor')
-    has = values(client, *SETTINGS)
+    has = values(client, *settings(bench.way))
     assert all(result.successful for result in set_each(client, *has.items()))
     refused(client.set_parameters(**{'control.accel': 6.0, 'poll_rate': 5.0}), 'monitor')
     assert not client.set_parameters(drive_timeout=4.0).successful
@@ -75,12 +76,12 @@ def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> N
     bench.driver(*QUIET)
     client = bench.client().connected()
     everything = client.parameter_names()
-    settings = everything - {*SETTINGS, ANY_BUS}
+    own = everything - set(settings(bench.way))
     assert client.change_state(Transition.TRANSITION_DEACTIVATE)
-    assert set(SETTINGS) <= client.parameter_names(), 'inactive, the drive is still there'
+    assert client.parameter_names() == everything, 'inactive, the drive is still there'
     assert set_one(client, 'control.accel', 6.0).successful
     assert client.change_state(Transition.TRANSITION_CLEANUP)
-    assert client.parameter_names() == settings
+    assert client.parameter_names() == own
     wire = Wire(bench)
     wire.writes()
     refused(set_one(client, 'control.accel', 7.0), 'control.accel', 'configured')
@@ -124,7 +125,7 @@ def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) 
     assert result.successful, result.reason
     wait_until(lambda: client.parameter('serial.sio_tot') == 12.5, 'what drive_timeout set')
     dump = _dump(client)
-    assert set(SETTINGS) < set(dump)
+    assert set(settings(bench.way)) < set(dump)
     assert {'autostart', 'address', 'control_method', 'apply_parameters'} < set(dump)
     wire = Wire(bench)
     wire.writes()
@@ -190,7 +191,7 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
         (5.0, 60.0, 7.0, 'Brake', 3),
     ]
     for client in clients:
-        assert set(SETTINGS) <= client.parameter_names()
+        assert set(settings(bench.way)) <= client.parameter_names()
     # one that is silent keeps the other from nothing
     left.inject('silence', 3600.0, address=2)
     clients[1].wait_for('status', lambda status: not status.connected, 'it is lost')

@@ -23,15 +23,17 @@ from typing import Any
 from bench import Bench
 from bench import Client
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Wire
 from parameter_bench import says_once
+from parameter_bench import settings
 from parameter_bench import values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from support.parameter_ends import Ends
 from unit.catalog import setting_names
 from ways import needs
+
+pytestmark = needs('parameters')
 
 ROWS = [line.split(',') for line in setting_names.SETTINGS.splitlines() if line]
 #: The name in the manual, by the name of the ROS parameter.
@@ -60,22 +62,21 @@ def _listed(client: Client) -> set[str]:
     return {name for name in names if name.partition('.')[0] in GROUPS and '.' in name}
 
 
-@needs('modbus')
-def test_every_setting_that_modbus_reaches_is_there_and_described(bench: Bench) -> None:
+def test_every_setting_that_can_be_reached_is_there_and_described(bench: Bench) -> None:
     bench.simulator(paced=False)
     bench.driver(*QUIET)
     client = bench.client().connected()
     wire = Wire(bench)
     assert len(MANUAL) == 120
-    assert len(SETTINGS) == 119
-    assert _listed(client) == set(SETTINGS) == set(MANUAL) - {'control.any_bus'}
-    wrong = {name: value for name, value in values(client, *SETTINGS).items()
+    reached = settings(bench.way)
+    assert _listed(client) == set(reached) == set(MANUAL) - bench.way.beyond
+    wrong = {name: value for name, value in values(client, *reached).items()
              if type(value) is not TYPES[name]}
     assert wrong == {}
-    described = client.call('describe_parameters', DescribeParameters, names=list(SETTINGS))
+    described = client.call('describe_parameters', DescribeParameters, names=list(reached))
     complaints = [
         f'{ends.name}: {complaint}'
-        for shown, ends in zip(described.descriptors, SETTINGS.values(), strict=True)
+        for shown, ends in zip(described.descriptors, reached.values(), strict=True)
         for complaint in _complaints(shown, ends)
     ]
     assert complaints == []

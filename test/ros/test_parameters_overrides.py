@@ -28,13 +28,16 @@ from bench import wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Wire
+from parameter_bench import register
 from parameter_bench import says_once
 from parameter_bench import set_one
 from parameter_bench import values
 from parameter_bench import written
 import pytest
+from ways import needs
+
+pytestmark = needs('parameters')
 
 _CANNOT_START = 2
 _DRIFT = 'differs from the parameter file'
@@ -125,7 +128,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
     assert client.parameter('control.accel') == 8.0
     holds_for(A_WHILE, lambda: drive.state()['parameters']['control.accel'] == 8.0, 'left so')
     _drifts(client, 'control.accel: 6 -> 8 s')
-    registers = {SETTINGS[name].register for name in ('control.accel', 'motor.u_nom')}
+    registers = {register(name) for name in ('control.accel', 'motor.u_nom')}
     assert registers.isdisjoint(write.register for write in wire.writes())
 
     # whoever sets it by hand has another wish
@@ -166,7 +169,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
 
 def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -> None:
     driver = bench.driver(*QUIET, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
-    wait_until(lambda: 'does not exist' in driver.text, 'there is nobody yet')
+    wait_until(lambda: bench.way.absent[0] in driver.text, 'there is nobody yet')
     bench.simulator(paced=False)
     client = bench.client().connected()
     assert Wire(bench).writes() == [written('control.accel', (6000, 0))]

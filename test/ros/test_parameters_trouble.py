@@ -26,11 +26,11 @@ from bench import Bench
 from bench import Client
 from bench import wait_until
 from parameter_bench import QUIET
-from parameter_bench import SETTINGS
 from parameter_bench import Stubborn
 from parameter_bench import Wire
 from parameter_bench import Write
 from parameter_bench import refused
+from parameter_bench import register
 from parameter_bench import set_each_async
 from parameter_bench import set_one
 from parameter_bench import values
@@ -42,6 +42,8 @@ from ways import needs
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
+pytestmark = needs('parameters')
+
 #: SCMD = Stop [M0 table 5, table 18].
 _STOP = Write(1, 0x0298, (0,))
 #: How soon one says that a drive does not answer: a few time-outs of 0.2 s, on a busy machine.
@@ -50,7 +52,7 @@ _SOON = 6.0
 
 def _agree(client: Client, drive: Stubborn) -> None:
     """Wait until ROS shows what the drive has, of all of it."""
-    wait_until(lambda: values(client, *SETTINGS) == drive.parameters(), 'ROS and drive agree')
+    wait_until(lambda: values(client, *drive.names) == drive.parameters(), 'ROS and drive agree')
 
 
 def _stands(drive: Stubborn) -> None:
@@ -86,13 +88,7 @@ def _refusing(name: str, reason: Reason) -> Callable[[str, str], None]:
 # --- what the drive says ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    'reason',
-    [
-        pytest.param(reason, marks=needs('modbus') if reason is Reason.FUNCTION else ())
-        for reason in Reason
-    ],
-)
+@pytest.mark.parametrize('reason', Reason)
 def test_what_was_written_before_a_refusal_is_put_back(
     stubborn: Stubborn, client: Client, wire: Wire, reason: Reason
 ) -> None:
@@ -103,7 +99,7 @@ def test_what_was_written_before_a_refusal_is_put_back(
     refused(result, 'error.rst_dly', 'put back', 'control.accel', 'control.st_mode')
     assert result.reason.startswith('error.rst_dly: ')
     assert stubborn.parameters() == before
-    assert values(client, *SETTINGS) == before
+    assert values(client, *stubborn.names) == before
     assert client.parameter('poll_rate') == 10.0
     assert wire.writes()[-2:] == [
         written('control.st_mode', (1,)), written('control.accel', (5000, 0))
@@ -119,7 +115,7 @@ def test_drive_timeout_that_is_refused_takes_the_parameters_back(
     result = client.set_parameters(**{'control.accel': 6.0, 'drive_timeout': 3.0})
     refused(result, 'drive_timeout', 'serial.auto_stop', 'put back')
     assert stubborn.parameters() == before
-    assert values(client, *SETTINGS) == before
+    assert values(client, *stubborn.names) == before
     assert client.parameter('drive_timeout') == 0.0
 
 
@@ -138,7 +134,6 @@ def test_what_cannot_be_put_back_is_named_and_shown(stubborn: Stubborn, client: 
     assert client.parameter('control.accel') == 6.0
 
 
-@needs('fine')
 def test_a_value_that_the_drive_alters_is_put_back(
     stubborn: Stubborn, client: Client, wire: Wire
 ) -> None:
@@ -146,17 +141,17 @@ def test_a_value_that_the_drive_alters_is_put_back(
     memory = stubborn.drive.memory
 
     def happens(what: str, key: str) -> None:
-        # its display has two decimals, say
+        # it knows half seconds alone, say
         if (what, key) == ('read', 'control.accel'):
-            memory.put(key, memory.raw(key) // 10 * 10)
+            memory.put(key, memory.raw(key) // 500 * 500)
 
     stubborn.before_requests(happens)
     refused(
-        set_one(client, 'control.accel', 6.006),
-        'control.accel', 'keeps 6 s', '6.006 s was written', '5 s as before',
+        set_one(client, 'control.accel', 6.3),
+        'control.accel', 'keeps 6 s', '6.3 s was written', '5 s as before',
     )
     assert wire.writes() == [
-        written('control.accel', (6006, 0)), written('control.accel', (5000, 0))
+        written('control.accel', (6300, 0)), written('control.accel', (5000, 0))
     ]
     assert stubborn.parameters() == before
     _agree(client, stubborn)
@@ -181,7 +176,7 @@ def test_what_a_running_motor_forbids_keeps_the_others_from_being_written(
         wire.writes()
         wanted = {'freque.f_fix1': 60.0, 'motor.u_nom': 230, 'motor.p_nom': 2.2}
         refused(client.set_parameters(**wanted), 'motor.u_nom', 'motor.p_nom', 'stopped')
-        registers = {SETTINGS[name].register for name in wanted}
+        registers = {register(name) for name in wanted}
         assert registers.isdisjoint(write.register for write in wire.writes())
         assert stubborn.parameters() == before
         assert client.set_parameters(**{'freque.f_fix1': 60.0, 'motor.u_nom': 400}).successful
@@ -192,7 +187,6 @@ def test_what_a_running_motor_forbids_keeps_the_others_from_being_written(
     _agree(client, stubborn)
 
 
-@needs('modbus')
 def test_every_third_request_for_a_setting_refused_leaves_ros_and_the_drive_the_same(
     stubborn: Stubborn, client: Client
 ) -> None:
@@ -200,19 +194,19 @@ def test_every_third_request_for_a_setting_refused_leaves_ros_and_the_drive_the_
     difficult = True
 
     def happens(what: str, key: str) -> None:
-        if difficult and key in SETTINGS and next(requests) % 3 == 0:
+        if difficult and key in stubborn.names and next(requests) % 3 == 0:
             raise Refused(Reason.STATE, 'stubborn')
 
     stubborn.before_requests(happens)
     before = stubborn.parameters()
-    for name in itertools.islice((name for name in SETTINGS if 'fix' in name), 24):
+    for name in itertools.islice((name for name in stubborn.names if 'fix' in name), 24):
         value = before[name] + 1.0
         result = set_one(client, name, value)
         has = stubborn.parameters()[name]
         assert has == (value if result.successful else before[name]) or 'NOT' in result.reason
         assert result.successful or result.reason.startswith(name)
     client.call('refresh_parameters')
-    assert len(client.parameter_names() & set(SETTINGS)) == 119
+    assert len(client.parameter_names() & set(stubborn.names)) == len(stubborn.names)
     difficult = False
     client.connected()
     assert client.call('refresh_parameters').success
@@ -258,7 +252,7 @@ def test_a_silent_drive_is_told_soon_and_nothing_changes(
     assert not answer.success
     assert 'check the cable' in answer.message
     assert time.monotonic() - started < 3 * _SOON
-    assert values(client, *SETTINGS) == before, 'what was read last'
+    assert values(client, *stubborn.names) == before, 'what was read last'
     stubborn.simulator.inject('silence', 0.0)
     client.wait_for('status', lambda status: status.connected, 'it is back')
     assert set_one(client, 'control.accel', 6.0).successful
@@ -284,7 +278,7 @@ def test_a_stop_goes_before_all_that_is_being_set_on_a_silent_drive(
 ) -> None:
     with client.run_at(20.0):
         stubborn.simulator.inject('silence', 4.0)
-        fixed = {name: 2.0 for name in SETTINGS if 'fix' in name}
+        fixed = {name: 2.0 for name in stubborn.names if 'fix' in name}
         setting = client.set_parameters_async(**fixed)
         each = set_each_async(client, *fixed.items())
         wire.writes()

@@ -25,15 +25,25 @@ from nfo_sinus_driver.catalog import Protocol
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
-    'rtu': 'it reads frames of Modbus RTU by hand',
-    'modbus': 'it is about requests of Modbus',
+    'rtu': 'it is about Modbus RTU, or reads its frames by hand',
+    'ascii': 'it is about Modbus ASCII',
+    'modbus': 'it is about Modbus',
+    'classic': 'it is about what has no register, and Classic alone reaches',
     'serial': 'it is about a serial port',
+    'gateway': 'it is about a gateway',
     'fine': 'its values are finer than the steps of Classic',
     'fast': 'this dialect knows no more than 9600 bit/s',
+    'newer': 'the firmware of this dialect has not got it [C5], [C21]',
+    'later': 'on this firmware it counts at once, and the line is gone [C7]',
     'parameters': 'this model has no drive parameters',
+    'bare': 'this model has drive parameters',
     'states': 'this model has no state machine that the words of the test are about',
-    'identity': 'this way has no question who the drive is',
+    'identity': 'nothing there tells which drive it is',
+    'own': 'it goes the one way that its command goes',
 }
+
+#: What a driver says where nobody answers, and what is to be checked, in order.
+SILENCE = 'nobody answers', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,7 @@ class Way:
     :ivar baud_rate: bit/s, of both ends.
     :ivar dialect: the manual that describes the Classic protocol; of the simulator.
     :ivar features: those of :data:`WITHOUT` that it has.
+    :ivar beyond: the settings of the drive that it does not reach.
     """
 
     name: str
@@ -52,6 +63,7 @@ class Way:
     model: str = 'sinus_g2'
     dialect: str = ''
     baud_rate: int = 57600
+    beyond: frozenset[str] = frozenset()
 
     @property
     def bus(self) -> Protocol:
@@ -75,22 +87,54 @@ class Way:
         # v2.03 is what a driver takes a drive for that is not said to be older
         return {**settings, 'classic_dialect': 'v5.0'} if self.dialect == '5.0' else settings
 
+    @property
+    def absent(self) -> tuple[str, str]:
+        """What a driver says where there is no port, and what is to be looked after."""
+        if self.protocol == 'modbus_tcp':
+            return 'cannot be reached', 'switched on'
+        return 'does not exist', 'plugged in'
 
-_G2 = frozenset(('fast', 'parameters', 'states'))
+    @property
+    def nobody(self) -> tuple[str, ...]:
+        """What a driver says where nobody has its address, and what is to be checked, in order."""
+        if self.protocol == 'modbus_tcp':
+            return 'has no path to unit', 'table of units', 'serial port'
+        return SILENCE
+
+    @property
+    def noise(self) -> tuple[str, ...]:
+        """What a driver says of damaged answers, and what is to be checked, in order."""
+        # no gateway passes them on
+        return SILENCE if self.protocol == 'modbus_tcp' else ('is no answer', 'baud rate', 'parity')
+
+
+_G2 = frozenset(('fast', 'later', 'newer', 'parameters', 'states'))
+_OPTIMAL = frozenset(('bare', 'fast', 'fine', 'later', 'modbus', 'newer'))
 _MODBUS = frozenset(('modbus', 'fine', 'identity'))
-_SERIAL = frozenset(('serial',))
-_RTU = frozenset(('rtu',))
+_CLASSIC = frozenset(('classic', 'serial'))
+_RTU = frozenset(('rtu', 'serial'))
+_ASCII = frozenset(('ascii', 'serial'))
+
+#: It has no register [M0 table 4].
+_NOT_ON_MODBUS = frozenset(('control.any_bus',))
+#: What the newer manual alone has [C21], and what has other codes in the older firmware [C5].
+NEWER = frozenset((
+    'control.f_sleep', 'error.short_c_err_cnt', 'serial.bus_type', 'serial.si_prot'
+))
 
 WAYS = {
     way.name: way
     for way in (
-        Way('modbus_rtu', 'modbus_rtu', _G2 | _MODBUS | _SERIAL | _RTU),
-        Way('modbus_ascii', 'modbus_ascii', _G2 | _MODBUS | _SERIAL),
-        Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS),
-        Way('classic_v2', 'classic', _G2 | _SERIAL, dialect='2.03'),
-        Way('classic_v5', 'classic', _G2 - {'fast'} | _SERIAL, dialect='5.0', baud_rate=9600),
-        Way('optimal_rtu', 'modbus_rtu', _MODBUS | _SERIAL | {'fast'}, 'sinus_optimal'),
-        Way('optimal_ascii', 'modbus_ascii', _MODBUS | _SERIAL | {'fast'}, 'sinus_optimal'),
+        Way('modbus_rtu', 'modbus_rtu', _G2 | _MODBUS | _RTU | {'own'}, beyond=_NOT_ON_MODBUS),
+        Way('modbus_ascii', 'modbus_ascii', _G2 | _MODBUS | _ASCII, beyond=_NOT_ON_MODBUS),
+        Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
+        Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
+        Way(
+            'classic_v5', 'classic', _G2 - {'fast', 'later', 'newer'} | _CLASSIC,
+            dialect='5.0', baud_rate=9600, beyond=NEWER,
+        ),
+        Way('optimal_rtu', 'modbus_rtu', _OPTIMAL | _RTU, 'sinus_optimal'),
+        Way('optimal_ascii', 'modbus_ascii', _OPTIMAL | _ASCII, 'sinus_optimal'),
     )
 }
 DEFAULT = 'modbus_rtu'

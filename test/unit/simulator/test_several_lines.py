@@ -28,6 +28,7 @@ from classic_bench import NAK
 from classic_bench import enquiry
 from classic_bench import reply
 from classic_bench import select as select_
+import minimalmodbus
 from pymodbus.client import ModbusSerialClient
 from pymodbus.client import ModbusTcpClient
 import pytest
@@ -157,7 +158,6 @@ def test_control_taken_by_one_is_seen_by_the_other(folder, open_master):
 
 @pytest.mark.parametrize('mode', ['rtu', 'ascii'])
 def test_minimalmodbus(mode):
-    minimalmodbus = pytest.importorskip('minimalmodbus')
     with Simulator(protocol=f'modbus_{mode}') as simulator:
         instrument = minimalmodbus.Instrument(simulator.port, 1, mode)
         instrument.serial.timeout = TIMEOUT
@@ -174,17 +174,32 @@ def test_minimalmodbus(mode):
 @pytest.mark.skipif(shutil.which('mbpoll') is None, reason='mbpoll is not installed')
 @pytest.mark.parametrize('protocol', ['modbus_rtu', 'modbus_tcp'])
 def test_mbpoll(protocol):
+    """It has no Modbus ASCII, for libmodbus has none: minimalmodbus and pymodbus speak that."""
     with Simulator(protocol=protocol) as simulator:
         if protocol == 'modbus_tcp':
             host, _, port = simulator.port.partition(':')
-            way = ['-m', 'tcp', '-p', port, host]
+            way, place = ['-m', 'tcp', '-p', port], host
         else:
-            way = ['-m', 'rtu', '-b', '19200', '-P', 'even', simulator.port]
-        # MODE, counted from 0
-        command = ['mbpoll', '-a', '1', '-t', '4', '-0', '-r', str(0x294), '-c', '1', '-1', *way]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
-        assert done.returncode == 0, done.stderr
-        assert re.search(r'\[660\]:\s+1\b', done.stdout)
+            way, place = ['-m', 'rtu', '-b', '19200', '-P', 'even'], simulator.port
+
+        def mbpoll(register, type_, *values):
+            # once, and registers are counted from 0
+            command = ['mbpoll', '-1', '-0', '-a', '1', '-o', str(TIMEOUT), '-t', f'4{type_}']
+            command += [*way, '-r', str(register), place, *map(str, values)]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+            return done.returncode, done.stdout + done.stderr
+
+        status, said = mbpoll(0x294, '')
+        assert status == 0, said
+        assert re.search(r'\[660\]:\s+1\b', said), 'MODE'
+        # 32 bits have their low word first
+        status, said = mbpoll(ACCEL, ':int', 70_000)
+        assert status == 0, said
+        assert simulator.state()['parameters']['control.accel'] == 70.0
+        status, said = mbpoll(ACCEL, ':int')
+        assert re.search(r'\[638\]:\s+70000\b', said), said
+        _, said = mbpoll(0, '')
+        assert 'Illegal' in said, said
 
 
 def test_a_gateway_in_real_time():
