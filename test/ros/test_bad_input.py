@@ -217,12 +217,14 @@ def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) ->
     client = bench.client().connected()
     refused = client.enable()
     assert not refused.success
-    for part in ('4 PTC Temp', 'thermistor', 'Let the motor cool', '~/fault_ack'):
+    sensor = 'thermistor' if bench.way.tells else 'temperature sensor'
+    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '~/fault_ack'):
         assert part in refused.message
     assert drive.state()['scmd'] == 0
     assert not drive.state()['turning']
 
 
+@needs('parameters')
 def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.mode=Speed')
     bench.driver('-p', 'expected_control_mode:=Freque')
@@ -266,10 +268,10 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
         ),
         pytest.param(['-p', 'port:=""'], ['no gateway', 'host:port'], marks=needs('gateway')),
         pytest.param(
-            ['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1'], marks=needs('rtu')
+            ['-p', 'char_format:=7E1'], ['char_format', '8 data bits', '8E1'], marks=needs('eight')
         ),
         pytest.param(
-            ['-p', 'char_format:=8E1'], ['char_format', '7 data bits', '7E1'], marks=needs('ascii')
+            ['-p', 'char_format:=8E1'], ['char_format', '7 data bits', '7E1'], marks=needs('seven')
         ),
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
@@ -359,7 +361,7 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
         '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
         '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
         f'{section}: {{ros__parameters: {{port: "{bench.port}", baud_rate: {baud_rate}, '
-        f'protocol: {protocol}, address: 3, response_timeout: 0.5}}}}\n'
+        f'protocol: {protocol}, model: {bench.way.model}, address: 3, response_timeout: 0.5}}}}\n'
     )
     driver = bench.bare_driver(*renames, '--params-file', str(parameters))
     client = bench.client(f'{namespace}/belt').connected()

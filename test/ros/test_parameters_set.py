@@ -209,6 +209,7 @@ def test_communication_is_changed_with_permission_that_can_be_taken_back(rig: Ri
     assert rig.wire.writes() == []
 
 
+@needs('later')
 def test_who_changes_the_line_is_told_how_to_follow(rig: Rig) -> None:
     client = rig.client
     assert set_one(client, 'allow_communication_changes', True).successful

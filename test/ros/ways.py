@@ -25,19 +25,18 @@ from nfo_sinus_driver.catalog import Protocol
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
-    'rtu': 'it is about Modbus RTU, or reads its frames by hand',
-    'ascii': 'it is about Modbus ASCII',
+    'rtu': 'it reads frames of Modbus RTU to a G2 by hand',
+    'eight': 'it is about the 8 data bits of Modbus RTU',
+    'seven': 'it is about the 7 data bits of Modbus ASCII',
     'modbus': 'it is about Modbus',
     'classic': 'it is about what has no register, and Classic alone reaches',
     'serial': 'it is about a serial port',
     'gateway': 'it is about a gateway',
     'fine': 'its values are finer than the steps of Classic',
-    'fast': 'this dialect knows no more than 9600 bit/s',
     'newer': 'the firmware of this dialect has not got it [C5], [C21]',
     'later': 'on this firmware it counts at once, and the line is gone [C7]',
     'parameters': 'this model has no drive parameters',
     'bare': 'this model has drive parameters',
-    'states': 'this model has no state machine that the words of the test are about',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
 }
@@ -55,6 +54,8 @@ class Way:
     :ivar dialect: the manual that describes the Classic protocol; of the simulator.
     :ivar features: those of :data:`WITHOUT` that it has.
     :ivar beyond: the settings of the drive that it does not reach.
+    :ivar untold: what a running drive does not tell of itself, by the fields of `DriveStatus`.
+    :ivar unmeasured: the same of `Telemetry`.
     """
 
     name: str
@@ -64,6 +65,8 @@ class Way:
     dialect: str = ''
     baud_rate: int = 57600
     beyond: frozenset[str] = frozenset()
+    untold: frozenset[str] = frozenset()
+    unmeasured: frozenset[str] = frozenset()
 
     @property
     def bus(self) -> Protocol:
@@ -88,6 +91,11 @@ class Way:
         return {**settings, 'classic_dialect': 'v5.0'} if self.dialect == '5.0' else settings
 
     @property
+    def tells(self) -> bool:
+        """The drive has settings to be read, and the driver knows from them how it is set."""
+        return 'parameters' in self.features
+
+    @property
     def absent(self) -> tuple[str, str]:
         """What a driver says where there is no port, and what is to be looked after."""
         if self.protocol == 'modbus_tcp':
@@ -108,12 +116,12 @@ class Way:
         return SILENCE if self.protocol == 'modbus_tcp' else ('is no answer', 'baud rate', 'parity')
 
 
-_G2 = frozenset(('fast', 'later', 'newer', 'parameters', 'states'))
-_OPTIMAL = frozenset(('bare', 'fast', 'fine', 'later', 'modbus', 'newer'))
-_MODBUS = frozenset(('modbus', 'fine', 'identity'))
+_G2 = frozenset(('later', 'newer', 'parameters'))
+_OPTIMAL = frozenset(('bare', 'fine', 'later', 'modbus', 'newer'))
+_MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _CLASSIC = frozenset(('classic', 'serial'))
-_RTU = frozenset(('rtu', 'serial'))
-_ASCII = frozenset(('ascii', 'serial'))
+_RTU = frozenset(('eight', 'serial'))
+_ASCII = frozenset(('seven', 'serial'))
 
 #: It has no register [M0 table 4].
 _NOT_ON_MODBUS = frozenset(('control.any_bus',))
@@ -121,20 +129,37 @@ _NOT_ON_MODBUS = frozenset(('control.any_bus',))
 NEWER = frozenset((
     'control.f_sleep', 'error.short_c_err_cnt', 'serial.bus_type', 'serial.si_prot'
 ))
+#: Without a status word the inverter status tells the rest [C21].
+_NO_STATUS_WORD = frozenset((
+    'ready', 'switched_on', 'network_reference', 'setpoint_reached', 'reverse'
+))
+_NOT_OF_THE_OPTIMAL = frozenset((
+    'output_voltage', 'dc_link_voltage', 'torque', 'motor_temperature', 'pt1000_temperature',
+    'brake_time', 'energy', 'total_energy',
+))
 
 WAYS = {
     way.name: way
     for way in (
-        Way('modbus_rtu', 'modbus_rtu', _G2 | _MODBUS | _RTU | {'own'}, beyond=_NOT_ON_MODBUS),
+        Way(
+            'modbus_rtu', 'modbus_rtu', _G2 | _MODBUS | _RTU | {'own', 'rtu'},
+            beyond=_NOT_ON_MODBUS,
+        ),
         Way('modbus_ascii', 'modbus_ascii', _G2 | _MODBUS | _ASCII, beyond=_NOT_ON_MODBUS),
         Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
         Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
         Way(
-            'classic_v5', 'classic', _G2 - {'fast', 'later', 'newer'} | _CLASSIC,
+            'classic_v5', 'classic', _G2 - {'later', 'newer'} | _CLASSIC,
             dialect='5.0', baud_rate=9600, beyond=NEWER,
+            untold=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
         ),
-        Way('optimal_rtu', 'modbus_rtu', _OPTIMAL | _RTU, 'sinus_optimal'),
-        Way('optimal_ascii', 'modbus_ascii', _OPTIMAL | _ASCII, 'sinus_optimal'),
+        *(
+            Way(
+                f'optimal_{kind}', f'modbus_{kind}', _OPTIMAL | features, 'sinus_optimal',
+                untold=frozenset(('network_reference',)), unmeasured=_NOT_OF_THE_OPTIMAL,
+            )
+            for kind, features in (('rtu', _RTU), ('ascii', _ASCII))
+        ),
     )
 }
 DEFAULT = 'modbus_rtu'

@@ -1,0 +1,79 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A drive that has no settings on the bus: the node's own parameters do all the same."""
+
+from __future__ import annotations
+
+from bench import Bench
+from bench import wait_until
+from parameter_bench import QUIET
+from parameter_bench import Wire
+from parameter_bench import refused
+from parameter_bench import set_each
+from parameter_bench import set_one
+from parameter_bench import values
+from support.parameter_ends import ENDS
+from ways import needs
+
+pytestmark = needs('bare')
+
+_NAMES = {ends.name for ends in ENDS}
+
+
+def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    wire = Wire(bench)
+    wire.writes()
+    # that one is rclpy's own, and no node at all takes it back
+    names = client.parameter_names() - {'start_type_description_service'}
+    assert not names & _NAMES
+    assert client.set_parameters(poll_rate=20.0, setpoint_max=30.0).successful
+    dump = values(client, *sorted(names))
+    assert dump['setpoint_max'] == 30.0
+    assert client.set_parameters(setpoint_max=10.0).successful
+    assert [result.reason for result in set_each(client, *dump.items())] == [''] * len(dump)
+    assert values(client, *sorted(names)) == dump
+    assert client.call('refresh_parameters').message == '0 parameters read, changed: none'
+    assert wire.writes() == []
+
+
+def test_settings_are_refused_one_by_one_and_with_others(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    wire = Wire(bench)
+    wire.writes()
+    for ends in ENDS:
+        refused(set_one(client, ends.name, ends.low), ends.name)
+    refused(client.set_parameters(**{'poll_rate': 20.0, 'control.accel': 6.0}), 'control.accel')
+    refused(client.set_parameters(poll_rate=20.0, drive_timeout=2.0), 'drive_timeout')
+    assert client.parameter('poll_rate') == 10.0
+    assert wire.writes() == []
+
+
+def test_settings_in_a_parameter_file_are_warned_about_and_do_no_harm(bench: Bench) -> None:
+    drive = bench.simulator(paced=False)
+    path = bench.folder / 'drive.yaml'
+    path.write_text(
+        '/**/nfo_sinus:\n  ros__parameters:\n    control: {accel: 6.0}\n    setpoint_max: 30.0\n'
+    )
+    driver = bench.driver(*QUIET, '--params-file', str(path))
+    client = bench.client().connected()
+    wait_until(lambda: 'control.accel was given to nfo_sinus' in driver.text, 'the warning')
+    assert client.parameter('setpoint_max') == 30.0
+    assert not drive.state()['writes']
