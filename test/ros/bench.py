@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
-from collections.abc import Mapping
 import contextlib
 import json
 import os
@@ -55,6 +54,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
+from ways import UNFRAMED
 from ways import Way
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -70,13 +70,6 @@ TOPICS = {
     'actual_speed': (Float32, 10),
     'actual_frequency': (Float32, 10),
     'telemetry': (Telemetry, 10),
-}
-
-#: How unit and PDU are got out of a frame of Modbus.
-UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
-    'modbus_rtu': lambda frame: frame[:-2],
-    'modbus_ascii': lambda frame: bytes.fromhex(frame[1:-4].decode()),
-    'modbus_tcp': lambda frame: frame[6:],
 }
 
 

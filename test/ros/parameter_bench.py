@@ -27,7 +27,6 @@ import re
 from typing import Any
 from typing import TypeAlias
 
-from bench import UNFRAMED
 from bench import Bench
 from bench import Client
 from bench import Process
@@ -40,6 +39,7 @@ from support.classic_ends import OTHER_ON_CLASSIC
 from support.classic_ends import on_classic
 from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
+from ways import UNFRAMED
 from ways import Way
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive

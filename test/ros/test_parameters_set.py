@@ -223,6 +223,22 @@ def test_who_changes_the_line_is_told_how_to_follow(rig: Rig) -> None:
         rig.wire.writes()
 
 
+@needs('at_once')
+@pytest.mark.parametrize(
+    ('name', 'value', 'setting'),
+    [('serial.address', 2, 'address (2)'), ('serial.si_baud', '4800bps', 'baud_rate (4800bps)')],
+)
+def test_who_loses_the_drive_by_a_change_of_the_line_is_told_how_to_follow(
+    bench: Bench, name: str, value: Value, setting: str
+) -> None:
+    bench.simulator(paced=False)
+    bench.driver(*QUIET, '-p', 'allow_communication_changes:=true')
+    client = bench.client().connected()
+    result = set_one(client, name, value)
+    refused(result, name, 'is not known', 'at once: then start this driver with the', setting)
+    client.wait_for('status', lambda status: not status.connected, 'it is lost')
+
+
 # --- several ------------------------------------------------------------------------------------
 
 

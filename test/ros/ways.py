@@ -17,6 +17,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pytest
@@ -35,12 +37,19 @@ WITHOUT = {
     'fine': 'its values are finer than the steps of Classic',
     'newer': 'the firmware of this dialect has not got it [C5], [C21]',
     'later': 'on this firmware it counts at once, and the line is gone [C7]',
+    'at_once': 'on this firmware it counts from the next power-up on [C7]',
     'parameters': 'this model has no drive parameters',
     'bare': 'this model has drive parameters',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
 }
 
+#: How unit and PDU are got out of a frame of Modbus.
+UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
+    'modbus_rtu': lambda frame: frame[:-2],
+    'modbus_ascii': lambda frame: bytes.fromhex(frame[1:-4].decode()),
+    'modbus_tcp': lambda frame: frame[6:],
+}
 #: What a driver says where nobody answers, and what is to be checked, in order.
 SILENCE = 'nobody answers', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 
@@ -149,7 +158,7 @@ WAYS = {
         Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
         Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
         Way(
-            'classic_v5', 'classic', _G2 - {'later', 'newer'} | _CLASSIC,
+            'classic_v5', 'classic', _G2 - {'later', 'newer'} | _CLASSIC | {'at_once'},
             dialect='5.0', baud_rate=9600, beyond=NEWER,
             untold=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
         ),
