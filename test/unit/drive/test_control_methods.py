@@ -27,8 +27,11 @@ import pytest
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.simulator import control_steps
 
 OVERLOAD = 5
+#: Bits of the Optimal's Drive Status [M1].
+ENABLED, FROM_BUS = 1 << 2, 1 << 9
 
 #: Model, control method, and where the reference comes from.
 WAYS = [
@@ -196,6 +199,44 @@ def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
 def test_the_optimal_is_expected_in_no_mode_that_it_lacks(mode: str) -> None:
     with pytest.raises(ValueError, match='expected_control_mode'):
         DriveSettings(model='sinus_optimal', expected_control_mode=mode)
+
+
+# --- the control word of the Optimal --------------------------------------------------------------
+
+
+def test_each_step_of_the_optimal_is_confirmed_before_the_next(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(control_steps, '_RESPONSE', 0.3)
+    rig = make_rig(
+        model='sinus_optimal', control_method='drive_control', reference='terminal'
+    )
+    rig.connect()
+    confirmed: list[tuple[int, int]] = []
+    write = rig.far.write_raw
+
+    def note(key: str, raw: int) -> None:
+        if key == 'fieldbus.drive_control':
+            confirmed.append((raw, rig.far.runner.status_word & (FROM_BUS | ENABLED)))
+        write(key, raw)
+
+    monkeypatch.setattr(rig.far, 'write_raw', note)
+    assert rig.enable().startswith('enabled')
+    assert confirmed == [
+        (0, 0), (0x4000, 0), (0x4008, FROM_BUS), (0x4009, FROM_BUS | ENABLED)
+    ]
+
+
+@pytest.mark.parametrize('key', ['stop', 'start', 'ext'])
+def test_optimal_is_enabled_again_after_its_keypad(make_rig: MakeRig, key: str) -> None:
+    # the bit that asks for control still stands in its word, and has to rise anew
+    rig = make_rig(
+        model='sinus_optimal', control_method='drive_control', reference='terminal'
+    )
+    turn(rig)
+    rig.simulator.inject('keypad', key)
+    wait_until(lambda: not rig.drive.armed)
+    assert rig.enable().startswith('enabled')
 
 
 # --- one method in a session ----------------------------------------------------------------------

@@ -41,6 +41,7 @@ from nfo_sinus_driver.simulator.state_machine import StateMachine
 
 OVERLOAD = 5
 STATUS = 0x258
+CONTROL = 0x254
 POWER = Control.NET_CTRL | Control.NET_REF | Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
 RAMP = Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
 ON = POWER | RAMP | Control.SWITCH_ON
@@ -248,6 +249,33 @@ def test_table_16_led(make_rig: MakeRig, exits: Exits, wanted: Exits, lead) -> N
         rig.drive.stop().result(PATIENCE)
     assert_it_can_be_enabled(rig)
     assert not rig.notes.told('CANNOT STOP')
+
+
+def masks(rig: Rig) -> list[tuple[int, int]]:
+    """What was written to DrvCtrlWriteMask, AND and OR, in order."""
+    data = [bytes.fromhex(frame['hex']) for frame in rig.trace() if frame['direction'] == 'request']
+    return [
+        (int.from_bytes(one[7:9], 'big'), int.from_bytes(one[9:11], 'big'))
+        for one in data
+        if one[1:4] == b'\x10\x02\x50'
+    ]
+
+
+@pytest.mark.parametrize(('reference', 'net_ref'), [('fieldbus', 0x8000), ('terminal', 0)])
+def test_words_of_table_14(make_rig: MakeRig, reference: str, net_ref: int) -> None:
+    rig = make_rig(control_method='drive_control', reference=reference)
+    rig.connect()
+    rig.enable()
+    # NetCtrl, power, no quick stop, ramp; bit 0 low first, then SwitchOn, then the direction
+    assert rig.writes(CONTROL) == [net_ref | 0x4076, net_ref | 0x4077, net_ref | 0x407F]
+    rig.drive.stop().result(PATIENCE)
+    # SwitchOn and both directions are taken back, and nothing is added
+    assert set(masks(rig)) == {(0xDFF6, 0)}
+    rig.drive.quick_stop().result(PATIENCE)
+    # no longer DisableQuickStop; OverrideCoast
+    assert (0xDFF2, 0x0800) in masks(rig)
+    # the mask saves reading the word
+    assert not any(frame['hex'][2:8] == '030254' for frame in rig.trace())
 
 
 # --- what another master leads it through, under the driver's eyes --------------------------------
