@@ -320,11 +320,7 @@ class Motion:
         self._setpoint.answered()
         if self._withdrawal.held_by_fault and not seen.faulted:
             self._withdrawal.wake()
-        refused_at, reason = self._refusal or (math.inf, '')
-        if seen.at > refused_at:
-            # as a drive with a fault refuses everything
-            self._refusal = None
-            self.secure(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        if self._explain_refusal(seen):
             return True
         if seen.at < self._changed_at:
             return False
@@ -345,6 +341,15 @@ class Motion:
         self.disarm()
         self._withdrawal.begin()
         self._refusal = (time.monotonic(), reason)
+
+    def _explain_refusal(self, seen: InverterStatus) -> bool:
+        refused_at, reason = self._refusal or (math.inf, '')
+        if seen.at <= refused_at:
+            return False
+        # a drive with a fault refuses everything
+        self._refusal = None
+        self.secure(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        return True
 
     def secure(self, reason: str) -> None:
         """Disarm and stop for a reason that a person should know, with what to do about it."""
@@ -370,6 +375,7 @@ class Motion:
     async def _arm(self) -> None:
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
+        self._explain_refusal(seen)
         if seen.faulted:
             fault = inverter.model.inv_st(seen.code)
             raise DriveError(

@@ -34,6 +34,8 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
 
 OVERLOAD = 5
 DC_LOW = 7
@@ -371,3 +373,25 @@ def test_condition_that_comes_and_goes_is_not_told_each_time(make_rig: MakeRig) 
             rig.far.faults.acknowledge()
         wait_until(lambda: Fact.ALARM not in facts(rig.drive.snapshot))
     assert len(rig.notes.events) == 1
+
+
+def test_refused_set_point_does_not_end_the_ride_after_it(make_rig: MakeRig) -> None:
+    # whoever enables it before the next poll
+    rig = turning(make_rig, 'sinus_g2', 'mode_scmd', 'fieldbus', poll_rate=1.0)
+    rig.stop_publishing()
+    answered = rig.far.write_raw
+
+    def refuse(key: str, raw: int) -> None:
+        if key == 'status.frq_set' and raw == 300:
+            raise Refused(Reason.VALUE, 'as the test wants it')
+        answered(key, raw)
+
+    rig.far.write_raw = refuse  # type: ignore[method-assign]
+    rig.drive.set_setpoint(30.0)
+    wait_until(lambda: not rig.drive.armed)
+    assert rig.enable().startswith('enabled')
+    rig.next_snapshots(2)
+    assert rig.drive.armed
+    lines = said(rig)
+    assert len(lines) == 1, lines
+    assert 'it refused set-point 30: ' in lines[0]
