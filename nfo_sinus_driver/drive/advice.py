@@ -31,6 +31,11 @@ _SILENCE_ADVICE = (
     'check in this order: BusType in the drive (NFO, which is classic, is the factory setting; '
     'MbusRtu or MbusAsc for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
 )
+#: Why a drive does not start that seems to be told to.
+NO_RUN_INPUT = (
+    'the drive stays in standby: its RUN input is not active '
+    '(DIN1; strap it to +24 V or close its safety contact)'
+)
 
 
 def explain(error: LinkError, address: int, *, known: bool) -> str:
@@ -84,6 +89,14 @@ def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) ->
             'another master stopped it: close the input'
         )
     return ''
+
+
+def explain_loss(inverter: Inverter) -> str:
+    """Return what became of a drive that was lost under our control and is back without it."""
+    return (
+        f'the bus has lost control meanwhile ({inverter.describe()}). The drive was switched off '
+        'and on, or somebody used its keypad: check its mains; then call ~/enable to go on'
+    )
 
 
 def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:

@@ -35,7 +35,9 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
 from nfo_sinus_driver.drive.advice import explain_fault
+from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
@@ -45,11 +47,6 @@ from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.withdrawal import Withdrawal
 from nfo_sinus_driver.link import LinkError
-
-_NO_RUN = (
-    'the drive stays in standby: its RUN input is not active '
-    '(DIN1; strap it to +24 V or close its safety contact)'
-)
 
 
 class Loan:
@@ -293,12 +290,7 @@ class Motion:
                 )
             self._withdrawal.begin()
         elif self._lost_in_use and seen is not None and not seen.faulted:
-            self._tell(
-                Severity.WARNING,
-                f'the bus has lost control meanwhile ({self._inverter.describe()}). The drive was '
-                'switched off and on, or somebody used its keypad: check its mains; then call '
-                '~/enable to go on',
-            )
+            self._tell(Severity.WARNING, explain_loss(self._inverter))
         self._lost_in_use = False
 
     def lost(self) -> bool:
@@ -414,13 +406,13 @@ class Motion:
             if seen.faulted:
                 raise DriveError(f'the drive did not start: {self._inverter.describe()}')
             if Fact.RUN_INPUT_MISSING in seen.facts:
-                raise DriveError(_NO_RUN)
+                raise DriveError(NO_RUN_INPUT)
             if seen.code == seen.codes.start_delay and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()
             if time.monotonic() > deadline:
                 raise DriveError(
-                    _NO_RUN
+                    NO_RUN_INPUT
                     if seen.standby
                     else f'the drive does not start: {self._inverter.describe()}'
                 )
