@@ -26,6 +26,7 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
 import enum
+import functools
 
 from nfo_sinus_driver.catalog import inv_st
 from nfo_sinus_driver.catalog import words
@@ -119,7 +120,7 @@ class Dialect:
     by_state: Mapping[State, Fact]
     codes: Codes
 
-    @property
+    @functools.cached_property
     def valid(self) -> Fact:
         """The facts that this model tells at all; of the others nothing is known."""
         valid = Fact.ALARM  # where no bit tells it, the inverter status does
@@ -149,12 +150,17 @@ class Dialect:
             return Kind.ALARM if Fact.ALARM in facts else Kind.STATUS
         return Kind.ALARM if listed is Kind.FAULT else listed
 
+    @functools.cached_property
+    def _pairs(self) -> tuple[tuple[int, int], ...]:
+        # plain numbers: this is done with every poll, and flags take their time
+        return tuple((int(bit), int(fact)) for bit, fact in self.by_bit.items())
+
     def _bits(self, word: int) -> Fact:
-        facts = Fact(0)
-        for bit, fact in self.by_bit.items():
+        facts = 0
+        for bit, fact in self._pairs:
             if word & bit:
                 facts |= fact
-        return facts
+        return Fact(facts)
 
 
 _G2 = words.Status

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 import enum
+import functools
 import math
 from typing import TYPE_CHECKING
 from typing import Protocol
@@ -70,7 +71,7 @@ class InverterStatus:
     model: Model
     by_mode: bool = False
 
-    @property
+    @functools.cached_property
     def listed(self) -> InvStCode:
         """What the model's table says of the code."""
         return self.model.inv_st(self.code)
@@ -80,7 +81,7 @@ class InverterStatus:
         """The model's codes by what they mean."""
         return self.model.dialect.codes
 
-    @property
+    @functools.cached_property
     def facts(self) -> Fact:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
@@ -99,14 +100,14 @@ class InverterStatus:
             return self.model.dialect.valid
         return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
 
-    @property
+    @functools.cached_property
     def kind(self) -> Kind:
         """How grave the code is; the bits have the last word ([C50], [C95])."""
         if self.word is None:
             return self.listed.kind
         return self.model.dialect.kind(self.word, self.listed.kind)
 
-    @property
+    @functools.cached_property
     def state(self) -> State:
         """The state of the generic state machine."""
         return State.UNKNOWN if self.word is None else self.model.dialect.state(self.word)

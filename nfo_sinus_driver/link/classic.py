@@ -151,7 +151,8 @@ _VALUE = (_ADDRESS, *_TEXT, _ANY)
 _VERDICT = (_ADDRESS, frozenset((_ACK, _NAK)))
 _ENQUIRY = (frozenset((_EOT,)), _ADDRESS, *_PARAMETER, frozenset((_ENQ,)))
 _SELECT = (frozenset((_EOT,)), *_VALUE)
-_SHAPES = (_VALUE, _VERDICT, _ENQUIRY, _SELECT)
+_ANSWERS = (_VALUE, _VERDICT)
+_REQUESTS = (_ENQUIRY, _SELECT)
 
 #: Characters of a REPLY, the longest answer.
 LONGEST_ANSWER = len(_VALUE)
@@ -181,7 +182,8 @@ class Reader:
         self._buffer += data
         found: list[Message] = []
         while self._buffer:
-            fit, shape = max(((_fit(self._buffer, shape), shape) for shape in _SHAPES), key=_first)
+            shapes = _REQUESTS if self._buffer[0] == _EOT else _ANSWERS
+            fit, shape = max([(_fit(self._buffer, shape), shape) for shape in shapes], key=_first)
             message = _decode(self._buffer[:fit]) if fit == len(shape) else None
             if message is not None:
                 found.append(message)

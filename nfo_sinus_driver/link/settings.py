@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import functools
 import re
 
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
@@ -69,7 +70,7 @@ class LineSettings:
         """1 or 2."""
         return int(self.char_format[2])
 
-    @property
+    @functools.cached_property
     def char_time(self) -> float:
         """The time of one character on the wire, s."""
         bits = 1 + self.data_bits + (self.parity != 'N') + self.stop_bits
