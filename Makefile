@@ -65,7 +65,7 @@ mutants: setup ## break each law in a copy and see that a test fails (a quarter 
 	@tools/run python test/mutants/run.py
 
 # Not a part of setup: only the comparison needs other masters.
-bench: setup ## measure its speed, and that of others (an hour; BENCH=--quick: 10 minutes)
+bench: setup ## measure its speed, and that of others (over an hour; BENCH=--quick: 10 minutes)
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)

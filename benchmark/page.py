@@ -94,16 +94,15 @@ def _table(rows: Sequence[Row], columns: Sequence[tuple[str, str, int]]) -> str:
 def verdict(aims: Figures, figures: Figures) -> str:
     """Return whether the aims are met, or what was missed and by how much."""
     missed = []
-    for name, most in aims.items():
-        if name not in figures:
-            continue
+    judged = {name: most for name, most in aims.items() if name in figures}
+    for name, most in judged.items():
         title, unit, decimals = _UNITS[name]
         excess = round(figures[name] - most, decimals)
         if excess > 0:
             missed.append(f'**{title} at most {most:g}{unit}: missed by {excess:g}{unit}**')
     if figures.get('lost'):
         missed.append(f'**{figures["lost"]:g} set-points never came there**')
-    return '; '.join(missed) or ('met' if aims else '')
+    return '; '.join(missed) or ('met' if judged else '')
 
 
 def circumstances(command: str, runs: int, loads: Sequence[float]) -> str:

@@ -35,7 +35,7 @@ from measurements import all_measurements
 import page
 import processor
 
-_WHOLE = Effort(window=5.0, setpoints=500, events=4)
+_WHOLE = Effort(window=5.0, setpoints=500, events=3)
 _QUICK = Effort(window=3.0, setpoints=60, events=1)
 #: The machine is calm when everybody else takes less than this, cores.
 _CALM = 0.5
