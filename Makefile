@@ -51,11 +51,12 @@ types: setup ## mypy, on all that is not ROS
 	@echo '== types: mypy --strict'
 	@.venv/bin/mypy
 
+# More workers than processors: these tests wait more than they work.
 unit: setup ## tests without ROS, with the current and with the oldest pymodbus
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto test/unit
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 4 test/unit
 	@echo '== unit again, what uses pymodbus: the current one'
-	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n auto test/unit/link test/unit/simulator test/unit/cli
+	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 4 test/unit/link test/unit/simulator
 
 ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
