@@ -115,9 +115,10 @@ def test_a_changed_control_mode_is_answered_before_anybody_else_talks(rig: Rig) 
 def test_what_goes_on_as_it_did_has_no_claim_on_the_line(rig: Rig) -> None:
     rig.turn()
     with _crowd(rig):
+        rig.next_snapshots()
         begun = len(_asked(rig))
         rig.next_snapshots()
-    asked = _asked(rig)[begun:]
+        asked = _asked(rig)[begun:]
     follows = [asked[number + 1 :][:1] for number, what in enumerate(asked) if what == _STATUS]
     assert [_CHATTER.numbers[0]] in follows
     assert [_INV_ST] not in follows
