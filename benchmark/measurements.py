@@ -109,7 +109,7 @@ def all_measurements() -> Iterator[Measurement]:
         ('modbus_rtu', 19200, stops.KINDS),
         ('modbus_ascii', 19200, stops.FEW_KINDS),
         ('classic', 57600, stops.FEW_KINDS),
-        ('classic', 9600, stops.FEW_KINDS),
+        ('classic', 9600, stops.SLOW_KINDS),
     ):
         yield Measurement(
             'stop', f'stop, {protocol}', baud_rate, 8, {'beyond': 5, 'polls': 2},

@@ -260,6 +260,8 @@ _INJECTED: dict[str, tuple[object, ...]] = {
 }
 KINDS = (*_SERVICES, *_INJECTED, 'set-point time-out', 'SIGTERM')
 FEW_KINDS = ('service stop', 'fault', 'fault in a poll', 'set-point time-out', 'SIGTERM')
+#: Where a cycle takes longer than the time-out, set-point 0 is refused before a poll can tell.
+SLOW_KINDS = tuple(kind for kind in FEW_KINDS if kind != 'fault in a poll')
 
 
 class StopRig(DriverRig):
