@@ -23,7 +23,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants bench parameters build clean
+.PHONY: help setup demo run test lint types unit ros mutants campaign bench parameters build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -64,6 +64,9 @@ ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY
 
 mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
 	@tools/run python test/mutants/run.py
+
+campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=500)
+	@HISTORIES=$(or $(HISTORIES),500) tools/run python $(PYTEST) -n auto test/unit/drive/test_any_order.py
 
 # Not a part of setup: only the comparison needs other masters.
 bench: setup ## measure its speed, and that of others (over an hour; BENCH=--quick: 10 minutes)

@@ -68,6 +68,8 @@ _T = TypeVar('_T')
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
 
+#: Earlier than any moment of the steady clock.
+_AT_ONCE = 0.0
 _NOWHERE = Address((), 0)
 
 
@@ -110,6 +112,8 @@ class Bus:
         self._awake.set()
         if self._thread.is_alive():
             self._thread.join(timeout)
+        elif not self._closed:
+            self._end()
 
     def run(self, coroutine: Coroutine[Any, Any, _T]) -> Future[_T]:
         """
@@ -269,28 +273,34 @@ class Bus:
         tighten_timers()
         while not self._stopping:
             try:
-                self._work_once()
+                self._rest(self.step())
             except BaseException:
                 # a mistake in a callback must not take every drive on the line with it
                 _log.exception('error in the bus worker; it goes on')
+        self._end()
+
+    def _end(self) -> None:
         self._port.close()
         self._closed = True
         self._take_in()
         for task in tuple(self._tasks):
             self.cancel(task)
 
-    def _work_once(self) -> None:
+    def step(self) -> float:
+        """
+        Do what is due, and send one transaction at most; for who never calls :meth:`start`.
+
+        :returns: when there is more to do, s on the steady clock, unless somebody asks before.
+        """
         self._awake.clear()
         self._take_in()
         self._ring_timers()
         if not self._port.is_open:
             self._open_when_due()
-            if not self._port.is_open:
-                self._fail_all(self._port.error)
-                self._rest()
-                return
-        if not self._send_next():
-            self._rest()
+        if not self._port.is_open:
+            self._fail_all(self._port.error)
+            return min(self._sleepers.next_moment, self._port.reopen_at)
+        return _AT_ONCE if self._send_next() else self._sleepers.next_moment
 
     def _take_in(self) -> None:
         while self._inbox:
@@ -312,14 +322,11 @@ class Bus:
         task.pause += 1
         self._advance(task, None, None)
 
-    def _rest(self) -> None:
-        """Sleep until something is asked for or a timer rings."""
-        if self._inbox or self._stopping:
+    def _rest(self, until: float) -> None:
+        """Sleep until something is asked for or a moment has come."""
+        if self._inbox or self._stopping or until == _AT_ONCE:
             return
-        moment = self._sleepers.next_moment
-        if not self._port.is_open:
-            moment = min(moment, self._port.reopen_at)
-        wait = None if math.isinf(moment) else max(0.0, moment - time.monotonic())
+        wait = None if math.isinf(until) else max(0.0, until - time.monotonic())
         self._awake.wait(wait)
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:

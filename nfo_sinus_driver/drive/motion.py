@@ -410,6 +410,9 @@ class Motion:
             if seen.code == seen.codes.start_delay and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()
+            elif delayed and seen.standby:
+                # it forgot the start: the run command must not wait for another
+                raise DriveError(_NO_RUN)
             if time.monotonic() > deadline:
                 raise DriveError(
                     NO_RUN_INPUT

@@ -121,8 +121,7 @@ class Withdrawal:
                     'Use the RUN input or the emergency stop if it turns',
                 )
             if not self._again:
-                connected = self._inverter.connected
-                await self._bus.sleep(_RETRY_PERIOD if connected else _LOST_RETRY_PERIOD)
+                await self._rest()
         self._task = None
         self.held_by_fault = False
         self._done()
@@ -133,11 +132,14 @@ class Withdrawal:
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
         while not self._again:
-            # a drive that is only being connected to has no polls yet, and others want the line too
-            await self._bus.sleep(_RETRY_PERIOD)
+            await self._rest()
             seen = self._inverter.seen
             if not self._inverter.connected or (seen is not None and not seen.faulted):
+                # one that is only being connected to has no polls yet
                 return
+
+    async def _rest(self) -> None:
+        await self._bus.sleep(_RETRY_PERIOD if self._inverter.connected else _LOST_RETRY_PERIOD)
 
     async def _tried(self) -> bool:
         try:

@@ -1,0 +1,521 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What must hold of a drive and its driver whatever happens, judged by the simulated drive alone.
+
+Written from the manuals and the laws of the house, not from the driver: nothing here is imported
+from it but what it publishes. Times are those of the virtual clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from any_order_rig import RESPONSE_TIMEOUT
+from any_order_rig import Rig
+from support import trace_laws
+
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+
+POLL_RATE = 10.0
+SETPOINT_TIMEOUT = 1.0
+SHUTDOWN_TIMEOUT = 1.0
+#: One transaction and a little, s.
+TRANSACTION = 0.015
+#: Two polls and a transaction, and what they themselves take: while active, and while not, s.
+NOTICED = 0.3
+NOTICED_IDLE = 1.2
+#: How seldom the control mode may be read, s.
+CONTROL_MODE_PERIOD = 1.0
+#: A command is carried out within this, s.
+CARRIED_OUT = 0.06
+#: Three polls that nobody answers and the drive is lost: while active, and while not, s.
+LOST = 2.0
+LOST_IDLE = 3.0
+#: A run command that could not be taken back is, so long after the line came back, s.
+TAKEN_BACK = 1.4
+#: A drive that was lost is found again within this, s.
+FOUND = 5.0
+#: Within this it is said that a motor cannot be stopped, s.
+SAID = 5.0
+#: No command keeps anybody waiting longer, s.
+LONGEST_COMMAND = 12.0
+
+#: Registers of one word or two [M0 §7], [M1].
+MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
+MODE_STOP, MODE_BUS = 1, 3
+RUN_FIELDBUS = 0x101
+FORWARD, REVERSE = 1 << 3, 1 << 13
+SWITCH_ON = 1 << 0
+
+_STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
+
+
+class Broken(AssertionError):
+    """A law is broken."""
+
+
+@dataclass
+class _Command:
+    """A command that is on its way."""
+
+    name: str
+    future: Future[Any]
+    at: float
+    #: The line was whole and the drive known when it was given, and has been since.
+    undisturbed: bool
+
+
+class Laws:
+    """Watches a rig; raises :class:`Broken` as soon as a law is."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._far = rig.far
+        self._optimal = rig.settings.model == 'sinus_optimal'
+        self._method = rig.settings.control_method
+        self._follows = rig.settings.reference == 'fieldbus'
+        rig.looked, rig.wrote, rig.gave = self.look, self._wrote, self.gave
+        self._commands: list[_Command] = []
+        #: Somebody enabled it, and nothing has happened since that ends that.
+        self.enabled_at: float | None = None
+        self._enabled_for_sure = False
+        #: When what made it stop happened last, and from when on it may not run.
+        self.lost_at = self._no_run_from = rig.clock.now
+        self._setpoint: tuple[float, float] = (-math.inf, 0.0)
+        #: This driver may have started the motor.
+        self._ours = False
+        #: The run command that stands is somebody else's.
+        self._foreign = False
+        self.active = self.watched = False
+        self._watched_at = self._active_at = rig.clock.now
+        self._whole_since: float | None = rig.clock.now
+        self._broken_since: float | None = None
+        self.disturbed_at = rig.clock.now
+        self._running_since: float | None = None
+        self._conditions = tuple(self._present_conditions())
+        self._truth: dict[str, tuple[Any, float]] = {}
+        self._acknowledged = 0
+        self._stop_due: int | None = None
+
+    # --- what the test tells ----------------------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        return self._rig.clock.now
+
+    def command(self, name: str, future: Future[Any]) -> None:
+        """Take note of a command that was given."""
+        undisturbed = self._steady
+        self._commands.append(_Command(name, future, self.now, undisturbed))
+        if name == 'enable':
+            if self.enabled_at is None:
+                self.enabled_at = self.now
+            self._ours = True
+        elif name in _STOPS:
+            if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
+                self._stop_due = len(self._rig.link.frames)
+            self.lose(CARRIED_OUT)
+        elif name == 'acknowledge':
+            self._acknowledged += 1
+        if name in ('deactivate', 'disconnect', 'stop_for_good'):
+            self.active = False
+        if name == 'disconnect':
+            self.watched = False
+
+    def connected(self) -> None:
+        """Take note that the driver looks after the drive from now on, or tries to."""
+        if not self.watched:
+            self.watched = True
+            self._watched_at = self.now
+            self._no_run_from = max(self._no_run_from, self.now + CARRIED_OUT)
+
+    def activated(self) -> None:
+        """Take note that it polls at full rate from now on."""
+        self.active = True
+        self._active_at = self.now
+
+    def gave(self, value: float) -> None:
+        """Take note of a set-point that was given."""
+        self._setpoint = self.now, value
+
+    def lose(self, within: float) -> None:
+        """Take note of something after which the motor may not turn, but for a moment yet."""
+        self.enabled_at = None
+        self._enabled_for_sure = False
+        self.lost_at = self.now
+        self._no_run_from = max(self._no_run_from, self.now + within)
+
+    def disturbed(self) -> None:
+        """Take note that somebody else did something to the drive."""
+        self.disturbed_at = self.now
+
+    def started_by_another(self) -> None:
+        """Take note that somebody else has given a run command over the bus."""
+        self.disturbed_at = self.now
+        self._foreign = True
+
+    def forgotten(self) -> None:
+        """Take note that the drive was made to forget its run command."""
+        if self.by_bus and not self._pending('enable'):
+            self.lose(self.noticed)
+
+    def control_mode_changed(self) -> None:
+        """Take note that the drive controls another quantity now."""
+        self.disturbed_at = self.now
+        if not self._pending('enable'):
+            self.lose(self.noticed + CONTROL_MODE_PERIOD)
+
+    def killed(self) -> None:
+        """Take note that the driver is no more."""
+        self._commands.clear()
+        self._truth.clear()
+        self.lose(0.0)
+        self.active = self.watched = self._ours = False
+        self._stop_due = None
+
+    @property
+    def enabling(self) -> bool:
+        """Somebody has enabled it, or is about to."""
+        return self._pending('enable') or self.enabled_at is not None
+
+    def _pending(self, name: str) -> bool:
+        return any(command.name == name for command in self._commands)
+
+    @property
+    def noticed(self) -> float:
+        """Within which time something is noticed, s."""
+        return NOTICED if self.active else NOTICED_IDLE
+
+    @property
+    def settled_since(self) -> float:
+        """Since when all that happens can be noticed; infinity if it cannot."""
+        if self._whole_since is None or not self.watched or not self._connected:
+            return math.inf
+        return max(self._whole_since, self._watched_at)
+
+    # --- what the simulated drive says ------------------------------------------------------------
+
+    @property
+    def by_bus(self) -> bool:
+        """The bus controls the drive."""
+        return self._far.runner.source.value in ('scmd', 'control_word')
+
+    @property
+    def running(self) -> bool:
+        """The drive carries out a run command that came over the bus."""
+        runner = self._far.runner
+        if self._optimal:
+            return self.by_bus and bool(runner._running)
+        return self.by_bus and runner.state == 'OPERATION_ENABLED'
+
+    @property
+    def standing(self) -> bool:
+        """A run command that came over the bus stands in it, carried out or not."""
+        runner = self._far.runner
+        if self._optimal:
+            return self.by_bus and bool(runner.scmd or runner._steps.run)
+        if runner.source.value == 'scmd':
+            return bool(runner.scmd & 1)
+        return self.by_bus and bool(runner.word & SWITCH_ON)
+
+    @property
+    def turning(self) -> bool:
+        """It turns the motor, or is about to."""
+        motor = self._far.motor
+        return self.running and motor.driven and abs(motor.demand) > 1e-6
+
+    def _present_conditions(self) -> Iterator[bool]:
+        """Return what has to stay as it is for the motor to run on."""
+        yield not self._far.faults
+        yield self.by_bus
+        yield self._far.runner.run_input
+        yield self._far.runner.initialised
+
+    @property
+    def _connected(self) -> bool:
+        snapshot = self._rig.notes.snapshot
+        return snapshot is not None and snapshot.connected
+
+    @property
+    def _steady(self) -> bool:
+        return self.now - self.settled_since > self.noticed
+
+    # --- the laws ---------------------------------------------------------------------------------
+
+    def look(self) -> None:
+        """Judge the present moment."""
+        self._watch_line()
+        self._watch_conditions()
+        self._judge_running()
+        self._judge_commands()
+        self._judge_status()
+        self._judge_silence()
+
+    def end(self) -> None:
+        """Judge everything that was on the line."""
+        found = trace_laws.violations(self._rig.link.frames, -math.inf, self._rig.settings.model)
+        acknowledging = [complaint for complaint in found if 'acknowledges' in complaint]
+        if len(acknowledging) > self._acknowledged or len(found) > len(acknowledging):
+            raise Broken(f'on the line: {found}')
+
+    def _watch_line(self) -> None:
+        if self._rig.link.whole and self._far.listening:
+            if self._whole_since is None:
+                self._whole_since = self.now
+                self._broken_since = None
+                back = FOUND if not self._ours else TAKEN_BACK
+                self._no_run_from = max(self._no_run_from, self.now + back)
+            return
+        self._whole_since = None
+        for command in self._commands:
+            command.undisturbed = False
+        self.disturbed_at = self.now
+        if self._broken_since is None:
+            self._broken_since = self.now
+        lost = LOST if self.active else LOST_IDLE
+        for_good = self.now - self._broken_since > lost and not self._rig.link.losses
+        if self.enabled_at is not None and for_good:
+            self.lose(TAKEN_BACK)
+        # nobody can stop it now
+        self._no_run_from = max(self._no_run_from, self.now + TAKEN_BACK)
+
+    def _watch_conditions(self) -> None:
+        conditions = tuple(self._present_conditions())
+        if conditions == self._conditions:
+            return
+        ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
+        self._conditions = conditions
+        # a G2 does not tell a RUN input that is off from a start that is yet to come
+        if any(ended) and not (ended == [False, False, True, False] and self._pending('enable')):
+            self.lose(self.noticed)
+
+    def _judge_running(self) -> None:
+        running = self.running
+        if not running:
+            self._running_since = None
+        elif self._running_since is None:
+            self._running_since = self.now
+        if not self.watched or self._method == 'monitor':
+            return
+        standing = self.standing
+        self._foreign = self._foreign and standing
+        if not self._optimal and self._far.faults:
+            # it refuses every command
+            self._no_run_from = max(self._no_run_from, self.now + self.noticed)
+        if standing and self.enabled_at is None:
+            self._judge_standing()
+        if self._follows and self.turning and self.enabled_at is not None:
+            self._judge_setpoint(self.enabled_at)
+
+    def _judge_standing(self) -> None:
+        """A run command of a past ride is taken back; one of another master when it is seen."""
+        if self._foreign:
+            since = self.now if self._running_since is None else self._running_since
+            late = max(self._no_run_from, since + self.noticed)
+        else:
+            late = self._no_run_from
+        if self.now > late:
+            raise Broken(f'a run command stands that nobody wants since {self.lost_at:.3f}')
+        self._require_word_of_it()
+
+    def _judge_setpoint(self, enabled_at: float) -> None:
+        if self.now <= self._no_run_from:
+            return
+        at = self._setpoint[0]
+        if at <= enabled_at:
+            raise Broken('it turns although no set-point came since it was enabled')
+        whole_since = self._whole_since
+        if whole_since is None:
+            return
+        late = max(at + SETPOINT_TIMEOUT, whole_since + 2 * RESPONSE_TIMEOUT) + NOTICED
+        if self.now > late:
+            raise Broken(f'it turns by a set-point from {at:.3f} at {self.now:.3f}')
+
+    def _require_word_of_it(self) -> None:
+        """A motor that runs and cannot be stopped is loudly said to."""
+        if not self._ours or self._running_since is None:
+            return
+        since = max(self._running_since, self.lost_at)
+        if self.now > since + SAID and not self._said(since, 'CANNOT STOP'):
+            raise Broken(f'it runs since {since:.3f}, and nobody says that it cannot be stopped')
+
+    def _said(self, since: float, what: str) -> bool:
+        return any(
+            at >= since and severity is Severity.ERROR and what in text
+            for at, severity, text in self._rig.notes.events
+        )
+
+    def _judge_commands(self) -> None:
+        for command in tuple(self._commands):
+            if command.future.done():
+                self._commands.remove(command)
+                self._judge_answer(command)
+            elif self.now > command.at + LONGEST_COMMAND:
+                raise Broken(f'{command.name} is never answered')
+
+    def _judge_answer(self, command: _Command) -> None:
+        error = command.future.exception()
+        if error is not None and type(error).__name__ != 'DriveError':
+            raise Broken(f'{command.name} raised {error!r}')
+        if command.name == 'enable':
+            self._judge_enabled(command, error)
+        elif command.name in _STOPS and self._method != 'monitor':
+            untouched = self.disturbed_at + NOTICED_IDLE < command.at and self.enabled_at is None
+            if error is None and untouched and self.running:
+                raise Broken(f'{command.name} is answered although it runs')
+            local = not self.by_bus or bool(self._far.faults)
+            if error is not None and untouched and command.undisturbed and not local:
+                raise Broken(f'{command.name} failed for no reason: {error}')
+
+    def _judge_enabled(self, command: _Command, error: BaseException | None) -> None:
+        if error is None:
+            self._enabled_for_sure = self.enabled_at is not None
+            return
+        ours = self.enabled_at is not None and self.enabled_at <= command.at
+        if ours and not self._pending('enable'):
+            self.lose(CARRIED_OUT)
+
+    def _judge_silence(self) -> None:
+        """Keep the drive's own time-out from striking."""
+        sio_tot = self._rig.settings.drive_timeout
+        if not sio_tot or not self._steady or not self._connected:
+            return
+        if self.now - self._rig.link.asked_at > sio_tot / 2:
+            raise Broken('the bus was silent for longer than half the time-out of the drive')
+
+    # --- what is written --------------------------------------------------------------------------
+
+    def _wrote(self, register: int, words: tuple[int, ...]) -> None:
+        if self._method == 'monitor':
+            raise Broken(f'monitor wrote {register:04X}h')
+        word = words[-1] if register == MASK else words[0]
+        controls = register in (CONTROL, MASK)
+        if controls and not self._optimal and word & FORWARD and word & REVERSE:
+            raise Broken('both directions at once')
+        if register == MODE and word not in (MODE_STOP, MODE_BUS):
+            raise Broken(f'MODE = {word}')
+        if controls and self._method != 'drive_control':
+            raise Broken('a control word in mode_scmd')
+        if register == SCMD and self._method != 'mode_scmd':
+            raise Broken('SCMD in drive_control')
+        if register == MODE and self._method == 'drive_control' and word != MODE_STOP:
+            raise Broken('MODE = 3 in drive_control')
+        self._note_stop(register, word)
+
+    def _note_stop(self, register: int, word: int) -> None:
+        """Let a stop go ahead of everything but what it has to read itself."""
+        if self._stop_due is None:
+            return
+        stops = (
+            (register == SCMD and word == 0)
+            or (register == MODE and word == MODE_STOP)
+            or (register in (CONTROL, MASK) and not word & SWITCH_ON)
+        )
+        before = len(self._rig.link.frames) - self._stop_due
+        if stops:
+            self._stop_due = None
+        most = 2 if self._optimal and self._method == 'drive_control' else 1
+        if before > most:
+            raise Broken(f'{before} transactions went ahead of a stop')
+
+    # --- what is told -----------------------------------------------------------------------------
+
+    def _facts(self) -> dict[str, Any]:
+        """Return what is true of the drive now, by the names of what is told of it."""
+        far = self._far
+        truth = {
+            'code': far.inv_st,
+            'fault': bool(far.faults),
+            'by bus': self.by_bus,
+            'running': self.running,
+            'limit': far.motor.limited,
+            'frequency': round(far.motor.frequency, 1),
+        }
+        if self._optimal:
+            truth['run input missing'] = not far.runner.run_input
+            truth['sleeping'] = bool(far.runner._sleeping)
+        else:
+            truth['control mode'] = str(far.peek('control.mode'))
+        return truth
+
+    @staticmethod
+    def _told(snapshot: Snapshot) -> dict[str, Any]:
+        """Return what the driver says of it."""
+        seen = snapshot.status
+        if seen is None:
+            return {}
+        return {
+            'code': seen.code,
+            'fault': snapshot.kind.value == 'fault',
+            'by bus': _has(seen, 'NETWORK_CONTROL'),
+            'running': seen.runs and seen.from_bus,
+            'limit': _has(seen, 'LIMIT_ACTIVE'),
+            'run input missing': _has(seen, 'RUN_INPUT_MISSING'),
+            'sleeping': _has(seen, 'SLEEPING'),
+            'control mode': snapshot.control_mode,
+            'frequency': snapshot.frequency,
+        }
+
+    def _judge_status(self) -> None:
+        truth = self._facts()
+        for name, value in truth.items():
+            if name not in self._truth or self._truth[name][0] != value:
+                self._truth[name] = value, self.now
+        snapshot = self._rig.notes.snapshot
+        if not self.watched or snapshot is None:
+            return
+        self._judge_connected(snapshot)
+        if not snapshot.connected:
+            return
+        told = self._told(snapshot)
+        known_since = max(self.settled_since, self._active_at)
+        for name, (value, since) in self._truth.items():
+            patience = self.noticed + (CONTROL_MODE_PERIOD if name == 'control mode' else 0.0)
+            if self.now - max(since, known_since) <= patience:
+                continue
+            if not _agree(told[name], value):
+                raise Broken(f'{name} is told as {told[name]}, and it is {value}')
+        running, since = self._truth['running']
+        long_since = self.now - max(since, known_since) > self.noticed
+        if snapshot.enabled and not running and long_since:
+            raise Broken('it is told as enabled, and it does not run')
+
+    def _judge_connected(self, snapshot: Snapshot) -> None:
+        if self._broken_since is not None and snapshot.connected:
+            lost = LOST if self.active and self._active_at < self._broken_since else LOST_IDLE
+            if self.now - self._broken_since > lost and not self._rig.link.losses:
+                raise Broken('it is told as connected, and it is not')
+        if self._whole_since is None or snapshot.connected:
+            return
+        if self.now - max(self._whole_since, self._watched_at) > FOUND:
+            raise Broken('it is told as not connected, and it is there')
+
+
+def _has(seen: Any, name: str) -> bool:
+    """Tell whether a status has a fact."""
+    return bool(seen.facts & type(seen.facts)[name])
+
+
+def _agree(told: Any, value: Any) -> bool:
+    if isinstance(value, float):
+        return bool(abs(told - value) < 0.3)
+    return bool(told == value)
+

@@ -1,0 +1,300 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A drive, its bus and the simulated drive in virtual time: one thread, nothing waits, all repeats.
+
+The link hands each request to the simulated drive at once and lets the clock go on by the times of
+the frames; the bus is stepped in place of its worker. So a minute of a drive takes a fraction of a
+second, and the same history always goes the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Iterator
+from collections.abc import Sequence
+from concurrent.futures import Future
+import contextlib
+import struct
+import sys
+import time
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.refusal import Refused as FarRefusal
+
+#: One byte at 57600 8E1, the silence between frames, and what the drive takes to answer, s.
+_CHARACTER = 11 / 57600
+_GAP = 0.00175
+_TURNAROUND = 0.001
+RESPONSE_TIMEOUT = 0.1
+#: How late an answer may come before it counts as lost, s.
+_LATEST = RESPONSE_TIMEOUT
+#: The longest step in which nothing is looked at, s.
+_SLICE = 0.02
+#: How often a program sends its set-point, s.
+_SENDING_PERIOD = 0.1
+
+
+class Clock:
+    """The steady clock of everything in the rig."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    @contextlib.contextmanager
+    def in_driver(self) -> Iterator[None]:
+        """Let the driver see this clock."""
+        seen = SimpleNamespace(monotonic=self.monotonic)
+        with contextlib.ExitStack() as stack:
+            for name, module in tuple(sys.modules.items()):
+                driver = name.startswith('nfo_sinus_driver.') and '.simulator' not in name
+                if driver and getattr(module, 'time', None) is time:
+                    stack.enter_context(mock.patch.object(module, 'time', seen))
+            yield
+
+
+class Notes:
+    """A listener that keeps what the laws need."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.snapshot: Snapshot | None = None
+        self.events: list[tuple[float, Severity, str]] = []
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        self.snapshot = snapshot
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        pass
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        pass
+
+    def on_event(self, severity: Severity, text: str) -> None:
+        self.events.append((self._clock.now, severity, text))
+
+
+class _Told:
+    """Questions of which none is left."""
+
+    done = True
+    found = Identification()
+
+    def ask(self) -> Reply:
+        raise AssertionError
+
+
+class DirectLink:
+    """
+    The line to one simulated drive.
+
+    :ivar state: ``whole``; ``silent``: nobody hears; ``deaf``: carried out, but no answer comes;
+        ``noise``: carried out, the answer is damaged; ``late``: it comes when nobody waits for it
+        any more; ``gone``: the port is.
+    :ivar losses: how many answers are still lost although the line is whole.
+    :ivar frames: every request, for :mod:`support.trace_laws`.
+    """
+
+    space = 'modbus'
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self.state = 'whole'
+        self.losses = 0
+        self.frames: list[dict[str, Any]] = []
+        self.asked_at = rig.clock.now
+        self._not_ready_until = 0.0
+
+    @property
+    def whole(self) -> bool:
+        return self.state == 'whole' and not self.losses
+
+    def open(self) -> None:
+        self._require_port()
+
+    def close(self) -> None:
+        pass
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        pass
+
+    def identify(self, unit: int) -> _Told:
+        return _Told()
+
+    def read(self, unit: int, address: Address) -> Reply:
+        if self._rig.clock.now < self._not_ready_until:
+            raise NotReady(self._not_ready_until)
+        register, count = address.numbers[0], address.words
+        request = struct.pack('>BBHH', unit, 3, register, count)
+        words = self._exchange(request, 5 + 2 * count, lambda far: far.read(register, count))
+        return Reply(words, self._rig.clock.now)
+
+    def write(self, unit: int, address: Address, words: Words) -> Reply:
+        register, count = address.numbers[0], address.words
+        if count == 1:
+            request = struct.pack('>BBHH', unit, 6, register, words[0])
+        else:
+            head = struct.pack('>BBHHB', unit, 16, register, count, 2 * count)
+            request = head + struct.pack(f'>{count}H', *words)
+
+        def carry_out(far: SimulatedDrive) -> Words:
+            far.write(register, words)
+            return ()
+
+        self._rig.judge(lambda: self._rig.wrote(register, words))
+        self._exchange(request, 8, carry_out)
+        return Reply((), self._rig.clock.now)
+
+    def _require_port(self) -> None:
+        if self.state == 'gone':
+            raise PortError('the port is gone')
+
+    def _exchange(
+        self, request: bytes, length: int, carry_out: Callable[[SimulatedDrive], Words]
+    ) -> Words:
+        rig = self._rig
+        self._require_port()
+        self.asked_at = rig.clock.now
+        frame = (request + b'\0\0').hex()
+        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame})
+        rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
+        if self.state == 'silent' or not rig.far.listening:
+            rig.elapse(RESPONSE_TIMEOUT)
+            raise NoAnswer('nobody answers')
+        rig.far.heard()
+        refusal = None
+        try:
+            words = carry_out(rig.far)
+        except FarRefusal as error:
+            words, length, refusal = (), 5, error
+        if not self.whole:
+            self._lose_answer()
+        rig.elapse(_TURNAROUND + length * _CHARACTER)
+        if refusal is not None:
+            raise Refused(int(refusal.reason))
+        return words
+
+    def _lose_answer(self) -> None:
+        self.losses -= self.losses > 0
+        self._rig.elapse(RESPONSE_TIMEOUT)
+        if self.state == 'noise':
+            raise DamagedAnswer('what came is no answer')
+        if self.state == 'late':
+            self._not_ready_until = self._rig.clock.now + _LATEST
+        raise NoAnswer('nobody answers')
+
+
+class Rig:
+    """
+    The driver of one drive, and the drive.
+
+    :param far: the simulated drive.
+    :ivar looked: called whenever something may have happened.
+    :ivar wrote: called with each write, register and words, before it is sent.
+    """
+
+    def __init__(self, far: SimulatedDrive, settings: DriveSettings) -> None:
+        self.clock = Clock()
+        self._stack = contextlib.ExitStack()
+        self._stack.enter_context(self.clock.in_driver())
+        self.far = far
+        self.far.advance_to(self.clock.now)
+        self.settings = settings
+        self.looked: Callable[[], None] = lambda: None
+        self.wrote: Callable[[int, Words], None] = lambda register, words: None
+        self.link = DirectLink(self)
+        self._broken: AssertionError | None = None
+        self._sent: float | None = None
+        self._send_at = 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """Start a driver."""
+        self.notes = Notes(self.clock)
+        self.bus = Bus(self.link)
+        self.drive = Drive(self.bus, self.settings, self.notes)
+
+    def kill(self) -> None:
+        """End the driver without a word to the drive, as a power cut of the computer does."""
+        self.bus.close()
+
+    def close(self) -> None:
+        self.kill()
+        self._stack.close()
+
+    def send(self, value: float | None) -> None:
+        """Let a program send a set-point again and again from now on; ``None``: it ends."""
+        self._sent = value
+        self._send_at = self.clock.now
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for all."""
+        end = self.clock.now + seconds
+        while self.clock.now < end:
+            if self._sent is not None and self.clock.now >= self._send_at:
+                self._send_at = self.clock.now + _SENDING_PERIOD
+                self.drive.set_setpoint(self._sent)
+                self.gave(self._sent)
+            until = min(self.bus.step(), end, self.clock.now + _SLICE)
+            self.judge(self.looked)
+            if self._broken is not None:
+                raise self._broken
+            if until > self.clock.now:
+                self.elapse(until - self.clock.now)
+
+    def gave(self, value: float) -> None:
+        """Take note of a set-point that was given; whoever wants to know puts himself here."""
+
+    def answer(self, future: Future[Any], patience: float = 60.0) -> str:
+        """Let time pass until a command is answered; return what it says, done or not."""
+        end = self.clock.now + patience
+        while not future.done():
+            assert self.clock.now < end, 'no answer'
+            self.pass_time(_SLICE)
+        return str(future.exception() or future.result())
+
+    def elapse(self, seconds: float) -> None:
+        """Let time pass while the driver waits."""
+        self.clock.now += seconds
+        self.far.advance_to(self.clock.now)
+        self.judge(self.looked)
+
+    def judge(self, look: Callable[[], None]) -> None:
+        """Keep what a look complains of until it can be raised: a driver survives everything."""
+        try:
+            look()
+        except AssertionError as complaint:
+            self._broken = self._broken or complaint

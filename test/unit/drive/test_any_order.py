@@ -1,0 +1,445 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Commands, events of the drive and losses of the line in any order; see ``any_order_laws.py``.
+
+Hypothesis makes up the histories, and shortens one that breaks a law to what is needed for it. What
+it prints then can be run as it stands.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+from typing import ClassVar
+
+from any_order_laws import MODE_BUS
+from any_order_laws import POLL_RATE
+from any_order_laws import RUN_FIELDBUS
+from any_order_laws import SETPOINT_TIMEOUT
+from any_order_laws import SHUTDOWN_TIMEOUT
+from any_order_laws import Laws
+from any_order_rig import Rig
+from hypothesis import HealthCheck
+from hypothesis import Phase
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine
+from hypothesis.stateful import initialize
+from hypothesis.stateful import precondition
+from hypothesis.stateful import rule
+from hypothesis.stateful import run_state_machine_as_test
+import pytest
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.refusal import Refused
+
+#: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
+WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
+SETPOINTS = st.sampled_from((20.0, -20.0, 0.0, 5.0, 50.0, 400.0, -1e5, 0.004))
+#: Faults of the motor, the mains, the serial line and the fieldbus; 15 wants no acknowledgement.
+FAULTS = st.sampled_from((5, 7, 12, 14, 15))
+
+#: How many histories each machine has in a campaign; 0: a normal run.
+HISTORIES = int(os.environ.get('HISTORIES', '0'))
+#: Always the same histories, so that what passes once passes on every machine.
+NORMAL = settings(
+    max_examples=25,
+    stateful_step_count=40,
+    derandomize=True,
+    deadline=None,
+    database=None,
+    phases=(Phase.generate,),
+    suppress_health_check=list(HealthCheck),
+    print_blob=False,
+)
+#: Others each time; what breaks a law is shortened.
+CAMPAIGN = settings(
+    NORMAL,
+    max_examples=max(HISTORIES, 1),
+    derandomize=False,
+    phases=(Phase.generate, Phase.shrink),
+)
+
+_CONTROL = 'fieldbus.drive_control'
+_whole = precondition(lambda self: self.rig.link.whole)
+_driven = precondition(lambda self: self.laws.watched)
+
+
+class AnyOrder(RuleBasedStateMachine):
+    """The rules; each ends with some time that passes."""
+
+    model: ClassVar[str] = 'sinus_g2'
+    method: ClassVar[str] = 'mode_scmd'
+    reference: ClassVar[str] = 'fieldbus'
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rig: Rig
+        self.laws: Laws
+
+    @initialize(
+        control_mode=st.sampled_from(('Freque', 'Freque', 'Speed', 'Torque', 'PI-Reg')),
+        brake=st.booleans(),
+        slow=st.booleans(),
+        delay=st.sampled_from((0, 0, 1)),
+        drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
+    )
+    def begin(
+        self,
+        control_mode: str = 'Freque',
+        brake: bool = True,
+        slow: bool = False,
+        delay: int = 0,
+        drive_timeout: float = 0.0,
+    ) -> None:
+        optimal = self.model == 'sinus_optimal'
+        if optimal and control_mode not in ('Freque', 'Speed'):
+            control_mode = 'Freque'
+        parameters: dict[str, Any] = {
+            'control.mode': control_mode,
+            'control.st_mode': 'Brake' if brake else 'Release',
+            'control.accel': 0.3,
+            'control.retard': 3.0 if slow else 0.3,
+            'control.run_dly': delay,
+        }
+        far = SimulatedDrive(self.model, settings=parameters)
+        self.rig = Rig(
+            far,
+            DriveSettings(
+                model=self.model,
+                control_method=self.method,
+                reference=self.reference,
+                expected_control_mode=control_mode if optimal else '',
+                poll_rate=POLL_RATE,
+                telemetry_rate=1.0,
+                setpoint_timeout=SETPOINT_TIMEOUT,
+                shutdown_timeout=SHUTDOWN_TIMEOUT,
+                drive_timeout=0.0 if optimal or self.method == 'monitor' else drive_timeout,
+            ),
+        )
+        self.laws = Laws(self.rig)
+        self.connect()
+        self.activate()
+
+    def teardown(self) -> None:
+        if hasattr(self, 'rig'):
+            try:
+                self.laws.end()
+            finally:
+                self.rig.close()
+
+    def let(self, wait: float) -> None:
+        """Let time pass, and judge."""
+        self.rig.judge(self.rig.looked)
+        self.rig.pass_time(wait)
+
+    def until_noticed(self) -> None:
+        """Let what has happened last be noticed, if it can be."""
+        self.rig.pass_time(self.laws.noticed)
+
+    # --- commands ---------------------------------------------------------------------------------
+
+    @precondition(lambda self: not self.laws.watched)
+    @rule(wait=WAITS)
+    def connect(self, wait: float = 0.1) -> None:
+        future = self.rig.drive.connect(patient=False)
+        self.rig.answer(future)
+        if future.exception() is None:
+            self.laws.connected()
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def activate(self, wait: float = 0.1) -> None:
+        self.rig.drive.activate()
+        self.laws.activated()
+        self.let(wait)
+
+    def _give(self, name: str, wait: float) -> None:
+        self.laws.command(name, getattr(self.rig.drive, name)())
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def enable(self, wait: float = 1.0) -> None:
+        self._give('enable', wait)
+
+    @_driven
+    @rule(value=SETPOINTS, wait=WAITS)
+    def run(self, value: float = 20.0, wait: float = 1.0) -> None:
+        """Enable it and send set-points, as a program does."""
+        self._give('enable', 0.4)
+        self.send(value, wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def stop(self, wait: float = 0.4) -> None:
+        self._give('stop', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def quick_stop(self, wait: float = 0.4) -> None:
+        self._give('quick_stop', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def acknowledge(self, wait: float = 0.4) -> None:
+        self._give('acknowledge', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def deactivate(self, wait: float = 0.4) -> None:
+        self._give('deactivate', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def clean_up(self, wait: float = 0.4) -> None:
+        future = self.rig.drive.disconnect(SHUTDOWN_TIMEOUT)
+        self.laws.command('disconnect', future)
+        self.rig.answer(future)
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def shut_down(self, wait: float = 0.4) -> None:
+        """End the driver as a signal does, and start another."""
+        for name, give in (
+            ('stop_for_good', self.rig.drive.stop_for_good),
+            ('disconnect', self.rig.drive.disconnect),
+        ):
+            future = give(SHUTDOWN_TIMEOUT)
+            self.laws.command(name, future)
+            self.rig.answer(future)
+        self.kill(wait)
+
+    @rule(wait=WAITS)
+    def kill(self, wait: float = 0.4) -> None:
+        """End the driver as a power cut of its computer does, and start another."""
+        self.rig.send(None)
+        self.rig.kill()
+        self.laws.killed()
+        self.rig.begin()
+        self.let(wait)
+        self.connect()
+        if self.laws.watched:
+            self.activate()
+
+    @precondition(lambda self: self.reference == 'fieldbus')
+    @rule(value=SETPOINTS, wait=WAITS)
+    def set_once(self, value: float = 20.0, wait: float = 0.1) -> None:
+        self.rig.drive.set_setpoint(value)
+        self.laws.gave(value)
+        self.let(wait)
+
+    @precondition(lambda self: self.reference == 'fieldbus')
+    @rule(value=st.none() | SETPOINTS, wait=WAITS)
+    def send(self, value: float | None = 20.0, wait: float = 1.0) -> None:
+        """Let a program send set-points from now on, or no more."""
+        if self.reference == 'fieldbus':
+            self.rig.send(value)
+        self.let(wait)
+
+    @rule(value=st.sampled_from((float('nan'), float('inf'))))
+    def send_no_number(self, value: float) -> None:
+        with pytest.raises((ValueError, DriveError)):
+            self.rig.drive.set_setpoint(value)
+
+    @_driven
+    @precondition(lambda self: self.model == 'sinus_g2')
+    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
+    def set_control_mode(self, mode: str, wait: float = 0.4) -> None:
+        if self.method != 'monitor':
+            self.until_noticed()
+            change = self.rig.drive.parameters.change({'control.mode': mode})
+            self.rig.answer(change)
+            self.let(wait)
+
+    # --- what the drive does ----------------------------------------------------------------------
+
+    @rule(code=FAULTS, standing=st.booleans(), wait=WAITS)
+    def fault(self, code: int, standing: bool = False, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        self.rig.far.trip(code, cause_present=standing)
+        self.let(wait)
+
+    @precondition(lambda self: self.rig.far.faults)
+    @rule(wait=WAITS)
+    def end_cause(self, wait: float = 0.4) -> None:
+        self.rig.far.end_fault_causes()
+        self.let(wait)
+
+    @precondition(lambda self: self.rig.far.faults and self.rig.link.whole)
+    @rule(wait=WAITS)
+    def end_fault(self, wait: float = 1.0) -> None:
+        """Let the drive forget its fault, by its keypad or as RstDly says."""
+        self.until_noticed()
+        self.laws.disturbed()
+        self.rig.far.end_fault_causes()
+        self.rig.far.faults.acknowledge()
+        self.rig.far.faults.acknowledge_serial()
+        self.rig.far.set_run_input(self.rig.far.runner.run_input)
+        self.let(wait)
+
+    @rule(key=st.sampled_from(('stop', 'start', 'ext')), wait=WAITS)
+    def press(self, key: str, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        getattr(self.rig.far, f'press_{key}')()
+        self.let(wait)
+
+    @rule(mode=st.sampled_from((1, 2, 3)), wait=WAITS)
+    def write_mode(self, mode: int, wait: float = 0.4) -> None:
+        """Let somebody else write MODE."""
+        self._by_another(('fieldbus.mode', mode))
+        if mode == MODE_BUS:
+            self.laws.forgotten()
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: self.reference == 'fieldbus' and not self.laws.enabling)
+    @rule(wait=WAITS)
+    def run_by_another(self, wait: float = 1.0) -> None:
+        """Let another master run the motor, the way this driver would."""
+        self.until_noticed()
+        setpoint = self.rig.far.runner.setpoint_key
+        if self.method == 'drive_control':
+            words = (0xC076, 0xC077, 0xC07F)
+            self._by_another(*((_CONTROL, word) for word in words), (setpoint, 100))
+        else:
+            command = 'fieldbus.smode' if self.model == 'sinus_optimal' else 'fieldbus.scmd'
+            mode = ('fieldbus.mode', MODE_BUS)
+            self._by_another(mode, (setpoint, 100), (command, RUN_FIELDBUS))
+        self.laws.started_by_another()
+        self.let(wait)
+
+    def _by_another(self, *writes: tuple[str, int]) -> None:
+        self.laws.disturbed()
+        for key, raw in writes:
+            try:
+                self.rig.far.write_raw(key, raw)
+            except Refused:
+                return
+
+    @rule(wait=WAITS)
+    def run_input_off(self, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        self.rig.far.set_run_input(False)
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: not self.rig.far.runner.run_input)
+    @rule(wait=WAITS)
+    def run_input_on(self, wait: float = 1.0) -> None:
+        self.until_noticed()
+        self.laws.disturbed()
+        self.rig.far.set_run_input(True)
+        self.let(wait)
+
+    @rule(share=st.sampled_from((0.3, 3.0)), wait=WAITS)
+    def load(self, share: float, wait: float = 1.0) -> None:
+        """Load the motor; 3.0 is more than the current limit lets it turn."""
+        self.rig.far.motor.load = share
+        self.let(wait)
+
+    @rule(boot=st.sampled_from((0.05, 0.5, 2.0)), wait=WAITS)
+    def power_cycle(self, boot: float, wait: float = 1.0) -> None:
+        self.laws.disturbed()
+        self.rig.far.power_cycle(boot)
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: self.model == 'sinus_g2')
+    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
+    def set_control_mode_at_keypad(self, mode: str, wait: float = 1.0) -> None:
+        self.until_noticed()
+        if self.rig.far.peek('control.mode') != mode:
+            self.rig.far.set_from_keypad('control.mode', mode)
+            self.laws.control_mode_changed()
+        self.let(wait)
+        self.until_noticed()
+
+    # --- what the line does -----------------------------------------------------------------------
+
+    @_whole
+    @rule(state=st.sampled_from(('silent', 'deaf', 'noise', 'late', 'gone')), wait=WAITS)
+    def break_line(self, state: str, wait: float = 1.0) -> None:
+        self.rig.link.state = state
+        self.let(wait)
+
+    @precondition(lambda self: not self.rig.link.whole)
+    @rule(wait=WAITS)
+    def mend_line(self, wait: float = 1.0) -> None:
+        self.rig.link.state, self.rig.link.losses = 'whole', 0
+        self.let(wait)
+
+    @_whole
+    @rule(losses=st.integers(1, 3), wait=WAITS)
+    def lose_answers(self, losses: int, wait: float = 0.4) -> None:
+        self.rig.link.losses = losses
+        self.let(wait)
+
+    @rule(seconds=st.sampled_from((0.05, 0.3, 2.0)), wait=WAITS)
+    def hold_silent(self, seconds: float, wait: float = 1.0) -> None:
+        self.rig.far.silence(seconds)
+        self.let(wait)
+
+    @rule(wait=st.sampled_from((1.0, 4.0)))
+    def nothing(self, wait: float) -> None:
+        self.let(wait)
+
+
+class G2ModeScmd(AnyOrder):
+    pass
+
+
+class G2DriveControl(AnyOrder):
+    method = 'drive_control'
+
+
+class OptimalModeScmd(AnyOrder):
+    model = 'sinus_optimal'
+
+
+class OptimalDriveControl(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'drive_control'
+    reference = 'terminal'
+
+
+class G2Monitor(AnyOrder):
+    method = 'monitor'
+
+
+class OptimalMonitor(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'monitor'
+
+
+MACHINES = (
+    G2ModeScmd,
+    G2DriveControl,
+    OptimalModeScmd,
+    OptimalDriveControl,
+    G2Monitor,
+    OptimalMonitor,
+)
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize('machine', MACHINES)
+def test_any_order(machine: type[AnyOrder]) -> None:
+    run_state_machine_as_test(machine, settings=CAMPAIGN if HISTORIES else NORMAL)
