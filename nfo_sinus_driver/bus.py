@@ -68,8 +68,6 @@ _T = TypeVar('_T')
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
 
-#: Earlier than any moment of the steady clock.
-_AT_ONCE = 0.0
 _NOWHERE = Address((), 0)
 
 
@@ -300,7 +298,7 @@ class Bus:
         if not self._port.is_open:
             self._fail_all(self._port.error)
             return min(self._sleepers.next_moment, self._port.reopen_at)
-        return _AT_ONCE if self._send_next() else self._sleepers.next_moment
+        return -math.inf if self._send_next() else self._sleepers.next_moment
 
     def _take_in(self) -> None:
         while self._inbox:
@@ -324,10 +322,8 @@ class Bus:
 
     def _rest(self, until: float) -> None:
         """Sleep until something is asked for or a moment has come."""
-        if self._inbox or self._stopping or until == _AT_ONCE:
-            return
-        wait = None if math.isinf(until) else max(0.0, until - time.monotonic())
-        self._awake.wait(wait)
+        if not self._inbox and not self._stopping:
+            self._awake.wait(None if until == math.inf else max(0.0, until - time.monotonic()))
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
         """Step a task and file what it awaits next."""
@@ -352,13 +348,11 @@ class Bus:
     def _send_next(self) -> bool:
         """Send what is most urgent; false if there is nothing to send."""
         entry = self._turns.take()
-        if entry is None:
-            return False
         if isinstance(entry, Slot):
             self._write_slot(entry)
-        else:
+        elif entry is not None:
             self._exchange(*entry)
-        return True
+        return entry is not None
 
     def _write_slot(self, slot: Slot) -> None:
         slot.pending = False

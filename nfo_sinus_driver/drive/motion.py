@@ -405,14 +405,13 @@ class Motion:
                 return
             if seen.faulted:
                 raise DriveError(f'the drive did not start: {self._inverter.describe()}')
-            if Fact.RUN_INPUT_MISSING in seen.facts:
+            # in standby after the start delay it has forgotten the start, and must not wait for
+            # another one
+            if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
                 raise DriveError(NO_RUN_INPUT)
             if seen.code == seen.codes.start_delay and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()
-            elif delayed and seen.standby:
-                # it forgot the start: the run command must not wait for another
-                raise DriveError(_NO_RUN)
             if time.monotonic() > deadline:
                 raise DriveError(
                     NO_RUN_INPUT

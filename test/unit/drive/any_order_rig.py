@@ -34,9 +34,12 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from support.wire import crc
+
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -77,7 +80,7 @@ class Clock:
     @contextlib.contextmanager
     def in_driver(self) -> Iterator[None]:
         """Let the driver see this clock."""
-        seen = SimpleNamespace(monotonic=self.monotonic)
+        seen = SimpleNamespace(monotonic=self.monotonic, time=self.monotonic)
         with contextlib.ExitStack() as stack:
             for name, module in tuple(sys.modules.items()):
                 driver = name.startswith('nfo_sinus_driver.') and '.simulator' not in name
@@ -101,6 +104,9 @@ class Notes:
         pass
 
     def on_parameters(self, keys: Collection[str]) -> None:
+        pass
+
+    def on_log_entry(self, entry: LogEntry) -> None:
         pass
 
     def on_event(self, severity: Severity, text: str) -> None:
@@ -188,7 +194,7 @@ class DirectLink:
         rig = self._rig
         self._require_port()
         self.asked_at = rig.clock.now
-        frame = (request + b'\0\0').hex()
+        frame = (request + crc(request).to_bytes(2, 'little')).hex()
         self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame})
         rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
         if self.state == 'silent' or not rig.far.listening:
