@@ -109,6 +109,7 @@ def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
         wait_until(lambda: simulator.state()['frequency'] < -1.0, 'it turns the other way')
 
 
+@needs('parameters')
 def test_newest_valid_set_point_counts_whichever_topic_it_came_from(bench: Bench) -> None:
     simulator, client = start(bench, '-p', 'setpoint_timeout:=0.0', '-p', 'joint_name:=belt')
     assert client.enable().success

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import fcntl
 import json
 import os
 from pathlib import Path
@@ -235,7 +236,8 @@ def test_output_that_nobody_reads_any_more(bench: Bench) -> None:
 
 def test_output_that_is_not_read_keeps_nothing_waiting(bench: Bench) -> None:
     with bench.riding('--period', 0.01, '--json') as process:
-        # a pipe holds 64 KiB, which is some hundred lines
+        assert process.stdout
+        fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, 4096)
         wait_until(lambda: is_full(process))
         before = bench.state()['frequency']
         process.send_signal(signal.SIGTERM)
@@ -339,7 +341,11 @@ def test_a_fault(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ('what', 'value', 'said'),
-    [('run', 'off', 'RUN input'), ('keypad', 'stop', 'took control'), ('power-cycle', 1, '')],
+    [
+        ('run', 'off', 'RUN input'),
+        ('keypad', 'stop', 'pressed STOP at the keypad'),
+        ('power-cycle', 1, ''),
+    ],
 )
 def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -> None:
     with bench.riding(*HASTY) as process:
