@@ -26,6 +26,7 @@ from nfo_sinus_msgs.msg import Setpoint
 import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
+from ways import needs
 
 _RADIANS = 2 * math.pi
 #: The simulated motor has two pole pairs: 20 Hz are 10 turns a second without slip.
