@@ -36,6 +36,12 @@ _METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
 _SIGNALS = 'nfo_sinus_driver/signals.py'
+_WITHDRAWAL = 'nfo_sinus_driver/drive/withdrawal.py'
+_CONTROL = 'nfo_sinus_driver/drive/drive_control.py'
+_ANY_ORDER = 'test/unit/drive/test_any_order.py'
+_G2_SCMD = (_ANY_ORDER, '-k', 'G2ModeScmd')
+_G2_CONTROL = (_ANY_ORDER, '-k', 'G2DriveControl')
+_OPTIMAL_SCMD = (_ANY_ORDER, '-k', 'OptimalModeScmd')
 
 
 @dataclass(frozen=True)
@@ -390,5 +396,206 @@ MUTANTS = (
         'safety function',
         'function',
         ('test/unit/test_docs.py',),
+    ),
+    # what the histories of any order have to notice
+    *(
+        Mutant(
+            2,
+            f'{what} does not disarm ({tests[-1]})',
+            _MOTION,
+            '            if reason:\n',
+            new,
+            tests,
+        )
+        for tests in (_G2_SCMD, _G2_CONTROL, _OPTIMAL_SCMD)
+        for what, new in (
+            ('in any order: a fault', '            if reason and not seen.faulted:\n'),
+            (
+                'in any order: keypad, terminals or another master',
+                '            if reason and (seen.from_bus or seen.faulted):\n',
+            ),
+            (
+                'in any order: a lost RUN input',
+                '            if reason and (seen.runs or seen.faulted or not seen.from_bus):\n',
+            ),
+        )
+    ),
+    Mutant(
+        2,
+        'in any order: a lost line does not disarm',
+        _WATCH,
+        '                self._motion.lost()',
+        '                pass',
+        _G2_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: a driver that begins lets run what runs',
+        _MOTION,
+        '        if await self._method.in_control(Priority.SERVICE):\n            seen',
+        '        self._changed_at = float("inf")\n        if False:\n            seen',
+        _G2_CONTROL,
+    ),
+    Mutant(
+        2,
+        'in any order: another control mode does not disarm',
+        _MOTION,
+        '        if control_mode != self._setpoint.control_mode:',
+        '        if False:',
+        _G2_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: no set-point 0 before a run command',
+        _MOTION,
+        '            await self._method.zero_setpoint(control_mode, Priority.SERVICE)\n',
+        '            pass\n',
+        _G2_CONTROL,
+    ),
+    Mutant(
+        2,
+        'in any order: a set-point from before enable is taken over',
+        _SETPOINT,
+        '        self._armed_at = time.monotonic()\n',
+        '        self._armed_at = 0.0\n        self._bus.request(self._slot)\n',
+        _OPTIMAL_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: a refused enable leaves its run command standing',
+        _MOTION,
+        'a run command may stand by now\n            self._withdrawal.begin()',
+        'a run command may stand by now',
+        _G2_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: what ends a ride leaves the run command standing',
+        _MOTION,
+        '        self.disarm()\n        self._withdrawal.begin()\n'
+        '        seen = self._inverter.seen\n        if seen',
+        '        self.disarm()\n        seen = self._inverter.seen\n        if seen',
+        _G2_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: a stop that a fault holds is forgotten',
+        _WITHDRAWAL,
+        '        return not refusal and not seen',
+        '        return self.held_by_fault or not refusal and not seen',
+        _G2_SCMD,
+    ),
+    Mutant(
+        2,
+        'in any order: a start that the RUN input ended waits for it',
+        _MOTION,
+        '            elif delayed and seen.standby:',
+        '            elif False:',
+        ('test/unit/drive/test_any_order_found.py',),
+    ),
+    Mutant(
+        3,
+        'in any order: an old set-point is followed for ever',
+        _SETPOINT,
+        'left = last + timeout - time.monotonic() if timeout else math.inf',
+        'left = math.inf',
+        _OPTIMAL_SCMD,
+    ),
+    Mutant(
+        3,
+        'in any order: a stop is answered before it is confirmed',
+        _WITHDRAWAL,
+        '        while task is not None and not await',
+        '        while False and not await',
+        _G2_SCMD,
+    ),
+    Mutant(
+        3,
+        'in any order: a motor that cannot be stopped is not said to be',
+        _WITHDRAWAL,
+        '            if time.monotonic() >= complain_at:',
+        '            if False:',
+        _G2_SCMD,
+    ),
+    Mutant(
+        3,
+        'in any order: a stop waits behind everything else',
+        _METHOD,
+        'write(self._command, Scmd.STOP, Priority.STOP, once=True)',
+        'write(self._command, Scmd.STOP, Priority.REFRESH, once=True)',
+        _G2_SCMD,
+    ),
+    Mutant(
+        3,
+        'in any order: deactivate does not stop the motor',
+        _DRIVE,
+        '        return await self._motion.stop(patience)\n',
+        "        return ''\n",
+        _G2_CONTROL,
+    ),
+    Mutant(
+        3,
+        'in any order: a clean-up does not stop the motor',
+        _DRIVE,
+        '            return await self._motion.release(timeout)\n',
+        "            return ''\n",
+        _OPTIMAL_SCMD,
+    ),
+    Mutant(
+        3,
+        'in any order: a drive that is lost is still told as connected',
+        _WATCH,
+        '            inverter.connected = False\n            explained',
+        '            explained',
+        _G2_CONTROL,
+    ),
+    Mutant(
+        7,
+        'in any order: the status of a fault is not told',
+        _WATCH,
+        '        self._publish(seen, frequency',
+        '        seen.faulted or self._publish(seen, frequency',
+        (_ANY_ORDER, '-k', 'OptimalMonitor'),
+    ),
+    Mutant(
+        1,
+        'in any order: polling acknowledges faults',
+        'nfo_sinus_driver/drive/inverter.py',
+        "read_number('fieldbus.inv_st', priority, once=once",
+        "read_number('fieldbus.inv_st_with_ack', priority, once=once",
+        (_ANY_ORDER, '-k', 'G2Monitor'),
+    ),
+    Mutant(
+        4,
+        'in any order: a monitor writes',
+        _DRIVE,
+        "        if settings.control_method != 'monitor':",
+        '        if True:',
+        (_ANY_ORDER, '-k', 'G2Monitor'),
+    ),
+    Mutant(
+        6,
+        'in any order: both directions at once',
+        _CONTROL,
+        'switched_on | Control.ENABLE_OP,',
+        'switched_on | Control.ENABLE_OP | Control.ENABLE_REV_OP,',
+        _G2_CONTROL,
+    ),
+    Mutant(
+        6,
+        'in any order: the register of the other method is written',
+        _CONTROL,
+        '            await self._change(~_RUN, Control(0), Priority.STOP)\n',
+        '            await self._change(~_RUN, Control(0), Priority.STOP)\n'
+        "            await self._registers.write('fieldbus.scmd', 0, Priority.STOP)\n",
+        _G2_CONTROL,
+    ),
+    Mutant(
+        9,
+        'in any order: the bus is silent longer than the time-out of the drive',
+        _WATCH,
+        '            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)',
+        '            pass',
+        _G2_SCMD,
     ),
 )

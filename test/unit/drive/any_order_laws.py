@@ -34,13 +34,13 @@ from support import trace_laws
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 
-POLL_RATE = 10.0
+POLL_RATE = 5.0
 SETPOINT_TIMEOUT = 1.0
 SHUTDOWN_TIMEOUT = 1.0
 #: One transaction and a little, s.
 TRANSACTION = 0.015
 #: Two polls and a transaction, and what they themselves take: while active, and while not, s.
-NOTICED = 0.3
+NOTICED = 0.5
 NOTICED_IDLE = 1.2
 #: How seldom the control mode may be read, s.
 CONTROL_MODE_PERIOD = 1.0
@@ -112,6 +112,8 @@ class Laws:
         self._running_since: float | None = None
         self._conditions = tuple(self._present_conditions())
         self._truth: dict[str, tuple[Any, float]] = {}
+        self._last: Snapshot | None = None
+        self._last_told: dict[str, Any] = {}
         self._acknowledged = 0
         self._stop_due: int | None = None
 
@@ -173,14 +175,14 @@ class Laws:
         self._foreign = True
 
     def forgotten(self) -> None:
-        """Take note that the drive was made to forget its run command."""
-        if self.by_bus and not self._pending('enable'):
+        """Take note that the drive may have been made to forget its run command."""
+        if not self.standing and not self.pending('enable'):
             self.lose(self.noticed)
 
     def control_mode_changed(self) -> None:
         """Take note that the drive controls another quantity now."""
         self.disturbed_at = self.now
-        if not self._pending('enable'):
+        if not self.pending('enable'):
             self.lose(self.noticed + CONTROL_MODE_PERIOD)
 
     def killed(self) -> None:
@@ -194,9 +196,10 @@ class Laws:
     @property
     def enabling(self) -> bool:
         """Somebody has enabled it, or is about to."""
-        return self._pending('enable') or self.enabled_at is not None
+        return self.pending('enable') or self.enabled_at is not None
 
-    def _pending(self, name: str) -> bool:
+    def pending(self, name: str) -> bool:
+        """Tell whether a command of this name is on its way."""
         return any(command.name == name for command in self._commands)
 
     @property
@@ -304,7 +307,7 @@ class Laws:
         ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
         self._conditions = conditions
         # a G2 does not tell a RUN input that is off from a start that is yet to come
-        if any(ended) and not (ended == [False, False, True, False] and self._pending('enable')):
+        if any(ended) and not (ended == [False, False, True, False] and self.pending('enable')):
             self.lose(self.noticed)
 
     def _judge_running(self) -> None:
@@ -337,7 +340,8 @@ class Laws:
         self._require_word_of_it()
 
     def _judge_setpoint(self, enabled_at: float) -> None:
-        if self.now <= self._no_run_from:
+        late = max(self._no_run_from, enabled_at + self.noticed if self._foreign else 0.0)
+        if self.now <= late:
             return
         at = self._setpoint[0]
         if at <= enabled_at:
@@ -390,7 +394,7 @@ class Laws:
             self._enabled_for_sure = self.enabled_at is not None
             return
         ours = self.enabled_at is not None and self.enabled_at <= command.at
-        if ours and not self._pending('enable'):
+        if ours and not self.pending('enable'):
             self.lose(CARRIED_OUT)
 
     def _judge_silence(self) -> None:
@@ -485,7 +489,9 @@ class Laws:
         self._judge_connected(snapshot)
         if not snapshot.connected:
             return
-        told = self._told(snapshot)
+        if snapshot is not self._last:
+            self._last, self._last_told = snapshot, self._told(snapshot)
+        told = self._last_told
         known_since = max(self.settled_since, self._active_at)
         for name, (value, since) in self._truth.items():
             patience = self.noticed + (CONTROL_MODE_PERIOD if name == 'control mode' else 0.0)

@@ -208,7 +208,8 @@ class DirectLink:
             words, length, refusal = (), 5, error
         if not self.whole:
             self._lose_answer()
-        rig.elapse(_TURNAROUND + length * _CHARACTER)
+        # the drive catches up when it is looked at next
+        rig.clock.now += _TURNAROUND + length * _CHARACTER
         if refusal is not None:
             raise Refused(int(refusal.reason))
         return words
