@@ -403,20 +403,20 @@ MUTANTS = (
             2,
             f'{what} does not disarm ({tests[-1]})',
             _MOTION,
-            '            if reason:\n',
-            new,
+            '        if reason:\n            self.secure',
+            f'        if {new}:\n            self.secure',
             tests,
         )
         for tests in (_G2_SCMD, _G2_CONTROL, _OPTIMAL_SCMD)
         for what, new in (
-            ('in any order: a fault', '            if reason and not seen.faulted:\n'),
+            ('in any order: a fault', 'reason and not seen.faulted'),
             (
                 'in any order: keypad, terminals or another master',
-                '            if reason and (seen.from_bus or seen.faulted):\n',
+                'reason and (seen.from_bus or seen.faulted)',
             ),
             (
                 'in any order: a lost RUN input',
-                '            if reason and (seen.runs or seen.faulted or not seen.from_bus):\n',
+                'reason and (seen.runs or seen.faulted or not seen.from_bus)',
             ),
         )
     ),
@@ -424,24 +424,24 @@ MUTANTS = (
         2,
         'in any order: a lost line does not disarm',
         _WATCH,
-        '                self._motion.lost()',
-        '                pass',
+        '            if self._motion is not None and self._motion.lost():',
+        '            if False:',
         _G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: a driver that begins lets run what runs',
         _MOTION,
-        '        if await self._method.in_control(Priority.SERVICE):\n            seen',
-        '        self._changed_at = float("inf")\n        if False:\n            seen',
+        '        if await self._method.in_control(Priority.SERVICE):\n            if seen',
+        '        self._changed_at = float("inf")\n        if False:\n            if seen',
         _G2_CONTROL,
     ),
     Mutant(
         2,
         'in any order: another control mode does not disarm',
-        _MOTION,
-        '        if control_mode != self._setpoint.control_mode:',
-        '        if False:',
+        _ADVICE,
+        '    if inverter.control_mode != control_mode:',
+        '    if False:',
         _G2_SCMD,
     ),
     Mutant(
@@ -489,8 +489,8 @@ MUTANTS = (
         2,
         'in any order: a start that the RUN input ended waits for it',
         _MOTION,
-        '            elif delayed and seen.standby:',
-        '            elif False:',
+        ' or (delayed and seen.standby):',
+        ':',
         ('test/unit/drive/test_any_order_found.py',),
     ),
     Mutant(
