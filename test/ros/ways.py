@@ -38,6 +38,7 @@ WITHOUT = {
     'newer': 'the firmware of this dialect has not got it [C5], [C21]',
     'later': 'on this firmware it counts at once, and the line is gone [C7]',
     'at_once': 'on this firmware it counts from the next power-up on [C7]',
+    'fast': 'this dialect knows no more than 9600 bit/s',
     'parameters': 'this model has no drive parameters',
     'bare': 'this model has drive parameters',
     'states': 'there is no state machine that the words of the test are about',
@@ -126,8 +127,8 @@ class Way:
         return SILENCE if self.protocol == 'modbus_tcp' else ('is no answer', 'baud rate', 'parity')
 
 
-_G2 = frozenset(('later', 'newer', 'parameters', 'states'))
-_OPTIMAL = frozenset(('bare', 'fine', 'later', 'modbus', 'newer'))
+_G2 = frozenset(('fast', 'later', 'newer', 'parameters', 'states'))
+_OPTIMAL = frozenset(('bare', 'fast', 'fine', 'later', 'modbus', 'newer'))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _CLASSIC = frozenset(('classic', 'serial'))
 _RTU = frozenset(('eight', 'serial'))
@@ -159,7 +160,7 @@ WAYS = {
         Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
         Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
         Way(
-            'classic_v5', 'classic', _G2 - {'later', 'newer', 'states'} | _CLASSIC | {'at_once'},
+            'classic_v5', 'classic', _G2 & {'parameters'} | _CLASSIC | {'at_once'},
             dialect='5.0', baud_rate=9600, beyond=NEWER,
             untold=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
         ),
