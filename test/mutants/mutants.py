@@ -519,14 +519,6 @@ MUTANTS = (
     ),
     Mutant(
         3,
-        'in any order: a stop waits behind everything else',
-        _METHOD,
-        'write(self._command, Scmd.STOP, Priority.STOP, once=True)',
-        'write(self._command, Scmd.STOP, Priority.REFRESH, once=True)',
-        _G2_SCMD,
-    ),
-    Mutant(
-        3,
         'in any order: deactivate does not stop the motor',
         _DRIVE,
         '        return await self._motion.stop(patience)\n',
@@ -589,13 +581,5 @@ MUTANTS = (
         '            await self._change(~_RUN, Control(0), Priority.STOP)\n'
         "            await self._registers.write('fieldbus.scmd', 0, Priority.STOP)\n",
         _G2_CONTROL,
-    ),
-    Mutant(
-        9,
-        'in any order: the bus is silent longer than the time-out of the drive',
-        _WATCH,
-        '            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)',
-        '            pass',
-        _G2_SCMD,
     ),
 )

@@ -47,10 +47,10 @@ CONTROL_MODE_PERIOD = 1.0
 #: A command is carried out within this, s.
 CARRIED_OUT = 0.06
 #: Three polls that nobody answers and the drive is lost: while active, and while not, s.
-LOST = 2.0
-LOST_IDLE = 3.0
+LOST = 3.0
+LOST_IDLE = 4.0
 #: A run command that could not be taken back is, so long after the line came back, s.
-TAKEN_BACK = 1.4
+TAKEN_BACK = 1.7
 #: A drive that was lost is found again within this, s.
 FOUND = 5.0
 #: Within this it is said that a motor cannot be stopped, s.
@@ -102,16 +102,20 @@ class Laws:
         self._setpoint: tuple[float, float] = (-math.inf, 0.0)
         #: This driver may have started the motor.
         self._ours = False
+        #: A run command stood in the drive when it was looked at last.
+        self._stood = False
         #: The run command that stands is somebody else's.
         self._foreign = False
         self.active = self.watched = False
-        self._watched_at = self._active_at = rig.clock.now
+        self._watched_at = self._active_at = self._commanded_at = rig.clock.now
         self._whole_since: float | None = rig.clock.now
         self._broken_since: float | None = None
         self.disturbed_at = rig.clock.now
         self._running_since: float | None = None
         self._conditions = tuple(self._present_conditions())
         self._truth: dict[str, tuple[Any, float]] = {}
+        #: When what is told of a fact was right last.
+        self._agreed_at: dict[str, float] = {}
         self._last: Snapshot | None = None
         self._last_told: dict[str, Any] = {}
         self._acknowledged = 0
@@ -189,6 +193,7 @@ class Laws:
         """Take note that the driver is no more."""
         self._commands.clear()
         self._truth.clear()
+        self._agreed_at.clear()
         self.lose(0.0)
         self.active = self.watched = self._ours = False
         self._stop_due = None
@@ -287,10 +292,9 @@ class Laws:
                 back = FOUND if not self._ours else TAKEN_BACK
                 self._no_run_from = max(self._no_run_from, self.now + back)
             return
-        self._whole_since = None
+        self._whole_since = self._stop_due = None
         for command in self._commands:
             command.undisturbed = False
-        self.disturbed_at = self.now
         if self._broken_since is None:
             self._broken_since = self.now
         lost = LOST if self.active else LOST_IDLE
@@ -306,8 +310,10 @@ class Laws:
             return
         ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
         self._conditions = conditions
-        # a G2 does not tell a RUN input that is off from a start that is yet to come
-        if any(ended) and not (ended == [False, False, True, False] and self.pending('enable')):
+        # what happens before the run command is given does not end an enabling; nor does a RUN
+        # input that is lost, for a G2 does not tell it from a start that is yet to come
+        unmoved = not self._stood or ended == [False, False, True, False]
+        if any(ended) and not (unmoved and self.pending('enable')):
             self.lose(self.noticed)
 
     def _judge_running(self) -> None:
@@ -316,9 +322,9 @@ class Laws:
             self._running_since = None
         elif self._running_since is None:
             self._running_since = self.now
+        standing = self._stood = self.standing
         if not self.watched or self._method == 'monitor':
             return
-        standing = self.standing
         self._foreign = self._foreign and standing
         if not self._optimal and self._far.faults:
             # it refuses every command
@@ -332,6 +338,9 @@ class Laws:
         """A run command of a past ride is taken back; one of another master when it is seen."""
         if self._foreign:
             since = self.now if self._running_since is None else self._running_since
+            # a drive that is not connected is not watched
+            if not self._connected:
+                self._no_run_from = max(self._no_run_from, self.now + self.noticed)
             late = max(self._no_run_from, since + self.noticed)
         else:
             late = self._no_run_from
@@ -358,7 +367,9 @@ class Laws:
         if not self._ours or self._running_since is None:
             return
         since = max(self._running_since, self.lost_at)
-        if self.now > since + SAID and not self._said(since, 'CANNOT STOP'):
+        # the line that is lost was broken before
+        from_when = since if self._broken_since is None else min(since, self._broken_since)
+        if self.now > since + SAID and not self._said(from_when, 'CANNOT STOP'):
             raise Broken(f'it runs since {since:.3f}, and nobody says that it cannot be stopped')
 
     def _said(self, since: float, what: str) -> bool:
@@ -368,6 +379,8 @@ class Laws:
         )
 
     def _judge_commands(self) -> None:
+        if self._commands:
+            self._commanded_at = self.now
         for command in tuple(self._commands):
             if command.future.done():
                 self._commands.remove(command)
@@ -495,9 +508,11 @@ class Laws:
         known_since = max(self.settled_since, self._active_at)
         for name, (value, since) in self._truth.items():
             patience = self.noticed + (CONTROL_MODE_PERIOD if name == 'control mode' else 0.0)
-            if self.now - max(since, known_since) <= patience:
+            if _agree(told[name], value):
+                self._agreed_at[name] = self.now
                 continue
-            if not _agree(told[name], value):
+            agreed_at = self._agreed_at.get(name, known_since)
+            if self.now - max(since, known_since, agreed_at) > patience:
                 raise Broken(f'{name} is told as {told[name]}, and it is {value}')
         running, since = self._truth['running']
         long_since = self.now - max(since, known_since) > self.noticed
@@ -507,7 +522,9 @@ class Laws:
     def _judge_connected(self, snapshot: Snapshot) -> None:
         if self._broken_since is not None and snapshot.connected:
             lost = LOST if self.active and self._active_at < self._broken_since else LOST_IDLE
-            if self.now - self._broken_since > lost and not self._rig.link.losses:
+            # commands that nobody answers go before the polls
+            since = max(self._broken_since, self._commanded_at)
+            if self.now - since > lost and not self._rig.link.losses:
                 raise Broken('it is told as connected, and it is not')
         if self._whole_since is None or snapshot.connected:
             return

@@ -131,6 +131,7 @@ class DirectLink:
         ``noise``: carried out, the answer is damaged; ``late``: it comes when nobody waits for it
         any more; ``gone``: the port is.
     :ivar losses: how many answers are still lost although the line is whole.
+    :ivar unheard: how many requests are.
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
@@ -139,14 +140,19 @@ class DirectLink:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self.state = 'whole'
-        self.losses = 0
+        self.losses = self.unheard = 0
         self.frames: list[dict[str, Any]] = []
         self.asked_at = rig.clock.now
         self._not_ready_until = 0.0
 
     @property
     def whole(self) -> bool:
-        return self.state == 'whole' and not self.losses
+        return self.state == 'whole' and not self.losses and not self.unheard
+
+    def mend(self) -> None:
+        """End all that is wrong with the line."""
+        self.state = 'whole'
+        self.losses = self.unheard = 0
 
     def open(self) -> None:
         self._require_port()
@@ -197,7 +203,8 @@ class DirectLink:
         frame = (request + crc(request).to_bytes(2, 'little')).hex()
         self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame})
         rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
-        if self.state == 'silent' or not rig.far.listening:
+        if self.unheard or self.state == 'silent' or not rig.far.listening:
+            self.unheard -= self.unheard > 0
             rig.elapse(RESPONSE_TIMEOUT)
             raise NoAnswer('nobody answers')
         rig.far.heard()

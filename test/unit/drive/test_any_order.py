@@ -193,7 +193,7 @@ class AnyOrder(RuleBasedStateMachine):
         """Put right what is in the way, enable it and send set-points."""
         rig, far = self.rig, self.rig.far
         rig.send(None)
-        rig.link.state, rig.link.losses = 'whole', 0
+        rig.link.mend()
         far.silence(0.0)
         far.motor.load = 0.3
         far.end_fault_causes()
@@ -226,8 +226,24 @@ class AnyOrder(RuleBasedStateMachine):
 
     @_driven
     @rule(wait=WAITS)
+    def enable_without_run_input(self, wait: float = 0.4) -> None:
+        self.run_input_off()
+        self._answered('enable')
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
     def stop(self, wait: float = 0.4) -> None:
         self._give('stop', wait)
+
+    @rule(wait=WAITS)
+    def stop_while_reading(self, wait: float = 0.4) -> None:
+        """Stop a ride while all the parameters are read, which keeps the line busy."""
+        self.ride()
+        reading = self.rig.drive.parameters.read()
+        self.let(0.05)
+        self._give('stop', wait)
+        self.rig.answer(reading)
 
     @_driven
     @rule(wait=WAITS)
@@ -405,8 +421,27 @@ class AnyOrder(RuleBasedStateMachine):
         if self.rig.far.peek('control.mode') != mode:
             self.rig.far.set_from_keypad('control.mode', mode)
             self.laws.control_mode_changed()
-        self.let(wait)
-        self.until_noticed()
+        # it is not read with every poll
+        self.let(max(wait, 2.5))
+
+    @rule(
+        event=st.sampled_from(('fault', 'stop', 'ext', 'mode', 'run_input', 'unheard')),
+        wait=st.sampled_from((0.4, 2.5)),
+    )
+    def end_ride(self, event: str, wait: float = 1.0) -> None:
+        """Let something that ends a ride happen in one."""
+        self.ride()
+        if event == 'fault':
+            self.fault(5, wait=wait)
+        elif event == 'mode':
+            self.write_mode(1, wait)
+        elif event == 'run_input':
+            self.run_input_off(wait)
+        elif event == 'unheard':
+            self.rig.link.unheard = 1
+            self.stop(wait)
+        else:
+            self.press(event, wait)
 
     # --- what the line does -----------------------------------------------------------------------
 
@@ -416,10 +451,25 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.link.state = state
         self.let(wait)
 
+    @rule(
+        state=st.sampled_from(('silent', 'noise', 'gone')),
+        give=st.sampled_from(('', '', 'stop', 'quick_stop', 'deactivate')),
+        seconds=st.sampled_from((4.5, 9.0, 9.0)),
+        wait=WAITS,
+    )
+    def lose_line(self, state: str, give: str, seconds: float, wait: float = 2.5) -> None:
+        """Lose the line in a ride for so long that the drive is lost; stop it meanwhile."""
+        self.ride()
+        self.break_line(state, wait=0.02)
+        if give and self.laws.watched:
+            self._give(give, 0.0)
+        self.let(seconds)
+        self.mend_line(wait)
+
     @precondition(lambda self: not self.rig.link.whole)
     @rule(wait=WAITS)
     def mend_line(self, wait: float = 1.0) -> None:
-        self.rig.link.state, self.rig.link.losses = 'whole', 0
+        self.rig.link.mend()
         self.let(wait)
 
     @_whole
