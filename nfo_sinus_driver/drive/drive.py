@@ -297,7 +297,9 @@ class Drive:
         # looked at on the bus, where a deactivation cannot come between
         if self._barred or not self._watch.active:
             raise DriveError('the drive is not active')
-        answer = await self._command(lambda motion: motion.enable(), connected=True)
+        answer = await self._command(
+            lambda motion: motion.enable(self._own_timeout.require_set), connected=True
+        )
         self._watch.wake()
         return answer
 
@@ -354,8 +356,7 @@ class Drive:
         await inverter.look(Priority.SERVICE)
         if self._motion is not None:
             await self._motion.connected()
-            if inverter.settings.drive_timeout:
-                await self._own_timeout.set_now(inverter.settings.drive_timeout)
+            await self._own_timeout.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
         inverter.connected = inverter.answering = True
@@ -371,12 +372,13 @@ class Drive:
         self._own_timeout.warn_if_missing()
 
     async def _disconnect(self, timeout: float) -> str:
+        # nobody may enable it while it is awaited that the motor stands
+        self._set_active(False)
         try:
             if self._motion is None:
                 return 'only watched'
             return await self._motion.release(timeout)
         finally:
-            self._set_active(False)
             if self._parameters_task is not None:
                 task, self._parameters_task = self._parameters_task, None
                 self._bus.cancel(task)

@@ -129,7 +129,7 @@ class DriveControl:
     async def quick_stop(self, control_mode: str) -> None:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
         await self._change(
-            ~(_RUN | Control.DISABLE_QUICK_STOP), Control.OVERRIDE_COAST, Priority.STOP
+            ~(_RUN | Control.DISABLE_QUICK_STOP), Control.OVERRIDE_COAST, Priority.STOP, once=False
         )
         for reference in references(self._registers, (control_mode,)):
             with contextlib.suppress(Refused):
@@ -163,15 +163,17 @@ class DriveControl:
             await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
         return why
 
-    async def _change(self, keep: Control, add: Control, priority: Priority) -> None:
+    async def _change(
+        self, keep: Control, add: Control, priority: Priority, *, once: bool = True
+    ) -> None:
         """Change some bits of the control word and leave the others to who has control."""
         if self._registers.reaches(_MASK):
             # in one transaction: the AND mask first, then the OR mask [M0 §7.1]
             masks = (int(keep) & 0xFFFF, int(add))
-            await self._registers.write_words(_MASK, masks, priority, once=True)
+            await self._registers.write_words(_MASK, masks, priority, once=once)
             return
         word = Control(int(await self._registers.read_number(_WORD, priority)))
-        await self._registers.write(_WORD, word & keep | add, priority, once=True)
+        await self._registers.write(_WORD, word & keep | add, priority, once=once)
 
 
 class OptimalDriveControl:

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from collections.abc import Iterator
 import contextlib
 import time
 
@@ -75,8 +76,22 @@ class Errands:
         self._require_idle(what, self._motion)
         return self._motion
 
+    @contextlib.contextmanager
+    def lent(self, what: str) -> Iterator[Loan]:
+        """
+        Have the drive for an errand, from its first preparations on: whoever stops it ends both.
+
+        :raises DriveError: it cannot be had, and why.
+        """
+        motion = self.require(what)
+        motion.loan = loan = Loan(what)
+        try:
+            yield loan
+        finally:
+            motion.loan = None
+
     @contextlib.asynccontextmanager
-    async def sent(self, what: str) -> AsyncIterator[Loan]:
+    async def sent(self, loan: Loan) -> AsyncIterator[None]:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
@@ -85,20 +100,17 @@ class Errands:
 
         :raises DriveError: it cannot be had, and why.
         """
-        motion = self.require(what)
-        motion.loan = loan = Loan(what)
+        motion = self._motion
+        assert motion is not None and motion.loan is loan
+        found = await self._take(loan, motion)
         try:
-            found = await self._take(what, motion)
-            try:
-                yield loan
-            except Exception:
-                # who asked is told what went wrong first; what comes of it is logged
-                with contextlib.suppress(DriveError, LinkError):
-                    await self._give_back(motion, found)
-                raise
-            await self._give_back(motion, found)
-        finally:
-            motion.loan = None
+            yield
+        except Exception:
+            # who asked is told what went wrong first; what comes of it is logged
+            with contextlib.suppress(DriveError, LinkError):
+                await self._give_back(motion, found)
+            raise
+        await self._give_back(motion, found)
 
     async def recall(self) -> str:
         """
@@ -110,9 +122,16 @@ class Errands:
             return ''
         return await self._motion.stop()
 
-    async def tell(self, command: Scmd) -> None:
-        """Write SCMD; once, for nobody knows what has happened before a second one."""
-        await self._registers.write('fieldbus.scmd', command, Priority.SERVICE, once=True)
+    async def tell(self, loan: Loan, command: Scmd) -> None:
+        """
+        Write SCMD; once, for nobody knows what has happened before a second one.
+
+        It waits for its turn with the stops: one that comes later must not overtake it.
+
+        :raises DriveError: it was stopped meanwhile.
+        """
+        loan.require_wanted()
+        await self._registers.write('fieldbus.scmd', command, Priority.STOP, once=True)
 
     @staticmethod
     def _require_idle(what: str, motion: Motion) -> None:
@@ -124,8 +143,8 @@ class Errands:
         if motion.stopping and not motion.held_by_fault:
             raise DriveError(f'{what}: a stop is not confirmed yet')
 
-    async def _take(self, what: str, motion: Motion) -> Mode:
-        inverter = self._inverter
+    async def _take(self, loan: Loan, motion: Motion) -> Mode:
+        inverter, what = self._inverter, loan.what
         seen = await inverter.look(Priority.SERVICE)
         if seen.faulted:
             fault = inverter.model.inv_st(seen.code)
@@ -146,6 +165,7 @@ class Errands:
                 f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
                 'back to them could start the motor: press STOP at the drive first'
             )
+        loan.require_wanted()
         await motion.method.take_control()
         deadline = time.monotonic() + withdrawal.PATIENCE
         while not (await inverter.look(Priority.SERVICE)).standby:

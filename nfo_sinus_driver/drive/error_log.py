@@ -170,12 +170,12 @@ class ErrorLog:
         :raises DriveError: it was not erased, and why.
         """
         what = 'erasing the error log'
-        self._errands.require(what)
-        area = self._area()
-        async with self._errands.sent(what):
-            await self._errands.tell(Scmd.ERASE_E_LOG)
-            if code_of(await self._entry(area, 0)):
-                raise DriveError('the drive took the command, but its error log is not empty')
+        with self._errands.lent(what) as loan:
+            area = self._area()
+            async with self._errands.sent(loan):
+                await self._errands.tell(loan, Scmd.ERASE_E_LOG)
+                if code_of(await self._entry(area, 0)):
+                    raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
 
     async def reset_energy_now(self) -> str:
@@ -192,12 +192,13 @@ class ErrorLog:
                 f'{what} came with firmware 4.38; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        async with self._errands.sent(what):
-            before = await self._registers.read_number(_ENERGY, Priority.SERVICE)
-            await self._errands.tell(Scmd.RESET_E_OUT)
-            after = await self._registers.read_number(_ENERGY, Priority.SERVICE)
-            if after > min(before, _NEARLY_NOTHING):
-                raise DriveError(f'the drive took the command, but {_ENERGY} is {after:g} kWh')
+        with self._errands.lent(what) as loan:
+            async with self._errands.sent(loan):
+                before = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                await self._errands.tell(loan, Scmd.RESET_E_OUT)
+                after = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                if after > min(before, _NEARLY_NOTHING):
+                    raise DriveError(f'the drive took the command, but {_ENERGY} is {after:g} kWh')
         return f'{_ENERGY}: {before:.3f} -> {after:.3f} kWh'
 
     def _area(self) -> ErrorLogArea:

@@ -22,6 +22,7 @@ the run command is taken back until the drive says that it stops. All of this ru
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from collections.abc import Callable
 import contextlib
 import math
@@ -58,8 +59,17 @@ class Loan:
 
     def __init__(self, what: str) -> None:
         self.what = what
-        #: The drive shall stop what it does.
+        #: The drive shall stop what it does, or not begin it.
         self.recalled = False
+
+    def require_wanted(self) -> None:
+        """
+        See to it that nobody has stopped it meanwhile.
+
+        :raises DriveError: somebody has.
+        """
+        if self.recalled:
+            raise DriveError(f'{self.what} was stopped before it began')
 
 
 class Motion:
@@ -82,6 +92,8 @@ class Motion:
         self._refusal: tuple[float, str] | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
+        #: A quick stop is on its way, which the drive has not confirmed yet.
+        self._releasing = False
 
     def _note_change(self) -> None:
         self._changed_at = time.monotonic()
@@ -113,10 +125,11 @@ class Motion:
 
     # --- what a person asks for ---------------------------------------------------------------
 
-    async def enable(self) -> str:
+    async def enable(self, prepare: Callable[[], Awaitable[None]]) -> str:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
+        :param prepare: does what has to be done before, once it is known that no fault stands.
         :returns: what was done.
         :raises DriveError: it was not done, and why; the run command is taken back then.
         """
@@ -128,7 +141,7 @@ class Motion:
             raise DriveError(f'{self.loan.what} is going on: wait for its end, or stop it')
         self._arming = self._bus.current
         try:
-            await self._arm()
+            await self._arm(prepare)
         except Cancelled:
             raise DriveError('it was stopped while it was being enabled') from None
         except Exception as error:
@@ -160,7 +173,11 @@ class Motion:
             return self._no_control(seen)
         if not seen.driven:
             return f'stopped ({text})'
-        coasts = await self._inverter.coasts_to_stop()
+        try:
+            coasts = await self._inverter.coasts_to_stop()
+        except LinkError:
+            # the stop is confirmed all the same
+            return f'stopping ({text})'
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
     async def take_back(self) -> None:
@@ -184,6 +201,7 @@ class Motion:
             return f'{await self.stop()} (this drive has no quick stop)'
         ours = self.concerned
         self.disarm()
+        self._releasing = True
         try:
             if not ours and not await self._method.in_control(Priority.STOP):
                 return self._no_control(await self._inverter.look(Priority.STOP))
@@ -194,6 +212,8 @@ class Motion:
         except (DriveError, LinkError) as error:
             self._withdrawal.begin()
             raise DriveError(f'the quick stop is NOT confirmed: {error}; stopping') from error
+        finally:
+            self._releasing = False
         self._withdrawal.begin()
         return 'released: the motor coasts'
 
@@ -319,7 +339,7 @@ class Motion:
         reason = ''
         if self.armed:
             reason = self._why_stopped(seen)
-        elif not self.ours and not self.stopping and seen.keeps_running:
+        elif not (self.ours or self.stopping or self._releasing) and seen.keeps_running:
             reason = (
                 'it runs under bus control although nobody enabled it: find out whether another '
                 'master commands it'
@@ -364,7 +384,7 @@ class Motion:
 
     # --- how --------------------------------------------------------------------------------
 
-    async def _arm(self) -> None:
+    async def _arm(self, prepare: Callable[[], Awaitable[None]]) -> None:
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         self._explain_refusal(seen)
@@ -374,6 +394,7 @@ class Motion:
                 f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
                 'then call ~/fault_ack'
             )
+        await prepare()
         control_mode = await inverter.read_control_mode()
         expected = inverter.settings.expected_control_mode
         if expected and control_mode != expected:

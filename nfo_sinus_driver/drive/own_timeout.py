@@ -35,6 +35,37 @@ class OwnTimeout:
         self._parameters = parameters
         self._commanded = commanded
         self._told = ''
+        #: It could not be set yet.
+        self._due = False
+
+    async def prepare(self) -> None:
+        """
+        Set it as the settings want it; while a fault stands, later if the drive takes nothing.
+
+        Who could not connect to such a drive could not acknowledge its fault.
+
+        :raises DriveError: it cannot be set.
+        """
+        self._due = True
+        try:
+            await self.require_set()
+        except DriveError as error:
+            seen = self._inverter.seen
+            if seen is None or not seen.faulted:
+                raise
+            self._inverter.tell(
+                Severity.WARNING, f'drive_timeout cannot be set yet, and will be when it is enabled: {error}'
+            )
+
+    async def require_set(self) -> None:
+        """
+        Set it if that could not be done before: nothing runs without it.
+
+        :raises DriveError: it cannot be set.
+        """
+        if self._due:
+            await self.set_now(self._inverter.settings.drive_timeout)
+            self._due = False
 
     async def set_now(self, seconds: float) -> str:
         """

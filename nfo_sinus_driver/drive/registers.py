@@ -203,8 +203,8 @@ class Registers:
         self, address: Address, priority: Priority, words: Words | None, once: bool
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
-        # what is busy has done nothing; a stop is tried on by who wants it
-        busy = 0 if priority is Priority.STOP else _BUSY_TRIES
+        # what is busy has done nothing; a stop that is sent once is tried on by who wants it
+        busy = 0 if once and priority is Priority.STOP else _BUSY_TRIES
         while True:
             try:
                 if words is None:

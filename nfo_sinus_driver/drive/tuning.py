@@ -117,15 +117,16 @@ class Tuning:
         :raises DriveError: it was not begun, and why; or nobody knows how it ended.
         """
         what = procedure.value
-        self._errands.require(what)
-        await self._require_motor_plate(what)
-        keys = [key for key in self._parameters.available() if key.startswith('motor.')]
-        async with self._parameters.left_to_the_drive(keys) as changes:
-            async with self._errands.sent(what) as loan:
-                self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
-                await self._errands.tell(_COMMANDS[procedure])
-                success, text = await self._outcome(what, loan, progress)
-            result = Tuned(success, text, await changes())
+        # from here on a stop is one of the tuning, too
+        with self._errands.lent(what) as loan:
+            await self._require_motor_plate(what)
+            keys = [key for key in self._parameters.available() if key.startswith('motor.')]
+            async with self._parameters.left_to_the_drive(keys) as changes:
+                async with self._errands.sent(loan):
+                    self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
+                    await self._errands.tell(loan, _COMMANDS[procedure])
+                    success, text = await self._outcome(what, loan, progress)
+                result = Tuned(success, text, await changes())
         grave = Severity.INFO if success else Severity.ERROR
         self._inverter.tell(grave, str(result))
         return result
