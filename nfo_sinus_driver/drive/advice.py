@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import GatewaySilent
@@ -60,6 +61,20 @@ def explain_fault(inverter: Inverter, seen: InverterStatus) -> str:
     """Return which fault stands, what it means and what to do about its cause."""
     fault = inverter.model.inv_st(seen.code)
     return f'fault {inverter.describe()}: {fault.description}. {fault.remedy}'
+
+
+def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
+    """
+    See to it that no fault stands, before the motor gets current.
+
+    :raises DriveError: one does.
+    """
+    if seen.faulted:
+        fault = inverter.model.inv_st(seen.code)
+        raise DriveError(
+            f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
+            'then call ~/fault_ack'
+        )
 
 
 def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) -> str:

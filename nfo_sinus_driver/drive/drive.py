@@ -165,6 +165,11 @@ class Drive:
         """A stop was asked for that the drive has not confirmed yet."""
         return self._motion is not None and self._motion.stopping
 
+    @property
+    def stop_overdue(self) -> bool:
+        """It has had time to confirm it, and no fault keeps it from turning the motor."""
+        return self._motion is not None and self._motion.taking_back.overdue
+
     def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[str]:
         """
         Identify the drive, make sure that nothing runs unasked, and watch it from then on.

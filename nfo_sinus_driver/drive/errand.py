@@ -27,9 +27,10 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.motion import Loan
+from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
@@ -140,18 +141,13 @@ class Errands:
         if motion.ours:
             raise DriveError(f'{what}: the motor is enabled: stop it first')
         # a fault that holds the stop is told of later, with what to do
-        if motion.stopping and not motion.held_by_fault:
+        if motion.stopping and not motion.taking_back.held_by_fault:
             raise DriveError(f'{what}: a stop is not confirmed yet')
 
     async def _take(self, loan: Loan, motion: Motion) -> Mode:
         inverter, what = self._inverter, loan.what
         seen = await inverter.look(Priority.SERVICE)
-        if seen.faulted:
-            fault = inverter.model.inv_st(seen.code)
-            raise DriveError(
-                f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
-                'then call ~/fault_ack'
-            )
+        require_no_fault(inverter, seen)
         mode = int(await self._registers.read_number('fieldbus.mode', Priority.SERVICE))
         if mode == Mode.INHIBIT:
             raise DriveError(
@@ -179,5 +175,5 @@ class Errands:
     async def _give_back(self, motion: Motion, found: Mode) -> None:
         """Take the command back, and control too where nobody had it; not while a fault stands."""
         await motion.take_back()
-        if found is Mode.STOP and not motion.held_by_fault:
+        if found is Mode.STOP and not motion.taking_back.held_by_fault:
             await motion.method.release()

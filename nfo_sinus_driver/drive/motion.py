@@ -40,36 +40,17 @@ from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
+from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.withdrawal import Withdrawal
 from nfo_sinus_driver.link import LinkError
-
-
-class Loan:
-    """
-    The drive in the hands of somebody else, such as a tuning.
-
-    :param what: what for.
-    """
-
-    def __init__(self, what: str) -> None:
-        self.what = what
-        #: The drive shall stop what it does, or not begin it.
-        self.recalled = False
-
-    def require_wanted(self) -> None:
-        """
-        See to it that nobody has stopped it meanwhile.
-
-        :raises DriveError: somebody has.
-        """
-        if self.recalled:
-            raise DriveError(f'{self.what} was stopped before it began')
+from nfo_sinus_driver.link import Refused
 
 
 class Motion:
@@ -109,9 +90,9 @@ class Motion:
         return self._withdrawal.going_on
 
     @property
-    def held_by_fault(self) -> bool:
-        """The drive takes no command until its fault is acknowledged."""
-        return self._withdrawal.held_by_fault
+    def taking_back(self) -> Withdrawal:
+        """How it goes with a stop that was asked for."""
+        return self._withdrawal
 
     @property
     def method(self) -> ControlMethod:
@@ -166,18 +147,17 @@ class Motion:
         self._withdrawal.begin()
         await self._withdrawal.finish(patience or None)
         seen = self._inverter.seen
-        text = self._inverter.describe()
         if self._withdrawal.held_by_fault:
-            return f'stopped by fault {text}; the drive takes no command until it is acknowledged'
+            return self._withdrawal.by_fault
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
         if not seen.driven:
-            return f'stopped ({text})'
+            return f'stopped ({self._inverter.describe()})'
         try:
             coasts = await self._inverter.coasts_to_stop()
         except LinkError:
             # the stop is confirmed all the same
-            return f'stopping ({text})'
+            return f'stopping ({self._inverter.describe()})'
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
     async def take_back(self) -> None:
@@ -203,17 +183,24 @@ class Motion:
         self.disarm()
         self._releasing = True
         try:
-            if not ours and not await self._method.in_control(Priority.STOP):
-                return self._no_control(await self._inverter.look(Priority.STOP))
-            await self._method.quick_stop(self._inverter.control_mode)
-            await self._await_status(
-                lambda seen: not seen.driven, Priority.STOP, withdrawal.PATIENCE
-            )
+            ours = ours or await self._method.in_control(Priority.STOP)
+            if ours:
+                await self._method.quick_stop(self._inverter.control_mode)
+                await self._await_status(
+                    lambda seen: not seen.driven, Priority.STOP, withdrawal.PATIENCE
+                )
+            else:
+                await self._inverter.look(Priority.STOP)
         except (DriveError, LinkError) as error:
             self._withdrawal.begin()
-            raise DriveError(f'the quick stop is NOT confirmed: {error}; stopping') from error
+            seen = self._inverter.seen
+            if isinstance(error, Refused) and seen is not None and seen.faulted and not seen.driven:
+                return self._withdrawal.by_fault
+            raise DriveError(f'the quick stop is NOT confirmed: {error}; trying a stop') from error
         finally:
             self._releasing = False
+        if not ours:
+            return self._no_control(self._inverter.seen)
         self._withdrawal.begin()
         return 'released: the motor coasts'
 
@@ -388,12 +375,7 @@ class Motion:
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         self._explain_refusal(seen)
-        if seen.faulted:
-            fault = inverter.model.inv_st(seen.code)
-            raise DriveError(
-                f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
-                'then call ~/fault_ack'
-            )
+        require_no_fault(inverter, seen)
         await prepare()
         control_mode = await inverter.read_control_mode()
         expected = inverter.settings.expected_control_mode

@@ -54,7 +54,8 @@ class OwnTimeout:
             if seen is None or not seen.faulted:
                 raise
             self._inverter.tell(
-                Severity.WARNING, f'drive_timeout cannot be set yet, and will be when it is enabled: {error}'
+                Severity.WARNING,
+                f'drive_timeout cannot be set yet, and will be when it is enabled: {error}',
             )
 
     async def require_set(self) -> None:

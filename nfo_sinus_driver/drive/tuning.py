@@ -31,7 +31,7 @@ from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.motion import Loan
+from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers

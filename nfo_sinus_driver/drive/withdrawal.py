@@ -67,6 +67,20 @@ class Withdrawal:
         #: The drive stands by a fault, and refuses the stop until it is acknowledged.
         self.held_by_fault = False
         self._unconfirmed = ''
+        #: From when on a drive that has still not confirmed it is complained of.
+        self._due = 0.0
+
+    @property
+    def overdue(self) -> bool:
+        """A stop is not confirmed although there was time; no fault keeps the motor still."""
+        waiting = self.going_on and not self.held_by_fault
+        return waiting and time.monotonic() >= self._due
+
+    @property
+    def by_fault(self) -> str:
+        """What is said of a motor that a fault has stopped."""
+        fault = self._inverter.describe()
+        return f'stopped by fault {fault}; the drive takes no command until it is acknowledged'
 
     @property
     def going_on(self) -> bool:
@@ -82,6 +96,7 @@ class Withdrawal:
         """Take the run command back, again and again until the drive says that it stops."""
         if self._task is None:
             self._unconfirmed = 'no answer yet'
+            self._due = time.monotonic() + PATIENCE
             self._task = self._bus.spawn(self._keep_trying())
         else:
             # what was written may be overtaken by now
@@ -105,12 +120,12 @@ class Withdrawal:
                 )
 
     async def _keep_trying(self) -> None:
-        complain_at = time.monotonic() + PATIENCE
+        complain_at = self._due
         pause = 0.0
         while not await self._tried():
             if self.held_by_fault:
-                complain_at = time.monotonic() + PATIENCE
                 await self._fault_gone()
+                self._due = complain_at = time.monotonic() + PATIENCE
                 continue
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)

@@ -52,7 +52,7 @@ def drive_status(
     lifecycle_state: str,
     address: int,
     identity: Identity | None,
-    stop_unconfirmed: bool,
+    stop_overdue: bool,
     last_error: LogEntry | None,
     parameters: str,
     drift: Sequence[Change],
@@ -64,7 +64,7 @@ def drive_status(
     :param parameters: how many of them are known.
     :param drift: what is otherwise than the parameter file says.
     """
-    if stop_unconfirmed:
+    if stop_overdue:
         level = DiagnosticStatus.ERROR
         message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
     elif not snapshot.connected:

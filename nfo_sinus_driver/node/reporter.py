@@ -180,7 +180,7 @@ class Reporter:
             lifecycle_state=self._node.state,
             address=drive.settings.address,
             identity=drive.identity,
-            stop_unconfirmed=drive.stop_unconfirmed,
+            stop_overdue=drive.stop_overdue,
             last_error=drive.last_error,
             parameters=drive.parameters.progress,
             drift=drive.parameters.drift,

@@ -18,6 +18,10 @@ from __future__ import annotations
 
 from bench import Bench
 from bench import wait_until
+import pytest
+from ways import needs
+
+from nfo_sinus_driver.catalog import Mode
 
 _THREE = """
 nfo_sinus_bus: {ros__parameters: {drives: [left, right, watched]}}
@@ -74,3 +78,26 @@ def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -
     assert not answer.success
     assert answer.message.startswith('right: '), answer.message
     assert 'left: enabled' in answer.message
+
+
+@pytest.mark.every_way
+@needs('classic')
+@pytest.mark.parametrize('watched', [False, True], ids=['all_ours', 'one_is_only_watched'])
+def test_a_stop_for_all_where_it_may_be(bench: Bench, watched: bool) -> None:
+    simulator = bench.simulator('--address', '1', '--address', '2', '--address', '3')
+    parameters = bench.folder / 'three.yaml'
+    parameters.write_text(_THREE if watched else _THREE.replace('monitor', 'mode_scmd'))
+    bench.driver('--params-file', str(parameters))
+    for name in ('/left', '/right', '/watched'):
+        bench.client(name).connected()
+    assert bench.client('/left').enable().success
+    simulator.inject('silence', 3600.0, address=2)
+    answer = bench.client('/nfo_sinus_bus').call('stop_all')
+    assert not answer.success
+    if watched:
+        assert 'no stop was broadcast' in answer.message
+        assert simulator.state(1)['mode'] == Mode.BUS
+    else:
+        assert 'a stop for all was broadcast' in answer.message
+        # it is MODE = Stop, which takes control, too
+        simulator.wait_for(lambda state: state['mode'] == Mode.STOP, address=1)

@@ -179,6 +179,27 @@ def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
     assert inv_st.remedy
 
 
+def test_diagnostics_of_a_ride_name_its_fault_and_cry_over_no_stop_that_goes_well(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+
+    def said() -> list[str]:
+        messages = client.messages['diagnostics']
+        return [status.message for message in messages for status in message.status]
+
+    with client.run_at(20.0):
+        assert client.call('stop').success
+    drive.wait_for(lambda state: not state['turning'])
+    with client.run_at(20.0):
+        drive.inject('fault', 8)
+        # at once, and with the second that follows
+        wait_until(lambda: sum(text.startswith('DC High: ') for text in said()) > 1, 'the fault')
+    assert not [text for text in said() if 'NOT confirmed' in text]
+
+
 def test_inv_st_is_there_for_late_comers(idle: Bench) -> None:
     late = idle.client()
     late.wait_for('inv_st', lambda message: message.text == 'Stop', 'the inverter status')

@@ -202,12 +202,20 @@ def test_quick_stop_lets_the_motor_coast(make_rig: MakeRig) -> None:
     assert rig.enable().startswith('enabled')
 
 
+def test_stops_of_a_drive_with_a_fault(rig: Rig) -> None:
+    rig.turn()
+    rig.simulator.inject('fault', 5)
+    wait_until(lambda: not rig.drive.armed)
+    for command in (rig.drive.stop, rig.drive.quick_stop):
+        assert command().result(PATIENCE).startswith('stopped by fault 5 Overload')
+
+
 def test_stop_of_a_drive_that_is_not_ours(rig: Rig) -> None:
     rig.connect()
     rig.simulator.inject('keypad', 'start')
     rig.next_snapshots()
     for command in (rig.drive.stop, rig.drive.quick_stop):
-        assert 'the bus has no control of this drive' in rig.answer(command())
+        assert rig.answer(command()).startswith('the bus has no control of this drive')
         # whoever runs it at the keypad is not disturbed
         assert rig.far.motor.driven
     assert rig.writes(MODE) == []

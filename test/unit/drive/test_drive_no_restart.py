@@ -86,7 +86,7 @@ def test_fault_that_ends_while_the_drive_is_polled_seldom(make_rig: MakeRig) -> 
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     # the drive refuses every command now, and its run command stands
-    wait_until(lambda: rig.drive._motion and rig.drive._motion.held_by_fault)
+    wait_until(lambda: rig.drive._motion and rig.drive._motion.taking_back.held_by_fault)
     with rig.simulator.lock:
         rig.far.faults.acknowledge()
         rig.far._settle()
