@@ -426,11 +426,12 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(
         event=st.sampled_from(('fault', 'stop', 'ext', 'mode', 'run_input', 'unheard')),
-        wait=st.sampled_from((0.4, 2.5)),
+        after=st.sampled_from((0.2, 1.0)),
+        wait=st.sampled_from((1.0, 2.5)),
     )
-    def end_ride(self, event: str, wait: float = 1.0) -> None:
+    def end_ride(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
         """Let something that ends a ride happen in one."""
-        self.ride()
+        self.ride(wait=after)
         if event == 'fault':
             self.fault(5, wait=wait)
         elif event == 'mode':
@@ -465,6 +466,10 @@ class AnyOrder(RuleBasedStateMachine):
             self._give(give, 0.0)
         self.let(seconds)
         self.mend_line(wait)
+
+    @rule(state=st.sampled_from(('silent', 'gone')), wait=WAITS)
+    def lose_line_for_long(self, state: str, wait: float) -> None:
+        self.lose_line(state, '', 9.0, wait)
 
     @precondition(lambda self: not self.rig.link.whole)
     @rule(wait=WAITS)
