@@ -61,7 +61,7 @@ class Stopping:
         except DriveError as error:
             self.answer = in_our_words(str(error))
             say(f'{self.answer}: {_EMERGENCY}')
-            return self._confirmed_late()
+            return self.confirmed_late()
         return True
 
     def give_back(self, patience: float = math.inf) -> bool:
@@ -94,8 +94,8 @@ class Stopping:
             return time.monotonic() < since + _LONGEST_POLL
         return seen.status is not None and seen.status.driven
 
-    def _confirmed_late(self) -> bool:
-        """Let it be tried on for a while."""
+    def confirmed_late(self) -> bool:
+        """Let a stop be tried on for a while; true when the drive has confirmed it."""
         say, drive = self._helm.screen.say, self._drive
         deadline = time.monotonic() + _LAST_TRIES
         while drive.stop_unconfirmed and time.monotonic() < deadline:

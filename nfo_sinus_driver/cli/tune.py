@@ -26,6 +26,7 @@ from nfo_sinus_driver.cli.helm import at_the_helm
 from nfo_sinus_driver.cli.helm import spoken
 from nfo_sinus_driver.cli.question import require_yes
 from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.stopping import Stopping
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.drive import DriveError
@@ -95,6 +96,11 @@ class _Tuning:
         except DriveError as error:
             tuned = Tuned(False, str(error), ())
         text = in_our_words(tuned.text)
+        if self._drive.stop_unconfirmed:
+            # nobody else tries on when this command has ended
+            screen.say(text)
+            Stopping(self._helm, self._drive, self._show).confirmed_late()
+            status = status or 1
         if self._options.json:
             facts = {
                 'success': tuned.success,

@@ -352,6 +352,8 @@ class Drive:
         try:
             await inverter.identify(patient=patient)
         except Refused as error:
+            if error.code == Refused.BUSY:
+                raise
             raise DriveError(
                 f'{error}: every {inverter.model.name} has SWVer; is this another model? '
                 'set model to auto or to what it is'

@@ -73,7 +73,8 @@ class LogEntry:
         """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
         if not math.isnan(self.at):
             return _local(self.at)
-        return '' if math.isnan(self.latest) else f'{_local(self.latest)} or before'
+        latest = '' if math.isnan(self.latest) else _local(self.latest)
+        return f'{latest} or before' if latest else ''
 
     def __str__(self) -> str:
         age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
@@ -92,7 +93,11 @@ def hours_of(entry: int) -> float:
 
 
 def _local(at: float) -> str:
-    moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    try:
+        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    except (ValueError, OverflowError, OSError):
+        # no calendar goes back so far: the drive tells nonsense
+        return ''
     return moment.isoformat(' ', 'minutes')
 
 

@@ -302,8 +302,11 @@ class Motion:
 
     def lost(self) -> bool:
         """Take note that the drive does not answer any more; true if it may have followed us."""
-        self._lost_in_use = self.ours
-        self._refusal = None
+        self._lost_in_use = self.ours or self._refusal is not None
+        if self._refusal is not None:
+            # no status will come that could tell a better reason
+            (_, reason), self._refusal = self._refusal, None
+            self._tell(Severity.WARNING, f'stopping: {reason}')
         self.disarm()
         if self._lost_in_use:
             self._withdrawal.begin()

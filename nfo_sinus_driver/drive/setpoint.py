@@ -31,6 +31,7 @@ from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
 
@@ -190,6 +191,7 @@ class Setpoint:
         else:
             # asking a silent drive again at once would starve its neighbours
             self._inverter.answering = False
+            self._registers.unanswered += isinstance(error, NoAnswer)
             self._waits_for_answer = True
             self._written = ()
 
@@ -236,15 +238,16 @@ class Setpoint:
             before = self._request
             try:
                 await self._reference.write_zero(Priority.STOP)
-            except Refused as error:
-                self._refused(f'it refused set-point 0: {error}')
-                return
-            except LinkError:
+            except LinkError as error:
+                if isinstance(error, Refused) and not self._may_be_busy(error):
+                    self._refused(f'it refused set-point 0: {error}')
+                    return
                 # the poll finds out whether the drive is lost; until then this is tried again
                 await self._bus.sleep(_WATCH_PERIOD)
                 return
             if self._request is before:
                 self.commanded = 0.0
+            self._busy_since = math.inf
             self._written = self._reference.words(0.0)
             self._written_at = time.monotonic()
         self._expired = True

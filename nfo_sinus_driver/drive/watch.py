@@ -192,7 +192,8 @@ class Watch:
         # a request that fails is not repeated at once, so that a silent drive costs its
         # neighbours no more than one time-out in each of their cycles
         inverter = self._inverter
-        silent = not inverter.answering or self._registers.unanswered > self._unanswered
+        # one that is busy, or whose answer was damaged, was there
+        silent = self._registers.unanswered > self._unanswered
         alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
         seen = await inverter.look(Priority.POLL, once=True, alarming=alarming)
         inverter.answering, inverter.was_silent = True, silent
