@@ -22,10 +22,13 @@ import math
 import shlex
 
 from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
+from nfo_sinus_driver.drive.settings import ADDRESSES
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.drive.settings import require_address
 from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
@@ -42,7 +45,6 @@ DEFAULTS = {
 }
 #: Nobody waits long for each of 247 addresses.
 SCAN_TIMEOUT = 0.1
-ADDRESSES = range(1, 248)
 
 _ALLOW = '--allow-communication-changes'
 _EPILOG = """
@@ -53,13 +55,24 @@ Reading never changes anything in a drive, and a motor that runs runs on.
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return what was typed, complete with defaults; leave the program if it makes no sense."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     defaults = dict(DEFAULTS)
     if options.verb == 'scan':
         defaults['response_timeout'] = SCAN_TIMEOUT
     for name, default in defaults.items():
         if not hasattr(options, name):
             setattr(options, name, default)
+    protocol = Protocol.CLASSIC if options.protocol == 'classic' else Protocol.MODBUS
+    if options.verb == 'scan' and not options.addresses:
+        options.addresses = tuple(filter(None, ADDRESSES[protocol]))
+    against = getattr(options, 'against', None)
+    named = (options.address, *getattr(options, 'addresses', ()))
+    try:
+        for address in named if against is None else (*named, against):
+            require_address(address, protocol)
+    except ValueError as error:
+        parser.error(str(error))
     return options
 
 
@@ -86,7 +99,12 @@ def _common() -> argparse.ArgumentParser:
         'gateway (default: /dev/ttyUSB0)',
     )
     add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu')
-    add('--address', type=_address, metavar='N', help='of the drive, 1 to 247 (default: 1)')
+    add(
+        '--address',
+        type=_address,
+        metavar='N',
+        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone (default: 1)',
+    )
     add('--model', choices=MODELS, help='default: sinus_g2')
     add(
         '--baud-rate',
@@ -138,9 +156,9 @@ def _parser() -> argparse.ArgumentParser:
     scan.add_argument(
         '--addresses',
         type=_addresses,
-        default=tuple(ADDRESSES),
+        default=(),
         metavar='LIST',
-        help='such as 1-10,20 (default: 1-247)',
+        help='such as 1-10,20 (default: 1-247; classic: 1-94)',
     )
     scan.add_argument(
         '--all-settings',
@@ -286,7 +304,7 @@ def _add_load(load: argparse.ArgumentParser) -> None:
 
 def _address(text: str) -> int:
     address = int(text, 10)
-    if address not in ADDRESSES:
+    if not 0 <= address <= 247:
         raise argparse.ArgumentTypeError(f'{text} is not possible: 1 to 247')
     return address
 

@@ -199,7 +199,9 @@ class Session:
 
     def drive(self, address: int | None = None) -> Remote:
         """Return the drive at an address, or at the one that the options name; nothing is sent."""
-        return Remote(self._bus, self._settings(address or self._options.address))
+        if address is None:
+            address = self._options.address
+        return Remote(self._bus, self._settings(address))
 
     def command(self, listener: Listener, **settings: Any) -> Drive:
         """

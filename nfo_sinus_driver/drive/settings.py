@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import math
 
 from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Protocol
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
@@ -44,7 +45,22 @@ MONITOR_REFUSAL = (
 )
 
 _LONGEST_DRIVE_TIMEOUT = 25.0
-_MODBUS_ADDRESSES = range(1, 248)
+#: On Classic, the one of a drive that is alone on its line, whatever its own is [M0 §6.1.2].
+POINT_TO_POINT = 0
+#: What a drive can be asked by: [M0 §6.2.2]; [M0 §6.1.2], where 95 is everybody [C10].
+ADDRESSES = {Protocol.MODBUS: range(1, 248), Protocol.CLASSIC: range(POINT_TO_POINT, 95)}
+
+
+def require_address(address: int, protocol: Protocol) -> None:
+    """
+    Make sure that a drive can be asked by an address.
+
+    :raises ValueError: it cannot, and which there are.
+    """
+    allowed = ADDRESSES[protocol]
+    if address not in allowed:
+        name = protocol.name.title()
+        raise ValueError(f'address {address}: {name} has {allowed[0]} to {allowed[-1]}')
 
 
 @dataclass(frozen=True)
@@ -52,7 +68,7 @@ class DriveSettings:
     """
     How one drive is to be treated; the fields are the parameters of its node.
 
-    :ivar address: Modbus 1 to 247 [M0 §6.2.2].
+    :ivar address: one of :data:`ADDRESSES`, whichever the line has.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
@@ -100,8 +116,8 @@ class DriveSettings:
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
         modes = ('Freque', 'Speed') if self.model == 'sinus_optimal' else CONTROL_MODES
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
-        if self.address not in _MODBUS_ADDRESSES:
-            raise ValueError(f'address {self.address}: a Modbus drive has 1 to 247')
+        if not any(self.address in allowed for allowed in ADDRESSES.values()):
+            raise ValueError(f'address {self.address}: allowed are 0 to 247')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')

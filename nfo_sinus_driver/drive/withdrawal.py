@@ -80,7 +80,7 @@ class Withdrawal:
     def by_fault(self) -> str:
         """What is said of a motor that a fault has stopped."""
         fault = self._inverter.describe()
-        return f'stopped by fault {fault}; the drive takes no command until it is acknowledged'
+        return f'stopped by fault {fault}; what the drive refuses now is done when it is over'
 
     @property
     def going_on(self) -> bool:
@@ -149,8 +149,17 @@ class Withdrawal:
         while not self._again:
             await self._rest()
             seen = self._inverter.seen
-            if not self._inverter.connected or (seen is not None and not seen.faulted):
+            if not self._inverter.connected:
                 # one that is only being connected to has no polls yet
+                return
+            if seen is not None and not seen.faulted:
+                if seen.runs_by_bus:
+                    self._inverter.tell(
+                        Severity.WARNING,
+                        'the fault ended by itself or at the drive, and the motor started by the '
+                        f'run command that stood there ({self._inverter.describe()}): stopping '
+                        'it; call ~/enable to go on',
+                    )
                 return
 
     async def _rest(self) -> None:

@@ -35,12 +35,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
+from nfo_sinus_driver.drive.settings import require_address
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
@@ -308,8 +310,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         names = {field.name for field in dataclasses.fields(DriveSettings)}
         wanted = {name: value for name, value in values.items() if name in names}
         settings = DriveSettings(**wanted, retries=self._line.retries)  # type: ignore[arg-type]
-        other = self._line.owner_of(settings.address)
-        if other is not None and other is not self:
+        require_address(settings.address, Protocol(self._line.bus.space))
+        other = self._line.rival_of(self, settings.address)
+        if other is not None:
             raise ValueError(
                 f'address {settings.address} belongs to {other.get_name()} already: '
                 'every drive on a bus needs an address of its own'

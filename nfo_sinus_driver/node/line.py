@@ -27,6 +27,7 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive.settings import POINT_TO_POINT
 from nfo_sinus_driver.node.listener import Listener
 from nfo_sinus_driver.node.outbox import Outbox
 
@@ -81,6 +82,10 @@ class Line:
         """Log a line from the outbox, for the bus must not wait for a log."""
         self.outbox.put(lambda: log(text))
 
-    def owner_of(self, address: int) -> DriveNode | None:
-        """Return the node whose drive has an address."""
-        return next((node for node in self.drives if node.settings.address == address), None)
+    def rival_of(self, owner: DriveNode, address: int) -> DriveNode | None:
+        """Return another node whose drive would answer to an address, too."""
+        for node in self.drives:
+            theirs = node.settings.address
+            if node is not owner and (theirs == address or POINT_TO_POINT in (theirs, address)):
+                return node
+        return None

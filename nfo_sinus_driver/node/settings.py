@@ -164,7 +164,13 @@ BUS_SETTINGS = (
 )
 
 DRIVE_SETTINGS = (
-    Setting('address', 1, "The drive's address on the bus; Modbus 1 to 247", 1, 247),
+    Setting(
+        'address',
+        1,
+        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone",
+        0,
+        247,
+    ),
     Setting(
         'model',
         'sinus_g2',

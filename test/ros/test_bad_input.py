@@ -241,7 +241,13 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
-        (['-p', 'address:=0'], ['nfo_sinus: address 0', '1 to 247']),
+        pytest.param(
+            ['-p', 'address:=0'], ['nfo_sinus: address 0', '1 to 247'], marks=needs('modbus')
+        ),
+        pytest.param(
+            ['-p', 'address:=95'], ['nfo_sinus: address 95', '0 to 94'], marks=needs('classic')
+        ),
+        (['-p', 'address:=248'], ['nfo_sinus: address 248', '0 to 247']),
         (['-p', 'address:=one'], ["address is 'one' (a string)", 'write a whole number']),
         (['-p', 'address:="1"'], ["address is '1' (a string)", 'write 1 without quotes']),
         (['-p', 'address:=2.0'], ['address is 2.0 (a double): write 2']),

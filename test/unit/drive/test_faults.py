@@ -228,7 +228,7 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.drive.stop_unconfirmed)
+    wait_until(lambda: rig.drive._motion.taking_back.held_by_fault)
     assert rig.far.runner.scmd == Scmd.FIELDBUS
     # its 2 s are over, and it runs again by itself
     with rig.simulator.lock:
@@ -240,6 +240,7 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     rig.assert_stays_still()
     assert not rig.notes.told('CANNOT STOP')
     assert not rig.notes.told('nobody enabled it')
+    assert rig.notes.told('the motor started by the run command that stood there')
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(20.0)
 
