@@ -30,7 +30,7 @@ _WORDS = (
     ('set model to auto or to what it is', 'give the right --model'),
     ('if this driver is killed', 'if this command is killed'),
     ('the driver is ending', 'this command is ending'),
-    ('; trying again for ever', ''),
+    ('; tried again for ever', ''),
 )
 
 

@@ -138,10 +138,16 @@ class Inverter:
         priority = Priority.STOP if alarmed else priority
         code = int(await self._registers.read_number('fieldbus.inv_st', priority, once=once))
         seen = replace(seen, code=code)
-        # a fault came or went between the two, or the drive treats it as an alarm [C95]
-        differs = seen.listed.kind is not Kind.ALARM
-        differs = differs and (seen.listed.kind is Kind.FAULT) != seen.faulted
-        news = before is not None and code != before.code and not alarmed
+        is_new = before is not None and code != before.code
+        news = is_new and not alarmed
+        # a fault or an alarm came or went between the two; one that stays so is treated as the
+        # other by the drive [C95]
+        kind = seen.listed.kind
+        differs = (
+            is_new and seen.kind is not kind
+            if kind is Kind.ALARM
+            else (kind is Kind.FAULT) != seen.faulted
+        )
         if news and alarming(replace(seen, word=None)):
             differs, priority = True, Priority.STOP
         if differs:

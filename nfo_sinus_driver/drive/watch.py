@@ -245,9 +245,9 @@ class Watch:
             inverter.connected = False
             explained = self._explain(error)
             self._bus.forget_cycle(self._inverter.settings.address)
-            goes_on = 'trying again for ever'
+            goes_on = 'tried again for ever'
             if self._motion is not None and self._motion.lost():
-                goes_on = f'{goes_on}, and stopping it then; call ~/enable after that to go on'
+                goes_on += ', and stopped as soon as it answers; then call ~/enable to go on'
             inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
             try:
                 self._publish(None)

@@ -88,7 +88,7 @@ class AllDrives:
             self._line.bus.run(broadcast_stop(self._line.bus)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
-        return 'a stop for all was broadcast, which nobody confirms'
+        return 'a stop for all was broadcast, which releases every motor and nobody confirms'
 
     def _enable(self) -> tuple[list[str], list[str]]:
         return self._command(_enable_one, _LONGEST_ENABLE)

@@ -178,7 +178,7 @@ def test_long_power_cycle(make_rig: MakeRig) -> None:
     rig.simulator.inject('power-cycle', 3600)
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: not rig.drive.snapshot.connected)
-    assert rig.notes.told('trying again for ever', Severity.ERROR)
+    assert rig.notes.told('tried again for ever', Severity.ERROR)
     rig.set_response_timeout(2.0)
     rig.boot()
     wait_until_connected(rig)

@@ -357,7 +357,7 @@ def test_drive_that_was_off_for_long(make_rig: MakeRig) -> None:
     lines = said(rig)
     assert len([text for text in lines if text.startswith('lost: ')]) == 1
     assert 'check the cable and that the drive has power' in lines[0]
-    assert '~/enable after that to go on' in lines[0]
+    assert 'then call ~/enable to go on' in lines[0]
     meanwhile = [text for text in lines if 'the bus has lost control meanwhile (24 Stop)' in text]
     assert len(meanwhile) == 1
     assert 'was switched off and on' in meanwhile[0]
