@@ -35,6 +35,11 @@ from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+#: How often a busy drive is told again, and for how long, s.
+_BUSY_PERIOD = 0.05
+_LONGEST_BUSY = 0.5
 
 
 class Errands:
@@ -127,12 +132,21 @@ class Errands:
         """
         Write SCMD; once, for nobody knows what has happened before a second one.
 
-        It waits for its turn with the stops: one that comes later must not overtake it.
+        It waits for its turn with the stops: one that comes later must not overtake it. Only a
+        drive that is busy is told again for a while, for it has done nothing.
 
         :raises DriveError: it was stopped meanwhile.
         """
-        loan.require_wanted()
-        await self._registers.write('fieldbus.scmd', command, Priority.STOP, once=True)
+        deadline = time.monotonic() + _LONGEST_BUSY
+        while True:
+            loan.require_wanted()
+            try:
+                await self._registers.write('fieldbus.scmd', command, Priority.STOP, once=True)
+                return
+            except Refused as error:
+                if error.code != Refused.BUSY or time.monotonic() >= deadline:
+                    raise
+            await self._bus.sleep(_BUSY_PERIOD)
 
     @staticmethod
     def _require_idle(what: str, motion: Motion) -> None:

@@ -25,6 +25,8 @@ from typing import Any
 from drive_rig import MakeRig
 from drive_rig import Rig
 import pytest
+from virtual_rig import MakeVirtual
+from virtual_rig import VirtualRig
 
 from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver.drive import DriveSettings
@@ -74,3 +76,21 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
 def rig(make_rig: MakeRig) -> Rig:
     """A rig as most tests need it."""
     return make_rig()
+
+
+@pytest.fixture
+def make_virtual() -> Iterator[MakeVirtual]:
+    """Makes a rig in virtual time, as often as it is asked for; the one before ends."""
+    rigs: list[VirtualRig] = []
+
+    def end() -> None:
+        while rigs:
+            rigs.pop().close()
+
+    def make(parameters: dict[str, Any] | None = None, **settings: Any) -> VirtualRig:
+        end()
+        rigs.append(VirtualRig(parameters, **settings))
+        return rigs[-1]
+
+    yield make
+    end()

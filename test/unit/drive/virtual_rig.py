@@ -1,0 +1,106 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A ride in virtual time, in which a test meets each request just before it is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import any_order_rig
+
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+
+#: What a drive takes to say that it is busy, s.
+_BUSY_TIME = 0.004
+
+
+class VirtualRig(any_order_rig.Rig):
+    """
+    The driver of one drive, and the drive, in virtual time.
+
+    :ivar before: called with each request, register and words, ``None`` if it reads; what it
+        raises is the answer.
+    """
+
+    def __init__(self, parameters: dict[str, Any] | None = None, **settings: Any) -> None:
+        parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
+        settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
+        super().__init__(SimulatedDrive(settings=parameters), DriveSettings(**settings))
+        self.before: Callable[[int, Words | None], None] = lambda register, words: None
+        read, write = self.link.read, self.link.write
+
+        def meet_read(unit: int, address: Address) -> Reply:
+            self.before(address.numbers[0], None)
+            return read(unit, address)
+
+        def meet_write(unit: int, address: Address, words: Words) -> Reply:
+            self.before(address.numbers[0], words)
+            return write(unit, address, words)
+
+        self.link.read, self.link.write = meet_read, meet_write
+
+    def connect(self) -> str:
+        """Connect and activate."""
+        answer = self.answer(self.drive.connect())
+        self.drive.activate()
+        self.pass_time(0.2)
+        return answer
+
+    def ride(self, frequency: float = 20.0) -> None:
+        """Connect, enable and turn, with a program that keeps on sending the set-point."""
+        self.connect()
+        assert 'enabled' in self.answer(self.drive.enable())
+        self.send(frequency)
+        self.pass_time(1.0)
+        assert abs(self.far.motor.frequency - frequency) < 0.2
+        self.notes.events.clear()
+
+    def register(self, key: str) -> int:
+        """Return where a parameter stands."""
+        return self.drive._registers.address(key).numbers[0]
+
+    def be_busy(self, register: int, times: int = 1, *, writes: bool = False) -> None:
+        """Have the drive say so many times that it is busy, to whoever reads or writes this."""
+        left = [times]
+
+        def meet(asked: int, words: Words | None) -> None:
+            if left[0] and asked == register and (words is not None) == writes:
+                left[0] -= 1
+                self.elapse(_BUSY_TIME)
+                raise Refused(Refused.BUSY)
+
+        self.before = meet
+
+    def written(self, register: int) -> list[int]:
+        """Return what was written to a register of one word, in order."""
+        head = f'{register:04x}'
+        frames = [frame['hex'] for frame in self.link.frames]
+        return [int(frame[8:12], 16) for frame in frames if frame[2:8] == f'06{head}']
+
+    def said(self, part: str, severity: Severity | None = None) -> bool:
+        """Whether an event says this."""
+        return any(
+            part in text for _, grave, text in self.notes.events if severity in (None, grave)
+        )
+
+
+MakeVirtual = Callable[..., VirtualRig]
