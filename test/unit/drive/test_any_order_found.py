@@ -12,12 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ``test_any_order.py`` has found, each in the shortest history that shows it."""
+"""What histories in any order have found, each in the shortest one that shows it."""
 
 from __future__ import annotations
 
+from concurrent.futures import Future
+import dataclasses
+import itertools
+
+from drive_rig import RUN
+from drive_rig import SCMD
+import pytest
 from test_any_order import G2DriveControl
 from test_any_order import G2ModeScmd
+from virtual_rig import MakeVirtual
+from virtual_rig import VirtualRig
+
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Words
 
 BUS_FAIL = 15
 
@@ -48,3 +61,127 @@ def test_a_start_that_the_run_input_ends_does_not_wait_for_it() -> None:
         assert not state.rig.far.motor.driven
     finally:
         state.teardown()
+
+
+def test_nothing_is_enabled_while_it_is_awaited_that_the_motor_stands(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual({'control.retard': 3.0})
+    rig.ride()
+    gone = rig.drive.disconnect(1.0)
+    rig.pass_time(0.3)
+    assert not gone.done()
+    assert 'not active' in rig.answer(rig.drive.enable())
+    assert 'left to its ramp' in rig.answer(gone)
+    rig.pass_time(5.0)
+    assert not rig.drive.armed
+    assert not rig.far.motor.driven
+
+
+def timed_out(rig: VirtualRig) -> None:
+    """Kill a driver in the middle of a ride, and start one that wants another drive_timeout."""
+    rig.ride()
+    rig.kill()
+    rig.elapse(3.0)
+    assert rig.far.inv_st_text == 'Sio Fail'
+    rig.settings = dataclasses.replace(rig.settings, drive_timeout=1.0)
+    rig.begin()
+    rig.send(None)
+
+
+def test_a_serial_fault_that_stands_keeps_nobody_from_acknowledging_it(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual(drive_timeout=2.0)
+    timed_out(rig)
+    assert 'firmware' in rig.connect()
+    assert rig.said('drive_timeout cannot be set yet', Severity.WARNING)
+    assert 'Sio Fail stands' in rig.answer(rig.drive.enable())
+    assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
+    writes: list[int] = []
+    rig.wrote = lambda register, words: writes.append(register)
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    assert writes[0] == rig.register('serial.sio_tot')
+    assert rig.far.peek('serial.sio_tot') == 1.0
+    # and once is enough
+    rig.answer(rig.drive.stop())
+    rig.answer(rig.drive.enable())
+    assert writes.count(rig.register('serial.sio_tot')) == 1
+
+
+def test_nothing_runs_without_the_time_out_that_could_not_be_set(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual(drive_timeout=2.0)
+    timed_out(rig)
+    rig.connect()
+    rig.answer(rig.drive.acknowledge())
+    timeout, runs = rig.register('serial.sio_tot'), rig.written(SCMD).count(RUN)
+
+    def refuse(register: int, words: Words | None) -> None:
+        if register == timeout and words is not None:
+            raise Refused(4)
+
+    rig.before = refuse
+    for _ in range(2):
+        assert 'serial.sio_tot' in rig.answer(rig.drive.enable())
+        assert not rig.drive.armed
+    assert rig.written(SCMD).count(RUN) == runs
+    rig.before = lambda register, words: None
+    assert 'enabled' in rig.answer(rig.drive.enable())
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+def test_a_poll_that_a_quick_stop_overtakes_complains_of_nobody(
+    make_virtual: MakeVirtual, method: str
+) -> None:
+    rig = make_virtual(control_method=method, poll_rate=1000.0)
+    rig.connect()
+    for moment in range(12):
+        rig.answer(rig.drive.enable())
+        rig.send(20.0)
+        rig.pass_time(0.3)
+        quick_stopped(rig, moment)
+        rig.pass_time(0.1)
+        assert not rig.said('nobody enabled it'), moment
+
+
+def quick_stopped(rig: VirtualRig, moment: int) -> None:
+    """Stop a drive quickly at so many requests."""
+    requests = itertools.count()
+    stops: list[Future[str]] = []
+
+    def stop(register: int, words: Words | None) -> None:
+        if next(requests) == moment:
+            stops.append(rig.drive.quick_stop())
+
+    rig.before = stop
+    while not stops:
+        rig.pass_time(0.001)
+    assert rig.answer(stops[0]) == 'released: the motor coasts'
+
+
+def test_why_it_stops_is_told_although_the_line_is_lost_at_once(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.ride()
+    setpoint = rig.register('status.frq_set')
+
+    def refuse(register: int, words: Words | None) -> None:
+        if register == setpoint and words is not None and any(words):
+            rig.link.state = 'silent'
+            raise Refused(4)
+
+    rig.before = refuse
+    rig.send(10.0)
+    rig.pass_time(2.0)
+    assert rig.said('stopping: it refused set-point 10', Severity.WARNING)
+    assert rig.said('trying again for ever, and stopping it then', Severity.ERROR)
+    rig.before = lambda register, words: None
+    rig.link.mend()
+    rig.pass_time(5.0)
+    assert rig.drive.snapshot.connected
+    assert not rig.far.motor.driven
+    # it is told once
+    assert sum('refused' in text for _, _, text in rig.notes.events) == 1

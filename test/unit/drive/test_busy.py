@@ -24,6 +24,8 @@ from drive_rig import PATIENCE
 from drive_rig import SCMD
 from drive_rig import Rig
 from drive_rig import wait_until
+import pytest
+from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import Refused
@@ -103,3 +105,75 @@ def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
     wait_until(lambda: rig.notes.told(reason, Severity.WARNING))
     rig.tap.before = lambda register, words: None
     rig.wait_until_still()
+
+
+@pytest.mark.parametrize(
+    ('method', 'key'),
+    [('mode_scmd', 'fieldbus.mode'), ('drive_control', 'fieldbus.drv_ctrl_write_mask')],
+)
+def test_a_quick_stop_stays_one(make_virtual: MakeVirtual, method: str, key: str) -> None:
+    rig = make_virtual({'control.retard': 10.0}, control_method=method)
+    rig.ride()
+    rig.be_busy(rig.register(key), writes=True)
+    assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
+    assert not rig.far.motor.driven
+
+
+@pytest.mark.parametrize('retard', [0.3, 10.0])
+def test_a_stop_is_confirmed_whatever_else_cannot_be_read(
+    make_virtual: MakeVirtual, retard: float
+) -> None:
+    rig = make_virtual({'control.retard': retard})
+    rig.ride()
+    rig.be_busy(rig.register('control.st_mode'), 10_000)
+    assert rig.answer(rig.drive.stop()).startswith('stopping (')
+    assert not rig.drive.stop_unconfirmed
+
+
+def test_set_point_0_is_written_again_when_no_others_come(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual(setpoint_timeout=0.5)
+    rig.ride()
+    rig.be_busy(rig.register('status.frq_set'), writes=True)
+    rig.send(None)
+    rig.pass_time(2.0)
+    assert rig.said('no set-point for 0.5 s', Severity.WARNING)
+    assert abs(rig.far.motor.frequency) < 0.1
+    assert rig.drive.armed
+    rig.send(15.0)
+    rig.pass_time(1.0)
+    assert abs(rig.far.motor.frequency - 15.0) < 0.2
+
+
+def test_one_that_was_busy_was_not_switched_off(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.ride()
+    rig.be_busy(rig.register('status.frq_set'), 5, writes=True)
+    rig.send(10.0)
+    rig.pass_time(0.03)
+    rig.far.press_stop()
+    rig.pass_time(0.5)
+    assert rig.said('Somebody pressed STOP', Severity.WARNING)
+    assert not rig.said('did not answer')
+    assert not rig.said('switched off')
+
+
+def test_one_that_is_busy_when_it_is_connected_to_is_no_other_model(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.be_busy(rig.register('fieldbus.sw_ver'), 10_000)
+    answer = rig.answer(rig.drive.connect())
+    assert 'the drive is busy' in answer
+    assert 'model' not in answer
+    rig.before = lambda register, words: None
+    rig.connect()
+    rig.link.state = 'silent'
+    rig.pass_time(3.0)
+    assert rig.said('lost: ')
+    rig.be_busy(rig.register('fieldbus.sw_ver'), 10_000)
+    rig.link.mend()
+    rig.pass_time(8.0)
+    assert not rig.said('another model')
+    rig.before = lambda register, words: None
+    rig.pass_time(5.0)
+    assert rig.drive.snapshot.connected

@@ -26,11 +26,14 @@ from drive_rig import wait_until
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import log_watch
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.simulator.faults import LogEntry
 
 LOG = 0xC000
@@ -269,3 +272,32 @@ def test_many_readings_are_finer_than_a_tick() -> None:
 
 def test_before_the_first_reading_nothing_is_known() -> None:
     assert math.isnan(OperatingClock().moment(1.0))
+
+
+def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
+    make_virtual: MakeVirtual, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = make_virtual()
+    rig.connect()
+    rig.pass_time(3.0)
+    read, hours = rig.link.read, rig.register('status.op_time')
+
+    def absurd(unit: int, address: Address) -> Reply:
+        reply = read(unit, address)
+        if address.numbers[0] != hours:
+            return reply
+        return Reply((0xFFFF, 0x7FFF), reply.arrived)
+
+    monkeypatch.setattr(rig.link, 'read', absurd)
+    # nobody looked for long, so that only the hours tell when the entry came
+    rig.drive._log_watch._looked_at = -math.inf
+    for code, name in ((5, 'Overload'), (1, 'Par Fail')):
+        rig.far.trip(code)
+        rig.far.end_fault_causes()
+        rig.far.faults.acknowledge()
+        rig.pass_time(31.0)
+        assert rig.said(f'error log: {code} {name} at 1234.5 h')
+    # nor is there anything in the way of who asks for the log
+    log = rig.drive.error_log()
+    rig.answer(log)
+    assert [str(entry).split(' at ')[0] for entry in log.result()] == ['1 Par Fail', '5 Overload']
