@@ -28,6 +28,7 @@ import pytest
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
 
@@ -139,8 +140,11 @@ def test_set_point_0_is_written_again_when_no_others_come(make_virtual: MakeVirt
     assert rig.said('no set-point for 0.5 s', Severity.WARNING)
     assert abs(rig.far.motor.frequency) < 0.1
     assert rig.drive.armed
+    # how long it was busy then does not count any more
+    rig.be_busy(rig.register('status.frq_set'), writes=True)
     rig.send(15.0)
     rig.pass_time(1.0)
+    assert rig.drive.armed
     assert abs(rig.far.motor.frequency - 15.0) < 0.2
 
 
@@ -157,7 +161,24 @@ def test_one_that_was_busy_was_not_switched_off(make_virtual: MakeVirtual) -> No
     assert not rig.said('switched off')
 
 
-def test_one_that_is_busy_when_it_is_connected_to_is_no_other_model(
+def test_one_that_did_not_answer_a_setpoint_may_have_been(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.ride()
+    setpoint = rig.register('status.frq_set')
+
+    def miss(register: int, words: Words | None) -> None:
+        if register == setpoint and words is not None:
+            rig.before = lambda register, words: None
+            rig.far.press_stop()
+            raise NoAnswer('nobody answers')
+
+    rig.before = miss
+    rig.send(10.0)
+    rig.pass_time(0.5)
+    assert rig.said('the drive did not answer for a moment', Severity.WARNING)
+
+
+def test_one_that_is_busy_while_connected_to_is_no_other_model(
     make_virtual: MakeVirtual,
 ) -> None:
     rig = make_virtual()
@@ -165,7 +186,12 @@ def test_one_that_is_busy_when_it_is_connected_to_is_no_other_model(
     answer = rig.answer(rig.drive.connect())
     assert 'the drive is busy' in answer
     assert 'model' not in answer
-    rig.before = lambda register, words: None
+
+
+def test_one_that_is_busy_when_it_is_there_again_is_no_other_model(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
     rig.connect()
     rig.link.state = 'silent'
     rig.pass_time(3.0)

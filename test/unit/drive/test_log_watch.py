@@ -297,6 +297,7 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
         rig.far.faults.acknowledge()
         rig.pass_time(31.0)
         assert rig.said(f'error log: {code} {name} at 1234.5 h')
+        assert not rig.said('or before')
     # nor is there anything in the way of who asks for the log
     log = rig.drive.error_log()
     rig.answer(log)
