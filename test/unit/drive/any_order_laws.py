@@ -113,6 +113,9 @@ class Laws:
         self.disturbed_at = rig.clock.now
         self._running_since: float | None = None
         self._conditions = tuple(self._present_conditions())
+        #: When the last fault came, and of which ride it alone was the end.
+        self._faulted_at = -math.inf
+        self._ended_by_fault: float | None = None
         self._truth: dict[str, tuple[Any, float]] = {}
         #: When what is told of a fact was right last.
         self._agreed_at: dict[str, float] = {}
@@ -166,6 +169,7 @@ class Laws:
         """Take note of something after which the motor may not turn, but for a moment yet."""
         self.enabled_at = None
         self._enabled_for_sure = False
+        self._ended_by_fault = None
         self.lost_at = self.now
         self._no_run_from = max(self._no_run_from, self.now + within)
 
@@ -309,12 +313,24 @@ class Laws:
         if conditions == self._conditions:
             return
         ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
+        if conditions[0] and not self._conditions[0]:
+            self._forgive_fault()
         self._conditions = conditions
+        enabled_at = self.enabled_at
         # what happens before the run command is given does not end an enabling; nor does a RUN
         # input that is lost, for a G2 does not tell it from a start that is yet to come
         unmoved = not self._stood or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
             self.lose(self.noticed)
+        if ended[0]:
+            self._faulted_at = self.now
+            self._ended_by_fault = enabled_at if sum(ended) == 1 else None
+
+    def _forgive_fault(self) -> None:
+        """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""
+        due = max(self.settled_since, self._faulted_at) + self.noticed
+        if self._ended_by_fault is not None and self.now < due:
+            self.enabled_at = self._ended_by_fault
 
     def _judge_running(self) -> None:
         running = self.running
@@ -326,10 +342,10 @@ class Laws:
         if not self.watched or self._method == 'monitor':
             return
         self._foreign = self._foreign and standing
-        if not self._optimal and self._far.faults:
-            # it refuses every command
+        if not self._optimal and self._method == 'mode_scmd' and self._far.faults:
+            # it refuses every command, so that it may go on until it was seen to
             self._no_run_from = max(self._no_run_from, self.now + self.noticed)
-        if standing and self.enabled_at is None:
+        if (standing or running) and self.enabled_at is None:
             self._judge_standing()
         if self._follows and self.turning and self.enabled_at is not None:
             self._judge_setpoint(self.enabled_at)

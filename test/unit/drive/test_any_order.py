@@ -47,6 +47,7 @@ import pytest
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.self_restart import TRIES
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
 WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
@@ -98,6 +99,7 @@ class AnyOrder(RuleBasedStateMachine):
         slow=st.booleans(),
         delay=st.sampled_from((0, 0, 1)),
         drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
+        restart_after=st.sampled_from((None, 0, 1, 2)),
     )
     def begin(
         self,
@@ -106,7 +108,9 @@ class AnyOrder(RuleBasedStateMachine):
         slow: bool = False,
         delay: int = 0,
         drive_timeout: float = 0.0,
+        restart_after: int | None = None,
     ) -> None:
+        """Begin; a G2 ends its faults by itself after some seconds, if there are any."""
         optimal = self.model == 'sinus_optimal'
         if optimal and control_mode not in ('Freque', 'Speed'):
             control_mode = 'Freque'
@@ -117,6 +121,9 @@ class AnyOrder(RuleBasedStateMachine):
             'control.retard': 3.0 if slow else 0.3,
             'control.run_dly': delay,
         }
+        if restart_after is not None and not optimal:
+            parameters.update(dict.fromkeys(TRIES.values(), 3))
+            parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
         far = SimulatedDrive(self.model, settings=parameters)
         self.rig = Rig(
             far,
@@ -541,6 +548,28 @@ def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
                 state.run_input_on(wait=1.0)
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
+    finally:
+        state.teardown()
+
+
+@pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])
+def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> None:
+    state = machine()
+    state.begin(restart_after=1)
+    try:
+        for wait in (0.6, 1.0):
+            state.ride(wait=wait)
+            state.fault(5, standing=True, wait=wait)
+            state.end_cause(wait=0.9)
+            assert state.rig.far.faults and not state.rig.far.motor.driven
+            driven = []
+            for _ in range(100):
+                state.let(0.02)
+                driven.append(state.rig.far.motor.driven)
+            assert not state.rig.far.faults and not state.laws.standing
+            # who refuses every command while a fault stands cannot be stopped before it ends
+            assert any(driven) == (state.method == 'mode_scmd')
+            assert not driven[-1]
     finally:
         state.teardown()
 
