@@ -16,17 +16,26 @@
 What must hold of a drive and its driver whatever happens, judged by the simulated drive alone.
 
 Written from the manuals and the laws of the house, not from the driver: nothing here is imported
-from it but what it publishes. Times are those of the virtual clock.
+from it but what it publishes. What they are judged by is in ``any_order_history.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import Future
-from dataclasses import dataclass
 import math
 from typing import Any
 
+from any_order_history import CARRIED_OUT
+from any_order_history import CONTROL_MODE_PERIOD
+from any_order_history import FOUND
+from any_order_history import LOST
+from any_order_history import LOST_IDLE
+from any_order_history import NOTICED
+from any_order_history import NOTICED_IDLE
+from any_order_history import SETPOINT_TIMEOUT
+from any_order_history import STOPS
+from any_order_history import SWITCH_ON
+from any_order_history import Command
+from any_order_history import History
 from any_order_rig import RESPONSE_TIMEOUT
 from any_order_rig import Rig
 from support import trace_laws
@@ -34,25 +43,6 @@ from support import trace_laws
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 
-POLL_RATE = 5.0
-SETPOINT_TIMEOUT = 1.0
-SHUTDOWN_TIMEOUT = 1.0
-#: One transaction and a little, s.
-TRANSACTION = 0.015
-#: Two polls and a transaction, and what they themselves take: while active, and while not, s.
-NOTICED = 0.5
-NOTICED_IDLE = 1.2
-#: How seldom the control mode may be read, s.
-CONTROL_MODE_PERIOD = 1.0
-#: A command is carried out within this, s.
-CARRIED_OUT = 0.06
-#: Three polls that nobody answers and the drive is lost: while active, and while not, s.
-LOST = 3.0
-LOST_IDLE = 4.0
-#: A run command that could not be taken back is, so long after the line came back, s.
-TAKEN_BACK = 1.7
-#: A drive that was lost is found again within this, s.
-FOUND = 5.0
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
 #: No command keeps anybody waiting longer, s.
@@ -63,212 +53,28 @@ MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
 MODE_STOP, MODE_BUS = 1, 3
 RUN_FIELDBUS = 0x101
 FORWARD, REVERSE = 1 << 3, 1 << 13
-SWITCH_ON = 1 << 0
-
-_STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
 
 
 class Broken(AssertionError):
     """A law is broken."""
 
 
-@dataclass
-class _Command:
-    """A command that is on its way."""
-
-    name: str
-    future: Future[Any]
-    at: float
-    #: The line was whole and the drive known when it was given, and has been since.
-    undisturbed: bool
-
-
-class Laws:
+class Laws(History):
     """Watches a rig; raises :class:`Broken` as soon as a law is."""
 
     def __init__(self, rig: Rig) -> None:
-        self._rig = rig
-        self._far = rig.far
-        self._optimal = rig.settings.model == 'sinus_optimal'
-        self._method = rig.settings.control_method
-        self._follows = rig.settings.reference == 'fieldbus'
-        rig.looked, rig.wrote, rig.gave = self.look, self._wrote, self.gave
-        self._commands: list[_Command] = []
-        #: Somebody enabled it, and nothing has happened since that ends that.
-        self.enabled_at: float | None = None
-        self._enabled_for_sure = False
-        #: When what made it stop happened last, and from when on it may not run.
-        self.lost_at = self._no_run_from = rig.clock.now
-        self._setpoint: tuple[float, float] = (-math.inf, 0.0)
-        #: This driver may have started the motor.
-        self._ours = False
-        #: A run command stood in the drive when it was looked at last.
-        self._stood = False
-        #: The run command that stands is somebody else's.
-        self._foreign = False
-        self.active = self.watched = False
-        self._watched_at = self._active_at = self._commanded_at = rig.clock.now
-        self._whole_since: float | None = rig.clock.now
-        self._broken_since: float | None = None
-        self.disturbed_at = rig.clock.now
-        self._running_since: float | None = None
-        self._conditions = tuple(self._present_conditions())
-        #: When the last fault came, and of which ride it alone was the end.
-        self._faulted_at = -math.inf
-        self._ended_by_fault: float | None = None
+        super().__init__(rig)
+        rig.looked, rig.wrote = self.look, self._wrote
         self._truth: dict[str, tuple[Any, float]] = {}
         #: When what is told of a fact was right last.
         self._agreed_at: dict[str, float] = {}
         self._last: Snapshot | None = None
         self._last_told: dict[str, Any] = {}
-        self._acknowledged = 0
-        self._stop_due: int | None = None
-
-    # --- what the test tells ----------------------------------------------------------------------
-
-    @property
-    def now(self) -> float:
-        return self._rig.clock.now
-
-    def command(self, name: str, future: Future[Any]) -> None:
-        """Take note of a command that was given."""
-        undisturbed = self._steady
-        self._commands.append(_Command(name, future, self.now, undisturbed))
-        if name == 'enable':
-            if self.enabled_at is None:
-                self.enabled_at = self.now
-            self._ours = True
-        elif name in _STOPS:
-            if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
-                self._stop_due = len(self._rig.link.frames)
-            self.lose(CARRIED_OUT)
-        elif name == 'acknowledge':
-            self._acknowledged += 1
-        if name in ('deactivate', 'disconnect', 'stop_for_good'):
-            self.active = False
-        if name == 'disconnect':
-            self.watched = False
-
-    def connected(self) -> None:
-        """Take note that the driver looks after the drive from now on, or tries to."""
-        if not self.watched:
-            self.watched = True
-            self._watched_at = self.now
-            self._no_run_from = max(self._no_run_from, self.now + CARRIED_OUT)
-
-    def activated(self) -> None:
-        """Take note that it polls at full rate from now on."""
-        self.active = True
-        self._active_at = self.now
-
-    def gave(self, value: float) -> None:
-        """Take note of a set-point that was given."""
-        self._setpoint = self.now, value
-
-    def lose(self, within: float) -> None:
-        """Take note of something after which the motor may not turn, but for a moment yet."""
-        self.enabled_at = None
-        self._enabled_for_sure = False
-        self._ended_by_fault = None
-        self.lost_at = self.now
-        self._no_run_from = max(self._no_run_from, self.now + within)
-
-    def disturbed(self) -> None:
-        """Take note that somebody else did something to the drive."""
-        self.disturbed_at = self.now
-
-    def started_by_another(self) -> None:
-        """Take note that somebody else has given a run command over the bus."""
-        self.disturbed_at = self.now
-        self._foreign = True
-
-    def forgotten(self) -> None:
-        """Take note that the drive may have been made to forget its run command."""
-        if not self.standing and not self.pending('enable'):
-            self.lose(self.noticed)
-
-    def control_mode_changed(self) -> None:
-        """Take note that the drive controls another quantity now."""
-        self.disturbed_at = self.now
-        if not self.pending('enable'):
-            self.lose(self.noticed + CONTROL_MODE_PERIOD)
 
     def killed(self) -> None:
-        """Take note that the driver is no more."""
-        self._commands.clear()
+        super().killed()
         self._truth.clear()
         self._agreed_at.clear()
-        self.lose(0.0)
-        self.active = self.watched = self._ours = False
-        self._stop_due = None
-
-    @property
-    def enabling(self) -> bool:
-        """Somebody has enabled it, or is about to."""
-        return self.pending('enable') or self.enabled_at is not None
-
-    def pending(self, name: str) -> bool:
-        """Tell whether a command of this name is on its way."""
-        return any(command.name == name for command in self._commands)
-
-    @property
-    def noticed(self) -> float:
-        """Within which time something is noticed, s."""
-        return NOTICED if self.active else NOTICED_IDLE
-
-    @property
-    def settled_since(self) -> float:
-        """Since when all that happens can be noticed; infinity if it cannot."""
-        if self._whole_since is None or not self.watched or not self._connected:
-            return math.inf
-        return max(self._whole_since, self._watched_at)
-
-    # --- what the simulated drive says ------------------------------------------------------------
-
-    @property
-    def by_bus(self) -> bool:
-        """The bus controls the drive."""
-        return self._far.runner.source.value in ('scmd', 'control_word')
-
-    @property
-    def running(self) -> bool:
-        """The drive carries out a run command that came over the bus."""
-        runner = self._far.runner
-        if self._optimal:
-            return self.by_bus and bool(runner._running)
-        return self.by_bus and runner.state == 'OPERATION_ENABLED'
-
-    @property
-    def standing(self) -> bool:
-        """A run command that came over the bus stands in it, carried out or not."""
-        runner = self._far.runner
-        if self._optimal:
-            return self.by_bus and bool(runner.scmd or runner._steps.run)
-        if runner.source.value == 'scmd':
-            return bool(runner.scmd & 1)
-        return self.by_bus and bool(runner.word & SWITCH_ON)
-
-    @property
-    def turning(self) -> bool:
-        """It turns the motor, or is about to."""
-        motor = self._far.motor
-        return self.running and motor.driven and abs(motor.demand) > 1e-6
-
-    def _present_conditions(self) -> Iterator[bool]:
-        """Return what has to stay as it is for the motor to run on."""
-        yield not self._far.faults
-        yield self.by_bus
-        yield self._far.runner.run_input
-        yield self._far.runner.initialised
-
-    @property
-    def _connected(self) -> bool:
-        snapshot = self._rig.notes.snapshot
-        return snapshot is not None and snapshot.connected
-
-    @property
-    def _steady(self) -> bool:
-        return self.now - self.settled_since > self.noticed
 
     # --- the laws ---------------------------------------------------------------------------------
 
@@ -287,50 +93,6 @@ class Laws:
         acknowledging = [complaint for complaint in found if 'acknowledges' in complaint]
         if len(acknowledging) > self._acknowledged or len(found) > len(acknowledging):
             raise Broken(f'on the line: {found}')
-
-    def _watch_line(self) -> None:
-        if self._rig.link.whole and self._far.listening:
-            if self._whole_since is None:
-                self._whole_since = self.now
-                self._broken_since = None
-                back = FOUND if not self._ours else TAKEN_BACK
-                self._no_run_from = max(self._no_run_from, self.now + back)
-            return
-        self._whole_since = self._stop_due = None
-        for command in self._commands:
-            command.undisturbed = False
-        if self._broken_since is None:
-            self._broken_since = self.now
-        lost = LOST if self.active else LOST_IDLE
-        for_good = self.now - self._broken_since > lost and not self._rig.link.losses
-        if self.enabled_at is not None and for_good:
-            self.lose(TAKEN_BACK)
-        # nobody can stop it now
-        self._no_run_from = max(self._no_run_from, self.now + TAKEN_BACK)
-
-    def _watch_conditions(self) -> None:
-        conditions = tuple(self._present_conditions())
-        if conditions == self._conditions:
-            return
-        ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
-        if conditions[0] and not self._conditions[0]:
-            self._forgive_fault()
-        self._conditions = conditions
-        enabled_at = self.enabled_at
-        # what happens before the run command is given does not end an enabling; nor does a RUN
-        # input that is lost, for a G2 does not tell it from a start that is yet to come
-        unmoved = not self._stood or ended == [False, False, True, False]
-        if any(ended) and not (unmoved and self.pending('enable')):
-            self.lose(self.noticed)
-        if ended[0]:
-            self._faulted_at = self.now
-            self._ended_by_fault = enabled_at if sum(ended) == 1 else None
-
-    def _forgive_fault(self) -> None:
-        """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""
-        due = max(self.settled_since, self._faulted_at) + self.noticed
-        if self._ended_by_fault is not None and self.now < due:
-            self.enabled_at = self._ended_by_fault
 
     def _judge_running(self) -> None:
         running = self.running
@@ -404,13 +166,13 @@ class Laws:
             elif self.now > command.at + LONGEST_COMMAND:
                 raise Broken(f'{command.name} is never answered')
 
-    def _judge_answer(self, command: _Command) -> None:
+    def _judge_answer(self, command: Command) -> None:
         error = command.future.exception()
         if error is not None and type(error).__name__ != 'DriveError':
             raise Broken(f'{command.name} raised {error!r}')
         if command.name == 'enable':
             self._judge_enabled(command, error)
-        elif command.name in _STOPS and self._method != 'monitor':
+        elif command.name in STOPS and self._method != 'monitor':
             untouched = self.disturbed_at + NOTICED_IDLE < command.at and self.enabled_at is None
             if error is None and untouched and self.running:
                 raise Broken(f'{command.name} is answered although it runs')
@@ -418,9 +180,8 @@ class Laws:
             if error is not None and untouched and command.undisturbed and not local:
                 raise Broken(f'{command.name} failed for no reason: {error}')
 
-    def _judge_enabled(self, command: _Command, error: BaseException | None) -> None:
+    def _judge_enabled(self, command: Command, error: BaseException | None) -> None:
         if error is None:
-            self._enabled_for_sure = self.enabled_at is not None
             return
         ours = self.enabled_at is not None and self.enabled_at <= command.at
         if ours and not self.pending('enable'):

@@ -26,11 +26,11 @@ import os
 from typing import Any
 from typing import ClassVar
 
+from any_order_history import POLL_RATE
+from any_order_history import SETPOINT_TIMEOUT
+from any_order_history import SHUTDOWN_TIMEOUT
 from any_order_laws import MODE_BUS
-from any_order_laws import POLL_RATE
 from any_order_laws import RUN_FIELDBUS
-from any_order_laws import SETPOINT_TIMEOUT
-from any_order_laws import SHUTDOWN_TIMEOUT
 from any_order_laws import Laws
 from any_order_rig import Rig
 from hypothesis import HealthCheck
@@ -99,7 +99,7 @@ class AnyOrder(RuleBasedStateMachine):
         slow=st.booleans(),
         delay=st.sampled_from((0, 0, 1)),
         drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
-        restart_after=st.sampled_from((None, 0, 1, 2)),
+        restart_after=st.sampled_from((None, None, 0, 1, 2)),
     )
     def begin(
         self,

@@ -1,0 +1,293 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What has happened to a drive and its driver, as far as the laws in ``any_order_laws.py`` need it.
+
+From what the test tells, and from what the simulated drive and its line show by themselves; what
+the driver says is not asked for, but whether it is connected. Times are those of the virtual clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from any_order_rig import Rig
+
+#: How the driver is set.
+POLL_RATE = 5.0
+SETPOINT_TIMEOUT = 1.0
+SHUTDOWN_TIMEOUT = 1.0
+#: Two polls and a transaction, and what they themselves take: while active, and while not, s.
+NOTICED = 0.5
+NOTICED_IDLE = 1.2
+#: How seldom the control mode may be read, s.
+CONTROL_MODE_PERIOD = 1.0
+#: A command is carried out within this, s.
+CARRIED_OUT = 0.06
+#: Three polls that nobody answers and the drive is lost: while active, and while not, s.
+LOST = 3.0
+LOST_IDLE = 4.0
+#: A run command that could not be taken back is, so long after the line came back, s.
+TAKEN_BACK = 1.7
+#: A drive that was lost is found again within this, s.
+FOUND = 5.0
+
+#: Bit 0 of the control word [M0 table 14].
+SWITCH_ON = 1 << 0
+
+#: Commands that end a ride.
+STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
+
+
+@dataclass
+class Command:
+    """A command that is on its way."""
+
+    name: str
+    future: Future[Any]
+    at: float
+    #: The line was whole and the drive known when it was given, and has been since.
+    undisturbed: bool
+
+
+class History:
+    """Keeps what has happened to a rig, and whether anybody may want the motor to run since."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._far = rig.far
+        self._optimal = rig.settings.model == 'sinus_optimal'
+        self._method = rig.settings.control_method
+        self._follows = rig.settings.reference == 'fieldbus'
+        rig.gave = self.gave
+        self._commands: list[Command] = []
+        #: Somebody enabled it, and nothing has happened since that ends that.
+        self.enabled_at: float | None = None
+        #: When what made it stop happened last, and from when on it may not run.
+        self.lost_at = self._no_run_from = rig.clock.now
+        self._setpoint: tuple[float, float] = (-math.inf, 0.0)
+        #: This driver may have started the motor.
+        self._ours = False
+        #: A run command stood in the drive when it was looked at last.
+        self._stood = False
+        #: The run command that stands is somebody else's.
+        self._foreign = False
+        self.active = self.watched = False
+        self._watched_at = self._active_at = self._commanded_at = rig.clock.now
+        self._whole_since: float | None = rig.clock.now
+        self._broken_since: float | None = None
+        self.disturbed_at = rig.clock.now
+        self._running_since: float | None = None
+        self._conditions = tuple(self._present_conditions())
+        #: When the last fault came, and when the ride was enabled that ended by it alone, if the
+        #: drive may end that fault by itself.
+        self._faulted_at = -math.inf
+        self._ended_by_fault: float | None = None
+        self._acknowledged = 0
+        self._stop_due: int | None = None
+
+    # --- what the test tells ----------------------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        return self._rig.clock.now
+
+    def command(self, name: str, future: Future[Any]) -> None:
+        """Take note of a command that was given."""
+        undisturbed = self._steady
+        self._commands.append(Command(name, future, self.now, undisturbed))
+        if name == 'enable':
+            if self.enabled_at is None:
+                self.enabled_at = self.now
+            self._ours = True
+        elif name in STOPS:
+            if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
+                self._stop_due = len(self._rig.link.frames)
+            self.lose(CARRIED_OUT)
+        elif name == 'acknowledge':
+            self._acknowledged += 1
+        if name in ('deactivate', 'disconnect', 'stop_for_good'):
+            self.active = False
+        if name == 'disconnect':
+            self.watched = False
+
+    def connected(self) -> None:
+        """Take note that the driver looks after the drive from now on, or tries to."""
+        if not self.watched:
+            self.watched = True
+            self._watched_at = self.now
+            self._no_run_from = max(self._no_run_from, self.now + CARRIED_OUT)
+
+    def activated(self) -> None:
+        """Take note that it polls at full rate from now on."""
+        self.active = True
+        self._active_at = self.now
+
+    def gave(self, value: float) -> None:
+        """Take note of a set-point that was given."""
+        self._setpoint = self.now, value
+
+    def lose(self, within: float) -> None:
+        """Take note of something after which the motor may not turn, but for a moment yet."""
+        self.enabled_at = None
+        self._ended_by_fault = None
+        self.lost_at = self.now
+        self._no_run_from = max(self._no_run_from, self.now + within)
+
+    def disturbed(self) -> None:
+        """Take note that somebody else did something to the drive."""
+        self.disturbed_at = self.now
+
+    def started_by_another(self) -> None:
+        """Take note that somebody else has given a run command over the bus."""
+        self.disturbed_at = self.now
+        self._foreign = True
+
+    def forgotten(self) -> None:
+        """Take note that the drive may have been made to forget its run command."""
+        if not self.standing and not self.pending('enable'):
+            self.lose(self.noticed)
+
+    def control_mode_changed(self) -> None:
+        """Take note that the drive controls another quantity now."""
+        self.disturbed_at = self.now
+        if not self.pending('enable'):
+            self.lose(self.noticed + CONTROL_MODE_PERIOD)
+
+    def killed(self) -> None:
+        """Take note that the driver is no more."""
+        self._commands.clear()
+        self.lose(0.0)
+        self.active = self.watched = self._ours = False
+        self._stop_due = None
+
+    @property
+    def enabling(self) -> bool:
+        """Somebody has enabled it, or is about to."""
+        return self.pending('enable') or self.enabled_at is not None
+
+    def pending(self, name: str) -> bool:
+        """Tell whether a command of this name is on its way."""
+        return any(command.name == name for command in self._commands)
+
+    @property
+    def noticed(self) -> float:
+        """Within which time something is noticed, s."""
+        return NOTICED if self.active else NOTICED_IDLE
+
+    @property
+    def settled_since(self) -> float:
+        """Since when all that happens can be noticed; infinity if it cannot."""
+        if self._whole_since is None or not self.watched or not self._connected:
+            return math.inf
+        return max(self._whole_since, self._watched_at)
+
+    # --- what the simulated drive says ------------------------------------------------------------
+
+    @property
+    def by_bus(self) -> bool:
+        """The bus controls the drive."""
+        return self._far.runner.source.value in ('scmd', 'control_word')
+
+    @property
+    def running(self) -> bool:
+        """The drive carries out a run command that came over the bus."""
+        runner = self._far.runner
+        if self._optimal:
+            return self.by_bus and bool(runner._running)
+        return self.by_bus and runner.state == 'OPERATION_ENABLED'
+
+    @property
+    def standing(self) -> bool:
+        """A run command that came over the bus stands in it, carried out or not."""
+        runner = self._far.runner
+        if self._optimal:
+            return self.by_bus and bool(runner.scmd or runner._steps.run)
+        if runner.source.value == 'scmd':
+            return bool(runner.scmd & 1)
+        return self.by_bus and bool(runner.word & SWITCH_ON)
+
+    @property
+    def turning(self) -> bool:
+        """It turns the motor, or is about to."""
+        motor = self._far.motor
+        return self.running and motor.driven and abs(motor.demand) > 1e-6
+
+    def _present_conditions(self) -> Iterator[bool]:
+        """Return what has to stay as it is for the motor to run on."""
+        yield not self._far.faults
+        yield self.by_bus
+        yield self._far.runner.run_input
+        yield self._far.runner.initialised
+
+    @property
+    def _connected(self) -> bool:
+        snapshot = self._rig.notes.snapshot
+        return snapshot is not None and snapshot.connected
+
+    @property
+    def _steady(self) -> bool:
+        return self.now - self.settled_since > self.noticed
+
+    # --- what is seen -----------------------------------------------------------------------------
+
+    def _watch_line(self) -> None:
+        if self._rig.link.whole and self._far.listening:
+            if self._whole_since is None:
+                self._whole_since = self.now
+                self._broken_since = None
+                back = FOUND if not self._ours else TAKEN_BACK
+                self._no_run_from = max(self._no_run_from, self.now + back)
+            return
+        self._whole_since = self._stop_due = None
+        for command in self._commands:
+            command.undisturbed = False
+        if self._broken_since is None:
+            self._broken_since = self.now
+        lost = LOST if self.active else LOST_IDLE
+        for_good = self.now - self._broken_since > lost and not self._rig.link.losses
+        if for_good and (self.enabled_at is not None or self._ended_by_fault is not None):
+            self.lose(TAKEN_BACK)
+        # nobody can stop it now
+        self._no_run_from = max(self._no_run_from, self.now + TAKEN_BACK)
+
+    def _watch_conditions(self) -> None:
+        conditions = tuple(self._present_conditions())
+        if conditions == self._conditions:
+            return
+        ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
+        if conditions[0] and not self._conditions[0]:
+            self._forgive_fault()
+        self._conditions = conditions
+        enabled_at = self.enabled_at
+        # what happens before the run command is given does not end an enabling; nor does a RUN
+        # input that is lost, for a G2 does not tell it from a start that is yet to come
+        unmoved = not self._stood or ended == [False, False, True, False]
+        if any(ended) and not (unmoved and self.pending('enable')):
+            self.lose(self.noticed)
+        if ended[0]:
+            self._faulted_at = self.now
+            by_itself = all(map(self._far.self_restart._has_tries, self._far.faults.codes))
+            self._ended_by_fault = enabled_at if by_itself and sum(ended) == 1 else None
+
+    def _forgive_fault(self) -> None:
+        """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""
+        due = max(self.settled_since, self._faulted_at) + self.noticed
+        if self._ended_by_fault is not None and self.now < due:
+            self.enabled_at = self._ended_by_fault
