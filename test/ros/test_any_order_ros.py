@@ -39,7 +39,7 @@ pytestmark = needs('states')
 _QUICK = ('--set', 'control.accel=0.2', '--set', 'control.retard=0.2', '--boot-time', '0.2')
 _EAGER = ('-p', 'poll_rate:=20.0', '-p', 'setpoint_timeout:=0.3')
 #: For how long nothing may start, s of the simulated drive; longer than a few polls.
-_A_MOMENT = 0.25
+_A_MOMENT = 0.2
 _OVERLOAD = 5
 
 
