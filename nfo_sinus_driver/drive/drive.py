@@ -166,6 +166,11 @@ class Drive:
         return self._motion is not None and self._motion.stopping
 
     @property
+    def held_by_fault(self) -> bool:
+        """A fault keeps the drive from taking a stop, and the motor still."""
+        return self._motion is not None and self._motion.taking_back.held_by_fault
+
+    @property
     def stop_overdue(self) -> bool:
         """It has had time to confirm it, and no fault keeps it from turning the motor."""
         return self._motion is not None and self._motion.taking_back.overdue

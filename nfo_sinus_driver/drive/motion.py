@@ -194,7 +194,8 @@ class Motion:
         except (DriveError, LinkError) as error:
             self._withdrawal.begin()
             seen = self._inverter.seen
-            if isinstance(error, Refused) and seen is not None and seen.faulted and not seen.driven:
+            by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
+            if isinstance(error, Refused) and by_fault:
                 return self._withdrawal.by_fault
             raise DriveError(f'the quick stop is NOT confirmed: {error}; trying a stop') from error
         finally:

@@ -179,7 +179,7 @@ def test_why_it_stops_is_told_although_the_line_is_lost_at_once(
     rig.send(10.0)
     rig.pass_time(2.0)
     assert rig.said('stopping: it refused set-point 10', Severity.WARNING)
-    assert rig.said('trying again for ever, and stopping it then', Severity.ERROR)
+    assert rig.said('tried again for ever, and stopped as soon as it answers', Severity.ERROR)
     rig.before = lambda register, words: None
     rig.link.mend()
     rig.pass_time(5.0)
