@@ -552,6 +552,27 @@ def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
         state.teardown()
 
 
+@pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl, OptimalModeScmd])
+def test_a_set_point_from_before_enable_turns_nothing(machine: type[AnyOrder]) -> None:
+    state = machine()
+    state.begin()
+    try:
+        state.set_once(20.0)
+        state.enable(wait=1.0)
+        assert state.rig.drive.armed
+        assert state.rig.far.motor.frequency == 0
+        # nor does one from the ride before
+        state.send(20.0, wait=1.0)
+        assert state.rig.far.motor.frequency > 19.0
+        state.send(None, wait=0.1)
+        state.stop(wait=2.0)
+        state.enable(wait=1.0)
+        assert state.rig.drive.armed
+        assert state.rig.far.motor.frequency == 0
+    finally:
+        state.teardown()
+
+
 @pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])
 def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> None:
     state = machine()
