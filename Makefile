@@ -54,7 +54,7 @@ types: setup ## mypy, on all that is not ROS
 # More workers than processors: these tests wait more than they work.
 unit: setup ## tests without ROS, with the current and with the oldest pymodbus
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 4 test/unit
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 4 --dist worksteal test/unit
 	@echo '== unit again, what uses pymodbus: the current one'
 	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 4 test/unit/link test/unit/simulator
 
