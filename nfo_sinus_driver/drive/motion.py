@@ -171,7 +171,7 @@ class Motion:
 
     async def quick_stop(self) -> str:
         """
-        Release the motor at once: it coasts, and control is given back.
+        Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
         Where the drive has no way to do that, stop as usual [C96].
 
@@ -207,7 +207,7 @@ class Motion:
 
     async def acknowledge(self) -> str:
         """
-        Acknowledge a fault and take the run command back, so that nothing starts by it.
+        Acknowledge a fault; take the run command back before or, by [M0 §6.1.5], just after it.
 
         :returns: what was acknowledged.
         :raises DriveError: the fault still stands.
