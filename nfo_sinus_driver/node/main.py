@@ -20,6 +20,7 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 
 from __future__ import annotations
 
+from collections import deque
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import ctypes
@@ -65,6 +66,9 @@ _POLL_SIGNALS = 0.5
 _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
+
+#: Signals that came to threads of others; the worst of them would have ended us with no stop.
+_strays: deque[int] = deque()
 
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
@@ -232,13 +236,28 @@ def main(args: list[str] | None = None) -> int:
     """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _limit_arenas()
-    # blocked before any thread exists, so that only the main thread ever sees them
+    # blocked before our threads exist, so that none of them ever sees them
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | SUSPENDING)
+    for number in ENDING | SUSPENDING:
+        signal.signal(number, _take_stray)
     output = Output()
     try:
         return _run(*take_out_node_name(sys.argv if args is None else args))
     finally:
         output.close()
+
+
+def _take_stray(number: int, _: object) -> None:
+    """Keep a signal that came to a thread which libraries had started before we could block it."""
+    _strays.append(number)
+
+
+def _next_signal() -> int | None:
+    """Wait a while for a signal."""
+    caught = signal.sigtimedwait(ENDING | SUSPENDING, _POLL_SIGNALS)
+    if caught is not None:
+        return caught.si_signo
+    return _strays.popleft() if _strays else None
 
 
 def _limit_arenas() -> None:
@@ -273,11 +292,11 @@ def _await_end(process: DriverProcess) -> str:
     """Wait until something ends the driver; return what."""
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
-        caught = signal.sigtimedwait(ENDING | SUSPENDING, _POLL_SIGNALS)
-        if caught is None:
+        number = _next_signal()
+        if number is None:
             continue
-        name = signal_name(caught.si_signo)
-        if caught.si_signo in ENDING:
+        name = signal_name(number)
+        if number in ENDING:
             return name
         log.warning(f'{name} ignored: a suspended driver would leave the motors running')
     return 'a part of the driver has ended by itself'

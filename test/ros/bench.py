@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
+import ctypes
 import json
 import os
 from pathlib import Path
@@ -122,10 +123,18 @@ class Process:
         """It has not ended."""
         return self._process.poll() is None
 
-    def signal(self, number: int) -> None:
-        """Send it a signal, which may end it."""
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._process.pid
+
+    def signal(self, number: int, thread: int | None = None) -> None:
+        """Send it, or one of its threads, a signal, which may end it."""
         self._may_end = True
-        self._process.send_signal(number)
+        if thread is None:
+            self._process.send_signal(number)
+        else:
+            assert ctypes.CDLL(None).tgkill(self.pid, thread, number) == 0
 
     def wait(self) -> int:
         """Wait for its end; return its exit status."""

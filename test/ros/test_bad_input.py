@@ -386,7 +386,7 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
 
 def test_a_driver_that_ends_by_itself_fails_a_test_at_once_with_what_it_said(bench: Bench) -> None:
     drive = bench.simulator()
-    bench.driver('-p', 'address:=0')
+    bench.driver('-p', 'address:=248')
     client = bench.client()
     begun = time.monotonic()
     with pytest.raises(AssertionError, match=r'ended by itself .2.*is connected[^$]*247'):

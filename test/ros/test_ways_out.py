@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 import signal
 
 from bench import A_WHILE
@@ -72,6 +73,27 @@ def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int)
     assert state['scmd'] == 0
     assert state['fault'] == 0
     assert state['mode_ext_writes'] == 0
+
+
+def test_a_signal_that_comes_to_a_thread_of_a_library_stops_the_motor(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    driver = bench.driver()
+    client = bench.client().connected()
+    open_ones = [
+        thread
+        for thread in Path(f'/proc/{driver.pid}/task').iterdir()
+        if int(thread.name) != driver.pid
+        and 'SigBlk:\t0000000000000000' in (thread / 'status').read_text(encoding='utf-8')
+    ]
+    if not open_ones:
+        pytest.skip('no library has started a thread before the driver could block signals')
+    with client.run_at(20.0):
+        assert drive.state()['turning']
+        driver.signal(signal.SIGTERM, thread=int(open_ones[0].name))
+        assert driver.wait() == 0, driver.text
+        state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert state['mode'] == 1, 'control was not given back'
+    assert state['fault'] == 0
 
 
 def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
