@@ -177,6 +177,20 @@ class Bus:
         """
         return Transfer(unit, address, priority, words)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words, priority: Priority
+    ) -> Transfer:
+        """
+        Read a parameter whose value nobody needs, then write another (to be awaited).
+
+        One turn: nothing is sent between, whatever becomes of the read.
+
+        :param source: of one word.
+        :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
+        """
+        send = functools.partial(self._link.read_then_write, unit, source, address, words)
+        return Transfer(unit, address, priority, words, send)
+
     async def identify(self, unit: int, priority: Priority) -> Identification:
         """
         Ask a unit who it is, one transaction at a time, and none of them twice (to be awaited).

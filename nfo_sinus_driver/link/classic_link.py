@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 import time
 from typing import NamedTuple
 
@@ -187,6 +188,26 @@ class ClassicLink:
         """
         self.write(unit, address, words)
         return self.read(unit, source)
+
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        request = Enquiry(unit, source.numbers[0])
+        self._listen(request)
+        try:
+            with contextlib.suppress(NoAnswer, DamagedAnswer):
+                _, _, early = self._transact(request)
+                if early:
+                    self._distrust(request)
+            return self.write(unit, address, words)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
 
     def identify(self, unit: int) -> NothingToAsk:
         """Return no questions: the protocol has none but for parameters."""

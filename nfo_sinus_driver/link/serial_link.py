@@ -167,6 +167,15 @@ class SerialLink(ModbusLink):
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
 
+    def _ask_unheard(self, request: Request[object]) -> None:
+        """Send a request at once and wait for its answer, whatever that is and says."""
+        self._await_silence()
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
+            self._transact(request)
+        if self._repeats is not None:
+            # it may be the one before, told twice
+            self._doubts.add(request)
+
     def _probe(self, request: Request[Any]) -> None:
         """Have the unit answer something that cannot be confused with what may still come."""
         probe, until = self._doubts.probe(request.unit)
