@@ -190,6 +190,13 @@ class DirectLink:
         self._exchange(request, 8, carry_out)
         return Reply((), self._rig.clock.now)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NotReady):
+            self.read(unit, source)
+        return self.write(unit, address, words)
+
     def _require_port(self) -> None:
         if self.state == 'gone':
             raise PortError('the port is gone')

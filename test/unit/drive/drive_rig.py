@@ -117,6 +117,13 @@ class Tap:
         self.before(address.numbers[0], words)
         return self._link.write(unit, address, words)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        self.before(source.numbers[0], None)
+        self.before(address.numbers[0], words)
+        return self._link.read_then_write(unit, source, address, words)
+
 
 class Rig:
     """
