@@ -50,6 +50,8 @@ class ModeScmd:
     coasts = True
     #: The parameter that takes the run command; its codes for stop and run are the same on both.
     _command = 'fieldbus.scmd'
+    #: What releases the motor soonest; SCMD = Stop would let it ramp down.
+    _soonest: tuple[str, int] = ('fieldbus.mode', Mode.STOP)
 
     def __init__(self, registers: Registers, run: int = Scmd.FIELDBUS) -> None:
         self._registers = registers
@@ -154,7 +156,7 @@ class ModeScmd:
         Acknowledge a fault: a serial one by MODE = Stop, else by reading SioErr ([C42], [C99]).
 
         Any other by reading the status that acknowledges, once nothing is left that could turn the
-        motor; if the drive lets go of nothing, with SCMD = Stop as the very next frame.
+        motor. If the drive lets go of nothing, what releases it soonest is the very next frame.
         """
         if code != SIO_FAIL:
             await self._acknowledge_by_reading(control_mode)
@@ -175,7 +177,7 @@ class ModeScmd:
         key = 'fieldbus.inv_st_with_ack'
         ours = await self.in_control(_ACK)
         if ours and await self.remove(control_mode) is Removal.NOTHING:
-            await self._registers.acknowledge_and_write(key, self._command, Scmd.STOP)
+            await self._registers.acknowledge_and_write(key, *self._soonest)
         else:
             await self._registers.acknowledge(key, _ACK)
 
@@ -193,6 +195,7 @@ class ModeSmode(ModeScmd):
 
     coasts = False
     _command = 'fieldbus.smode'
+    _soonest = ('fieldbus.smode', Smode.STOP)
 
     async def take_control(self) -> None:
         """Put the drive under bus control with no run command standing."""

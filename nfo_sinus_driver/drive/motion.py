@@ -197,6 +197,8 @@ class Motion:
                 )
         except (DriveError, LinkError) as error:
             self._withdrawal.begin()
+            with contextlib.suppress(LinkError):
+                await self._inverter.look(Priority.STOP)
             seen = self._inverter.seen
             by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
             if isinstance(error, Refused) and by_fault:

@@ -132,6 +132,7 @@ class DirectLink:
         any more; ``gone``: the port is.
     :ivar losses: how many answers are still lost although the line is whole.
     :ivar unheard: how many requests are.
+    :ivar doubled: how many answers come twice yet: each spoils the next.
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
@@ -140,19 +141,19 @@ class DirectLink:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self.state = 'whole'
-        self.losses = self.unheard = 0
+        self.losses = self.unheard = self.doubled = 0
         self.frames: list[dict[str, Any]] = []
         self.asked_at = rig.clock.now
         self._not_ready_until = 0.0
 
     @property
     def whole(self) -> bool:
-        return self.state == 'whole' and not self.losses and not self.unheard
+        return self.state == 'whole' and not (self.losses or self.unheard or self.doubled)
 
     def mend(self) -> None:
         """End all that is wrong with the line."""
         self.state = 'whole'
-        self.losses = self.unheard = 0
+        self.losses = self.unheard = self.doubled = 0
 
     def open(self) -> None:
         self._require_port()
@@ -229,6 +230,9 @@ class DirectLink:
         return words
 
     def _lose_answer(self) -> None:
+        if self.doubled:
+            self.doubled -= 1
+            raise DamagedAnswer('an answer came twice')
         self.losses -= self.losses > 0
         self._rig.elapse(RESPONSE_TIMEOUT)
         if self.state == 'noise':
