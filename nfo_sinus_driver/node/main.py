@@ -43,6 +43,7 @@ from nfo_sinus_driver.node.arguments import refuse_other_arguments
 from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.output import Output
 from nfo_sinus_driver.node.overrides import bus_overrides
@@ -52,8 +53,9 @@ from nfo_sinus_driver.signals import ENDING
 from nfo_sinus_driver.signals import SUSPENDING
 from nfo_sinus_driver.signals import signal_name
 
-#: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
-_GROUPS_OF_A_DRIVE = 16
+#: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
+#: more for ``~/enable``.
+_GROUPS_OF_A_DRIVE = 15 + CALLS_OF_ENABLE
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
@@ -152,17 +154,15 @@ class DriverProcess:
         # all are told before the first is waited for, and nobody can enable any of them again
         stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
-        # a drive that never answered was never started, and may well not be there
-        connected = [node for node in self._drives if node.drive.identity is not None]
         unconfirmed = [
             node
             for node, future in stops
-            if node in connected and not _confirmed(node, future, begun)
+            if self._may_be_there(node) and not _confirmed(node, future, begun)
         ]
         releases = [
             (node, node.drive.disconnect(_time_left(node, begun)))
-            for node in connected
-            if node not in unconfirmed
+            for node in self._drives
+            if node.drive.heard and node not in unconfirmed
         ]
         unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         for node in unconfirmed:
@@ -171,6 +171,11 @@ class DriverProcess:
                 'the emergency stop'
             )
         return not unconfirmed
+
+
+    def _may_be_there(self, node: DriveNode) -> bool:
+        """Tell whether there may be a motor: one that never answered was never started by us."""
+        return node.drive.heard or self._bus_node.line.bus.port_error is None
 
 
 def _await_callbacks(executor: MultiThreadedExecutor) -> None:
@@ -187,7 +192,11 @@ def _time_left(node: DriveNode, begun: float) -> float:
 
 
 def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
-    """Wait for the answer to a stop or a release, and log it."""
+    """
+    Wait for the answer to a stop or a release, and log it.
+
+    A drive that has never answered anything need not confirm: it may well not be there.
+    """
     log = node.get_logger()
     try:
         answer = future.result(_time_left(node, begun) + _LAST_ANSWER)
@@ -195,6 +204,8 @@ def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except DriveError as error:
+        if not node.drive.heard:
+            return True
         log.error(str(error))
         return False
     if answer:
