@@ -28,6 +28,7 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
+from nfo_sinus_driver.node.line import COMMANDS
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.node.drive_node import DriveNode
@@ -56,7 +57,9 @@ class Commands:
         # several, for to disable must not wait for an enable that waits for a start delay; but not
         # any number, for each keeps a thread that other drives may need
         group = BoundedCallbackGroup(CALLS_OF_ENABLE)
-        node.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
+        node.create_service(
+            SetBool, '~/enable', self._on_enable, qos_profile=COMMANDS, callback_group=group
+        )
         self.offer('~/stop', Drive.stop, _LONGEST_STOP)
         self.offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
         self.offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
@@ -71,7 +74,9 @@ class Commands:
             return self._answer(response, command, timeout)
 
         group = MutuallyExclusiveCallbackGroup()
-        self._node.create_service(Trigger, name, answer, callback_group=group)
+        self._node.create_service(
+            Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
+        )
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response

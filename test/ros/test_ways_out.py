@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 import signal
 
@@ -62,7 +63,8 @@ def _stops(state: dict) -> bool:
 )
 def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int) -> None:
     drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
-    driver = bench.driver()
+    # as a background job of a shell is started, and worse
+    driver = bench.driver(through=('env', '--ignore-signal=INT,QUIT,HUP,TERM,USR1,RTMIN'))
     client = bench.client().connected()
     with client.run_at(20.0):
         assert drive.state()['turning']
@@ -275,6 +277,39 @@ def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
         wait_until(lambda: 'SIGTSTP ignored' in driver.text, 'the warning')
         assert client.call('stop').success
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+
+
+def test_a_driver_that_was_suspended_takes_no_signal_for_granted(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    driver = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGSTOP)
+        stood = drive.state()['time']
+        # longer than it ever waits for a signal
+        drive.wait_for(lambda state: state['time'] > stood + 1.0, timeout=PATIENCE)
+        driver.signal(signal.SIGCONT)
+        driver.signal(signal.SIGTSTP)
+        wait_until(lambda: 'SIGTSTP ignored' in driver.text, 'the warning')
+        assert driver.text.count('ignored') == 1, driver.text
+        assert driver.running
+
+
+def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> None:
+    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    pipe = bench.folder / 'pipe'
+    os.mkfifo(pipe)
+    with open(os.open(pipe, os.O_RDWR | os.O_NONBLOCK), 'wb', buffering=0) as nobody:
+        while nobody.write(b'.'):
+            continue
+        into_the_pipe = ('sh', '-c', f'exec "$@" >{pipe} 2>&1', 'sh')
+        driver = bench.driver('--log-level', 'debug', through=into_the_pipe)
+        client = bench.client().connected()
+        with client.run_at(20.0):
+            driver.signal(signal.SIGTERM)
+            assert driver.wait() == 0
+        state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert state['mode'] == 1, 'control was not given back'
 
 
 def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Bench) -> None:

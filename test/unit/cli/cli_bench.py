@@ -44,6 +44,8 @@ PATIENCE = 60.0
 #: The functions that write [M0 §6.2.3].
 WRITES = {6, 16, 23}
 COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+#: As a shell starts its background jobs.
+BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 
 
 MakeBench = Callable[..., 'Bench']
@@ -177,10 +179,12 @@ class Bench:
         )
         return Done(done.returncode, done.stdout, done.stderr)
 
-    def begin(self, *arguments: object) -> subprocess.Popen[str]:
-        """Begin to run it."""
+    def begin(
+        self, *arguments: object, through: tuple[str, ...] = ()
+    ) -> subprocess.Popen[str]:
+        """Begin to run it, by way of another command if need be."""
         return subprocess.Popen(
-            [*COMMAND, *self.options, *map(str, arguments)],
+            [*through, *COMMAND, *self.options, *map(str, arguments)],
             cwd=ROOT,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
