@@ -31,6 +31,8 @@ import time
 from typing import Any
 from typing import NamedTuple
 
+from support.variants import hardest
+
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -75,6 +77,7 @@ class Bench:
     def __init__(self, trace: Path, **options: Any) -> None:
         self._trace = trace
         options.setdefault('serial_numbers', ['NFO1001', 'NFO1002'])
+        options.setdefault('variant', hardest())
         self.simulator = Simulator([1, 2], trace=str(trace), boot_time=0.1, **options)
         self.options = ('--port', self.simulator.port, '--response-timeout', '2.0')
         for name in ('protocol', 'model'):

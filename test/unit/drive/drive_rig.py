@@ -29,6 +29,7 @@ from typing import Any
 
 import pytest
 from support import trace_laws
+from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
@@ -136,6 +137,7 @@ class Rig:
     ) -> None:
         self._trace = trace
         options.setdefault('boot_time', 0.2)
+        options.setdefault('variant', hardest(settings.model))
         self.simulator = Simulator(
             baud=BAUD,
             trace=str(trace),
