@@ -96,6 +96,7 @@ class SimulatedDrive:
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
     :ivar firmware: what its firmware does its own way.
     :ivar tears: how many times yet a counter goes on between the readings of its two halves.
+    :ivar step: the longest step of model time while something moves (s).
     :ivar time: model time since the start (s).
     :ivar identification: the objects of Read Device Identification, by number [M0 §6.2.4].
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
@@ -147,6 +148,7 @@ class SimulatedDrive:
         self.sio_err_reads = 0
         self.mode_ext_writes = 0
         self.tears = 0
+        self.step = _STEP
         self.time = 0.0
         self._lenient = lenient
         self._registers = RegisterMap(self.model)
@@ -161,8 +163,9 @@ class SimulatedDrive:
     def advance(self, dt: float) -> None:
         """Let ``dt`` seconds of model time pass."""
         while dt > 1e-9:
-            step = min(dt, _IDLE_STEP if self._resting else _STEP)
-            self._pass(step)
+            resting = self._resting
+            step = min(dt, _IDLE_STEP if resting else self.step)
+            self._pass(step, resting)
             dt -= step
 
     def advance_to(self, now: float) -> None:
@@ -425,7 +428,7 @@ class SimulatedDrive:
     def _bus_controls(self) -> bool:
         return self.runner.mode == Mode.BUS
 
-    def _pass(self, dt: float) -> None:
+    def _pass(self, dt: float, resting: bool) -> None:
         self.time += dt
         self._silent_left = max(0.0, self._silent_left - dt)
         if self._boot_left > 0:
@@ -441,7 +444,8 @@ class SimulatedDrive:
         self.self_restart.wait(dt, driven=self.motor.driven, voltage=self.motor.voltage_on)
         self.motor.advance(dt)
         self.counters.advance(dt, self.motor)
-        self._settle()
+        if not resting:
+            self._settle()
 
     def _settle(self) -> None:
         self.runner.settle()

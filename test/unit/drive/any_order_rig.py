@@ -27,6 +27,7 @@ from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
+import functools
 import struct
 import sys
 import time
@@ -66,6 +67,12 @@ _LATEST = RESPONSE_TIMEOUT
 _SLICE = 0.02
 #: How often a program sends its set-point, s.
 _SENDING_PERIOD = 0.1
+
+
+@functools.lru_cache(maxsize=4096)
+def _framed(request: bytes) -> str:
+    """Return the frame of a request; most are sent again and again."""
+    return (request + crc(request).to_bytes(2, 'little')).hex()
 
 
 class Clock:
@@ -208,8 +215,7 @@ class DirectLink:
         rig = self._rig
         self._require_port()
         self.asked_at = rig.clock.now
-        frame = (request + crc(request).to_bytes(2, 'little')).hex()
-        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame})
+        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': _framed(request)})
         rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
         if self.unheard or self.state == 'silent' or not rig.far.listening:
             self.unheard -= self.unheard > 0
@@ -248,6 +254,7 @@ class Rig:
 
     :param far: the simulated drive.
     :ivar looked: called whenever something may have happened.
+    :ivar changed: whether something else has happened since that a look would judge.
     :ivar wrote: called with each write, register and words, before it is sent.
     """
 
@@ -256,9 +263,11 @@ class Rig:
         self._stack = contextlib.ExitStack()
         self._stack.enter_context(self.clock.in_driver())
         self.far = far
+        self.far.step = _SLICE
         self.far.advance_to(self.clock.now)
         self.settings = settings
         self.looked: Callable[[], None] = lambda: None
+        self.changed: Callable[[], bool] = lambda: True
         self.wrote: Callable[[int, Words], None] = lambda register, words: None
         self.link = DirectLink(self)
         self._broken: AssertionError | None = None
@@ -288,17 +297,25 @@ class Rig:
     def pass_time(self, seconds: float) -> None:
         """Let time pass for all."""
         end = self.clock.now + seconds
+        self.judge(self.looked)
         while self.clock.now < end:
             if self._sent is not None and self.clock.now >= self._send_at:
                 self._send_at = self.clock.now + _SENDING_PERIOD
                 self.drive.set_setpoint(self._sent)
                 self.gave(self._sent)
+            before = self._shown
             until = min(self.bus.step(), end, self.clock.now + _SLICE)
-            self.judge(self.looked)
+            if self._shown != before or self.changed():
+                self.judge(self.looked)
             if self._broken is not None:
                 raise self._broken
             if until > self.clock.now:
                 self.elapse(until - self.clock.now)
+
+    @property
+    def _shown(self) -> tuple[object, ...]:
+        """All that a step of the bus may change beside what :attr:`changed` tells."""
+        return self.clock.now, len(self.link.frames), id(self.notes.snapshot), len(self.notes.events)
 
     def gave(self, value: float) -> None:
         """Take note of a set-point that was given; whoever wants to know puts himself here."""
