@@ -161,6 +161,6 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
     place = load_model(bench.way.model)['fieldbus.scmd'].place(bench.way.bus).address
     stop = asked_of.index(Request(1, place, 1, (Scmd.STOP,)))
     waits = [request for request in asked_of[:stop] if request and request.unit == 2]
-    # each of these keeps the line for a time-out: the one on its way, and one while the call came in
+    # each of them keeps the line for a time-out: one on its way, one while the call came in
     assert len(waits) <= 2, asked_of[: stop + 1]
     assert drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)

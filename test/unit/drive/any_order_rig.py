@@ -315,7 +315,8 @@ class Rig:
     @property
     def _shown(self) -> tuple[object, ...]:
         """All that a step of the bus may change beside what :attr:`changed` tells."""
-        return self.clock.now, len(self.link.frames), id(self.notes.snapshot), len(self.notes.events)
+        notes = self.notes
+        return self.clock.now, len(self.link.frames), id(notes.snapshot), len(notes.events)
 
     def gave(self, value: float) -> None:
         """Take note of a set-point that was given; whoever wants to know puts himself here."""
