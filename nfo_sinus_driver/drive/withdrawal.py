@@ -217,6 +217,11 @@ class Withdrawal:
             await self._method.stop(control_mode)
         except Refused as error:
             refusal = str(error)
+        except DamagedAnswer:
+            # among late answers a refusal is not believed, until something else was answered
+            if self._outcome is _Outcome.UNHEARD:
+                await self._inverter.look(Priority.STOP, once=True)
+            raise
         seen = await self._inverter.look(Priority.STOP, once=True)
         if refusal and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
