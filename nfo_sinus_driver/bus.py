@@ -44,6 +44,8 @@ from nfo_sinus_driver.jobs import Sleepers
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.jobs import inquire
+from nfo_sinus_driver.jobs import log_unexpected
 from nfo_sinus_driver.jobs import read_in_steps
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
@@ -68,8 +70,6 @@ _T = TypeVar('_T')
 
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
-
-_NOWHERE = Address((), 0)
 
 
 class Bus:
@@ -181,7 +181,21 @@ class Bus:
         """
         return Transfer(unit, address, priority, words)
 
-    async def identify(self, unit: int, priority: Priority) -> Identification:
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words, priority: Priority
+    ) -> Transfer:
+        """
+        Read a parameter whose value nobody needs, then write another (to be awaited).
+
+        One turn: nothing is sent between, whatever becomes of the read.
+
+        :param source: of one word.
+        :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
+        """
+        send = functools.partial(self._link.read_then_write, unit, source, address, words)
+        return Transfer(unit, address, priority, words, send)
+
+    def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
         """
         Ask a unit who it is, one transaction at a time, and none of them twice (to be awaited).
 
@@ -189,15 +203,7 @@ class Bus:
 
         :raises PortError: the port is not open.
         """
-        inquiry = self._link.identify(unit)
-        while not inquiry.done:
-            try:
-                await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
-            except PortError:
-                raise
-            except LinkError as error:
-                _log.debug('unit %d does not say who it is: %s', unit, error)
-        return inquiry.found
+        return inquire(unit, self._link.identify(unit), priority)
 
     def sleep(self, seconds: float) -> Pause:
         """Let time pass (to be awaited)."""
@@ -224,7 +230,7 @@ class Bus:
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
         """Start a coroutine beside the present one; errors nobody expects are logged."""
         task = Task(coroutine)
-        task.future.add_done_callback(_log_unexpected)
+        task.future.add_done_callback(log_unexpected)
         self._advance(task, None, None)
         return task
 
@@ -433,9 +439,3 @@ class Bus:
         except BaseException:
             # the others have to be told all the same
             _log.exception('error in a slot; the bus worker goes on')
-
-
-def _log_unexpected(future: Future[Any]) -> None:
-    error = future.exception()
-    if error is not None and not isinstance(error, (Cancelled, LinkError)):
-        _log.error('a job on the bus failed', exc_info=error)

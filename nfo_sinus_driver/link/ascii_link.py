@@ -30,7 +30,12 @@ _T = TypeVar('_T')
 
 
 class AsciiLink(SerialLink):
-    """A Modbus ASCII master; a frame may pause up to a second between characters."""
+    """
+    A Modbus ASCII master.
+
+    The standard allows a pause of a second between two characters. An answer whose end was lost
+    would leave the line unused for that, so no pause may be longer than it may take to begin one.
+    """
 
     @property
     def _gap(self) -> float:
@@ -40,7 +45,8 @@ class AsciiLink(SerialLink):
         return modbus_ascii.encode(request)
 
     def _reader(self, request: Request[_T]) -> modbus_ascii.AsciiReader[_T]:
-        return modbus_ascii.AsciiReader(request)
+        pause = min(modbus_ascii.PAUSE, self._settings.response_timeout)
+        return modbus_ascii.AsciiReader(request, pause)
 
     def _frame_length(self, message_length: int) -> int:
         return modbus_ascii.length(message_length)

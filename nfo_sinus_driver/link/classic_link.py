@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 import time
 from typing import NamedTuple
 
@@ -35,11 +36,10 @@ from nfo_sinus_driver.link.classic_refusal import INV_ST
 from nfo_sinus_driver.link.classic_refusal import MODE
 from nfo_sinus_driver.link.classic_refusal import SIO_ERR
 from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
-from nfo_sinus_driver.link.doubts import LATEST_ANSWER
+from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
@@ -60,6 +60,9 @@ _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
 #: How long drives may be busy with a broadcast, which none of them confirms, s.
 _TURNAROUND = 0.1
+#: What every firmware has and may be read at any time [M0 §6.1.7], [M2 table 1]: InvSt without
+#: acknowledging, MODE, control mode and f-Nom. So many that one is always certain, see Doubts.
+_EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
 #: How old the inverter status may be to show that a serial fault is new, s.
 _FRESH = 1.0
 
@@ -70,17 +73,20 @@ class _Answer(NamedTuple):
     arrived: float
 
 
+class _Ambiguous(DamagedAnswer):
+    """An ACK or NAK came that may belong to an earlier request."""
+
+
 class ClassicLink:
     """
     A master of the Classic protocol on one line.
 
     A REPLY names its parameter, ACK and NAK name nothing. So whenever an answer is missing or
     damaged, or bytes come that nobody asked for, the kinds of answers that may still come are in
-    doubt until an answer of another kind has come (units answer in order), or for
-    :data:`LATEST_ANSWER` time-outs. A parameter whose REPLY is in doubt is only read after
-    another one has been. A write is never kept waiting, for it may be a stop; but if its answer
-    is in doubt it is not believed: the line is cleared by reading something, and
-    :class:`DamagedAnswer` says that nobody knows.
+    doubt (:class:`Doubts`). A parameter whose REPLY is in doubt is only read after another one has
+    been. A write is never kept waiting, for it may be a stop; but if its answer is in doubt it is
+    not believed: the line is cleared by reading something, and :class:`DamagedAnswer` says that
+    nobody knows.
 
     An adapter that echoes what is sent is noticed at the first request; from then on an answer
     counts only behind the echo.
@@ -107,8 +113,7 @@ class ClassicLink:
             )
         self._port = port
         self._settings = settings
-        self._probes: dict[int, tuple[int, ...]] = {}
-        self._doubts: dict[int, dict[Kind, float]] = {}
+        self._doubts: Doubts[Kind] = Doubts(settings.response_timeout)
         #: The inverter status that each unit told last, and when.
         self._inv_st: dict[int, tuple[int, float]] = {}
         self._last: _Answer | None = None
@@ -134,12 +139,11 @@ class ClassicLink:
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """
-        Name more parameters that are safe to read at any time.
+        Take parameters that are safe to read; here those are asked that every firmware has.
 
-        E00E9 and E0029, which every firmware has, are taken first: to ask for what a drive does
-        not have is a serial fault, for which it stops when under serial control [M2 table 4].
+        To ask for what a drive does not have is a serial fault, for which it stops when under
+        serial control [M2 table 4].
         """
-        self._probes[unit] = tuple(number for probe in probes for number in probe.numbers)
 
     def read(self, unit: int, address: Address) -> Reply:
         """
@@ -188,6 +192,26 @@ class ClassicLink:
         self.write(unit, address, words)
         return self.read(unit, source)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        request = Enquiry(unit, source.numbers[0])
+        self._listen(request)
+        try:
+            with contextlib.suppress(NoAnswer, DamagedAnswer):
+                _, _, early = self._transact(request)
+                if early:
+                    self._distrust(request)
+            return self.write(unit, address, words)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
+
     def identify(self, unit: int) -> NothingToAsk:
         """Return no questions: the protocol has none but for parameters."""
         return NothingToAsk()
@@ -200,9 +224,9 @@ class ClassicLink:
             raise ValueError('nobody answers a broadcast')
         request = Enquiry(unit, number)
         self._listen(request)
-        doubt = self._doubt(unit)
-        if number in doubt:
-            self._clear(unit)
+        certain = self._first_certain(unit, number)
+        if certain != number:
+            self._enquire(unit, certain)
             self._listen(request)
         answer, arrived, early = self._transact(request)
         if early:
@@ -228,7 +252,8 @@ class ClassicLink:
         began = time.monotonic()
         try:
             answer, arrived, _ = self._transact(request)
-        except DamagedAnswer:
+        except _Ambiguous:
+            # not after mere noise: a stop that is given again would only have to wait for it
             self._settle(request.unit)
             raise
         if isinstance(answer, Nak):
@@ -269,25 +294,20 @@ class ClassicLink:
 
         :raises NotReady: everything that could be read is in doubt.
         """
-        doubt = self._doubt(unit)
-        numbers = (INV_ST, MODE, *self._probes.get(unit, ()))
-        for number in numbers:
-            if number not in doubt:
-                self._enquire(unit, number)
-                return
-        raise NotReady(max(doubt[number] for number in numbers))
+        self._enquire(unit, self._first_certain(unit))
 
-    def _doubt(self, unit: int) -> dict[Kind, float]:
-        """Return what may still come, and until when, without what is too late by now."""
-        now = time.monotonic()
-        doubt = {kind: until for kind, until in self._doubts.get(unit, {}).items() if until > now}
-        self._doubts[unit] = doubt
-        return doubt
+    def _first_certain(self, unit: int, *numbers: int) -> int:
+        """
+        Return the first of some parameters, or of those to be read at any time, not in doubt.
+
+        :raises NotReady: all are.
+        """
+        questions = ((number, (number,)) for number in (*numbers, *_EVERYWHERE))
+        return self._doubts.first_certain(unit, questions)
 
     def _distrust(self, request: Request) -> None:
-        until = time.monotonic() + (LATEST_ANSWER - 1) * self._settings.response_timeout
-        doubt = self._doubts.setdefault(request.unit, {})
-        doubt.update(dict.fromkeys(classic.kinds(request), until))
+        """Expect an answer to a request, one more than has come."""
+        self._doubts.add(request.unit, classic.kinds(request))
 
     def _listen(self, request: Request) -> None:
         """Take what came unasked; wait for it where it could pass for the answer to a request."""
@@ -326,7 +346,7 @@ class ClassicLink:
             self._echoes = False
             raise
         # units answer in order: whatever was still to come has come before this
-        self._doubts.pop(request.unit, None)
+        self._doubts.end(request.unit)
         self._last = _Answer(request, classic.kind(answer), arrived)
         if more:
             self._distrust(request)
@@ -337,7 +357,7 @@ class ClassicLink:
 
     def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
         """Return the answer, when it came, and whether more came behind it."""
-        doubt = self._doubt(request.unit)
+        doubt = self._doubts.of(request.unit)
         longest = classic.LONGEST_ANSWER * self._settings.char_time + _LUMP
         deadline = sent + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
@@ -362,7 +382,7 @@ class ClassicLink:
                     if classic.kind(message) not in doubt:
                         return message, now, bool(messages[number:] or reader.pending)
                     if isinstance(request, Select):
-                        raise DamagedAnswer(
+                        raise _Ambiguous(
                             f'unit {request.unit} answered, but perhaps to an earlier request'
                         )
             deadline = min(max(deadline, now + longest), last_chance)

@@ -16,91 +16,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 import time
-from typing import Any
+from typing import Generic
+from typing import TypeVar
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.errors import NotReady
+
+Kind = TypeVar('Kind')
+Question = TypeVar('Question')
 
 #: How late an answer may come, in time-outs, before it counts as lost for good.
 LATEST_ANSWER = 4
 
-#: The heads of answers that may still come, and until when.
-Doubt = dict[bytes, float]
 
-
-class Doubts:
+class Doubts(Generic[Kind]):
     """
-    What may still come from each unit.
+    What may still come from each unit, by *kinds*: what tells its answers from one another.
+
+    Units answer in order and :data:`LATEST_ANSWER` time-outs late at most. An answer of a kind
+    that is in doubt may be that to an earlier request, so it proves nothing. One of a kind that is
+    not in doubt is that to the present request, and whatever was to come has come before it.
+
+    So nobody has to wait until a doubt is over: :meth:`first_certain` finds something to ask
+    meanwhile. A request that fails takes a time-out, and what could answer it stays in doubt for
+    three more, so there are never more than three such kinds: of four questions with answers of
+    different kinds one is always certain, and of three after a time-out at most.
 
     :param response_timeout: how long an answer is waited for, s.
     """
 
     def __init__(self, response_timeout: float) -> None:
-        self._response_timeout = response_timeout
-        self._probes: dict[int, tuple[Address, ...]] = {}
-        self._of: dict[int, Doubt] = {}
-        #: Of answers that were right, and yet may come once more.
-        self._repeated: dict[int, Doubt] = {}
+        self._memory = (LATEST_ANSWER - 1) * response_timeout
+        self._until: dict[int, dict[Kind, float]] = {}
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
-        """Name parameters of different sizes that are safe to read at any time."""
-        self._probes[unit] = tuple(probes)
+    def add(self, unit: int, kinds: Iterable[Kind]) -> None:
+        """Expect an answer of one of these kinds from a unit, one more than has come."""
+        until = time.monotonic() + self._memory
+        self._until.setdefault(unit, {}).update(dict.fromkeys(kinds, until))
 
-    def add(self, request: Request[Any]) -> None:
-        """Expect an answer to a request, one more than has come."""
-        self._of.setdefault(request.unit, {})[request.answer_head] = self._latest()
-
-    def repeated(self, request: Request[Any]) -> None:
-        """Expect that the answer just got comes once more; what it says is right all the same."""
-        self._repeated[request.unit] = {request.answer_head: self._latest()}
-
-    def may_repeat(self, request: Request[Any]) -> bool:
-        """Tell whether an answer of this shape may come once more."""
-        return request.answer_head in _without_past(self._repeated.get(request.unit, {}))
-
-    def answered(self, unit: int) -> None:
-        """Forget which answer may come once more, for another has come."""
-        self._repeated.pop(unit, None)
-
-    def of(self, unit: int) -> Doubt:
-        """Return what may still come from a unit, without what is too late by now."""
-        doubt = self._of[unit] = _without_past(self._of.get(unit, {}))
-        return doubt
+    def of(self, unit: int) -> AbstractSet[Kind]:
+        """Return the kinds of answers that may still come from a unit."""
+        return self._left(unit).keys()
 
     def end(self, unit: int) -> None:
-        """Forget what a unit may still say: units answer in order, and this one has."""
-        self._of.pop(unit, None)
+        """Expect nothing more from a unit: it has answered what was asked last."""
+        self._until.pop(unit, None)
 
     def clear(self) -> None:
-        """Forget everything but the probes."""
-        self._of.clear()
-        self._repeated.clear()
+        """Expect nothing more from anybody."""
+        self._until.clear()
 
-    def _latest(self) -> float:
-        return time.monotonic() + (LATEST_ANSWER - 1) * self._response_timeout
-
-    def probe(self, unit: int) -> tuple[Read | None, float]:
+    def first_certain(
+        self, unit: int, questions: Iterable[tuple[Question, Iterable[Kind]]]
+    ) -> Question:
         """
-        Return a request whose answer cannot be confused with any that may still come.
+        Return the first question whose answer cannot be confused with any that may still come.
 
-        :returns: ``None`` if there is none yet, and when there will be (``time.monotonic``).
+        :param questions: each with the kinds of answers to be told apart; one question at least.
+        :raises NotReady: there is none, and when there will be.
         """
-        doubt = _without_past(self._repeated.get(unit, {})) | self.of(unit)
-        probes = [
-            Read(unit, address.numbers[0], address.words)
-            for address in self._probes.get(unit, ())
-        ]
-        for probe in probes:
-            if probe.answer_head not in doubt:
-                return probe, 0.0
-        # not until nothing is in doubt: a write that fails again and again must not keep reads out
-        ends = [doubt[probe.answer_head] for probe in probes] or doubt.values()
-        return None, max(ends)
+        left = self._left(unit)
+        free = []
+        for question, kinds in questions:
+            doubted = [left[kind] for kind in kinds if kind in left]
+            if not doubted:
+                return question
+            free.append(max(doubted))
+        raise NotReady(min(free))
 
-
-def _without_past(doubt: Doubt) -> Doubt:
-    now = time.monotonic()
-    return {head: until for head, until in doubt.items() if until > now}
+    def _left(self, unit: int) -> dict[Kind, float]:
+        """Forget what is too late by now; return the rest, and until when each may come."""
+        now = time.monotonic()
+        left = {kind: until for kind, until in self._until.get(unit, {}).items() if until > now}
+        self._until[unit] = left
+        return left

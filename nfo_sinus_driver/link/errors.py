@@ -51,6 +51,12 @@ class DamagedAnswer(LinkError):
     maybe_done = True
 
 
+class NeverSilent(DamagedAnswer):
+    """Somebody talks all the time, so nothing was sent."""
+
+    maybe_done = False
+
+
 class Refused(LinkError):
     """
     The drive answered that it will not.

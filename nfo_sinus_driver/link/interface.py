@@ -133,6 +133,20 @@ class Link(Protocol):
         :raises LinkError: as its subclasses say.
         """
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        For reading that does something, such as acknowledging a fault (02A4h, E00E8). Whatever
+        becomes of the read, the write is the next thing on the line.
+
+        :param source: of one word.
+        :returns: the answer to the write.
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+
     def identify(self, unit: int) -> Inquiry:
         """Return the questions by which a unit tells who it is; nothing is sent yet."""
 

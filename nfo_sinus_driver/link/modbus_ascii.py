@@ -58,10 +58,15 @@ def length(message_length: int) -> int:
 
 
 class AsciiReader(AnswerReader[_T]):
-    """Finds an answer in ASCII frames."""
+    """
+    Finds an answer in ASCII frames.
 
-    def __init__(self, request: Request[_T]) -> None:
+    :param pause: how long a frame that has begun may pause, s.
+    """
+
+    def __init__(self, request: Request[_T], pause: float = PAUSE) -> None:
         super().__init__(request)
+        self._pause = pause
         self._longest = length(request.answer_length)
         self._heads = [
             head.hex().upper().encode()
@@ -80,7 +85,7 @@ class AsciiReader(AnswerReader[_T]):
     @property
     def patience(self) -> float:
         """How long a pause may last before the next character comes, s."""
-        return PAUSE if self._begun() else _LUMP
+        return self._pause if self._begun() else _LUMP
 
     def _messages(self) -> Iterator[tuple[int, int, bytes]]:
         for frame in _FRAME.finditer(self._buffer):

@@ -20,6 +20,7 @@ from abc import ABC
 from abc import abstractmethod
 from typing import TypeVar
 
+from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
@@ -64,6 +65,21 @@ class ModbusLink(ABC):
         register, read_from = address.numbers[0], source.numbers[0]
         return Reply(*self._ask(WriteAndRead(unit, register, words, read_from, source.words)))
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        self._ask_unheard(Read(unit, source.numbers[0], source.words))
+        try:
+            return self.write(unit, address, words)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
+
     def identify(self, unit: int) -> ModbusInquiry:
         """Return the questions by which a unit tells who it is (functions 43/14 and 17)."""
         return ModbusInquiry(unit, self._ask)
@@ -71,3 +87,11 @@ class ModbusLink(ABC):
     @abstractmethod
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when its last byte came."""
+
+    @abstractmethod
+    def _ask_unheard(self, request: Request[object]) -> None:
+        """
+        Send a request at once and wait for its answer, whatever that is and says.
+
+        :raises LinkError: it was not sent.
+        """

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from collections.abc import Sequence
 import contextlib
 import time
@@ -28,6 +29,8 @@ from nfo_sinus_driver.link.answer_reader import AnswerReader
 from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.echo import Echo
 from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NeverSilent
 from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
@@ -35,6 +38,9 @@ from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.modbus_pdu import refusal_head
+from nfo_sinus_driver.link.modbus_probes import answer_kinds
+from nfo_sinus_driver.link.modbus_probes import probes
 from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
@@ -47,6 +53,10 @@ _LATER = 1.25
 _DECAY = 0.95
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
+#: How long a write waits at least for a line that is not silent, s.
+_WRITE_PATIENCE = 0.02
+#: Bytes in the answer to a read of two words.
+_TWO_WORDS = 7
 
 
 class Port(Protocol):
@@ -83,7 +93,8 @@ class SerialLink(ModbusLink):
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
-        self._doubts = Doubts(settings.response_timeout)
+        self._doubts: Doubts[bytes] = Doubts(settings.response_timeout)
+        self._safe: dict[int, tuple[Address, ...]] = {}
         self._echo = Echo()
         self._last: Request[Any] | None = None
         #: The last answer of each unit, to what, and until when it may come again.
@@ -125,7 +136,7 @@ class SerialLink(ModbusLink):
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
-        self._doubts.use_probes(unit, probes)
+        self._safe[unit] = tuple(probes)
 
     # --- what the protocols differ in -------------------------------------------------------------
 
@@ -150,15 +161,10 @@ class SerialLink(ModbusLink):
 
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when its last byte came."""
-        self._await_silence()
-        doubt = self._doubts.of(request.unit)
-        again = self._doubts.may_repeat(request)
+        self._await_silence(request)
         # a write answer names what was written, and nobody believes it without reading back
-        if not isinstance(request, Write) and (doubt or again):
-            self._probe(request)
-            self._await_silence()
-        elif again:
-            self._doubts.add(request)
+        if not isinstance(request, Write):
+            self._make_certain(request)
         try:
             answer = self._transact(request)
         except Refused:
@@ -167,11 +173,46 @@ class SerialLink(ModbusLink):
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
 
-    def _probe(self, request: Request[Any]) -> None:
-        """Have the unit answer something that cannot be confused with what may still come."""
-        probe, until = self._doubts.probe(request.unit)
-        if probe is None:
-            raise NotReady(until)
+    def _ask_unheard(self, request: Request[object]) -> None:
+        """Send a request at once and wait for its answer, whatever that is and says."""
+        self._await_silence(request)
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
+            self._transact(request)
+        if self._repeats is not None:
+            # it may be the one before, told twice
+            self._doubt(request)
+
+    def _in_doubt(self, request: Request[Any]) -> bool:
+        """Tell whether the answer to an earlier request would look like that to this one."""
+        return request.answer_head in self._doubts.of(request.unit)
+
+    def _doubt(self, request: Request[Any]) -> None:
+        """Expect an answer to a request, one more than has come."""
+        self._doubts.add(request.unit, answer_kinds(request))
+
+    def _make_certain(self, request: Request[Any]) -> None:
+        """
+        Have the unit answer something else, if its answer to this could be confused with another.
+
+        :raises NotReady: that cannot be told from others either.
+        """
+        questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
+        question = self._doubts.first_certain(request.unit, questions)
+        if question is request:
+            return
+        try:
+            self._probe(question)
+        except LinkError as error:
+            # nobody has heard the request itself
+            error.maybe_done = False
+            raise
+        self._await_silence(request)
+
+    def _probes(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
+        return probes(unit, self._safe.get(unit, ()))
+
+    def _probe(self, probe: Request[Any]) -> None:
+        """Have a unit answer, whatever it says."""
         # a refusal that is believed tells as well as an answer that all is said
         with contextlib.suppress(Refused):
             self._transact(probe)
@@ -189,21 +230,22 @@ class SerialLink(ModbusLink):
                 self._listen(request)
             return
         if names_it or self._repeats == request:
-            self._doubts.repeated(request)
+            # what it says is right, but it may come once more
+            self._doubts.add(request.unit, (request.answer_head,))
             return
         stray = self._stray
-        self._doubts.add(request)
-        stray |= self._await_silence()
+        self._doubt(request)
         self._confirming = True
         try:
-            self._probe(request)
+            stray |= self._await_silence(request)
+            self._probe(self._doubts.first_certain(request.unit, self._probes(request.unit)))
             if not stray and not self._stray:
                 return
-        except NotReady:
+        except (NotReady, NeverSilent):
             pass
         except (NoAnswer, DamagedAnswer):
             # the right answer may be as late as that to the probe
-            self._doubts.add(request)
+            self._doubt(request)
             raise
         finally:
             self._confirming = False
@@ -220,13 +262,22 @@ class SerialLink(ModbusLink):
         while (now := time.monotonic()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
-                self._doubts.add(request)
+                self._doubt(request)
                 self.distrust()
                 raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
-    def _await_silence(self) -> bool:
-        """Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for."""
-        give_up = time.monotonic() + self._settings.response_timeout
+    def _await_silence(self, request: Request[Any]) -> bool:
+        """
+        Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for.
+
+        A write may be a stop, and the noise may be on our side of the line alone: rather than not
+        at all it is sent into it, as soon as no answer that began before can still be coming.
+
+        :raises NeverSilent: there is none.
+        """
+        is_write = isinstance(request, Write)
+        patience = self._write_patience if is_write else self._settings.response_timeout
+        give_up = max(self._line_end + self._gap, time.monotonic()) + patience
         came = False
         while True:
             data = self._port.read(self._line_end + self._gap)
@@ -239,9 +290,17 @@ class SerialLink(ModbusLink):
             self.distrust()
             self._line_end = max(self._line_end, now)
             if self._last is not None:
-                self._doubts.add(self._last)
+                self._doubt(self._last)
             if now > give_up:
-                raise DamagedAnswer('the line is never silent: noise, or another master on it')
+                if is_write:
+                    return came
+                raise NeverSilent('the line is never silent: noise, or another master on it')
+
+    @property
+    def _write_patience(self) -> float:
+        """How long a write waits for a line that is not silent, s: one answer of two words."""
+        longest = self._frame_length(_TWO_WORDS) * self._settings.char_time
+        return max(_WRITE_PATIENCE, longest)
 
     # --- one transaction --------------------------------------------------------------------------
 
@@ -257,7 +316,7 @@ class SerialLink(ModbusLink):
         try:
             answer, arrived = self._receive(request, reader, frame)
         except (NoAnswer, DamagedAnswer):
-            self._doubts.add(request)
+            self._doubt(request)
             raise
         except Refused:
             self._doubts.end(request.unit)
@@ -269,7 +328,7 @@ class SerialLink(ModbusLink):
                 self._echo.present = True
             self._stray = bool(self._echo.before or reader.other.replace(frame, b'', 1))
         self._remember(request, reader.frame)
-        late = request.answer_head in self._doubts.of(request.unit)
+        late = self._in_doubt(request)
         if not late:
             # units answer in order: whatever was still to come has come before this
             self._doubts.end(request.unit)
@@ -282,13 +341,12 @@ class SerialLink(ModbusLink):
         if late or reader.received:
             self.distrust()
             # it may answer an earlier write of the same, or answer twice: one more may come
-            self._doubts.add(request)
+            self._doubt(request)
         return answer, arrived
 
     def _remember(self, request: Request[Any], frame: bytes) -> None:
         """Note what a unit told, and whether it told just that a moment ago."""
         now = time.monotonic()
-        self._doubts.answered(request.unit)
         before = self._told.get(request.unit)
         if before is not None and before[0] == frame and now < before[2]:
             self._repeats = before[1]
@@ -300,8 +358,7 @@ class SerialLink(ModbusLink):
     ) -> tuple[_T, float]:
         char_time = self._settings.char_time
         # an exception names neither register nor length: it may belong to the earlier request
-        doubt = self._doubts.of(request.unit)
-        believe_refusal = all(head[1] != request.function for head in doubt)
+        believe_refusal = refusal_head(request) not in self._doubts.of(request.unit)
         first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         length = self._frame_length(request.answer_length)

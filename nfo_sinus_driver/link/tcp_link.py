@@ -23,6 +23,7 @@ ones after some more).
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 import select
 import socket
 import time
@@ -130,6 +131,11 @@ class TcpLink(ModbusLink):
             f'the gateway did not answer for unit {request.unit}: '
             'response_timeout has to be longer than its own'
         )
+
+    def _ask_unheard(self, request: Request[object]) -> None:
+        """Send a request and wait for its answer, whatever that is and says."""
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NoPath):
+            self._ask(request)
 
     def _understood(self, request: Request[_T], message: bytes) -> _T:
         try:

@@ -321,7 +321,7 @@ MUTANTS = (
         8,
         'a late answer is believed',
         'nfo_sinus_driver/link/serial_link.py',
-        '        if not isinstance(request, Write) and (doubt or again):',
+        '        if not isinstance(request, Write):',
         '        if False:',
         (_RTU_LINK,),
     ),

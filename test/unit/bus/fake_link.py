@@ -26,6 +26,7 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
@@ -111,6 +112,13 @@ class FakeLink:
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
         return self._transact(Done(unit, address.numbers[0], words))
+
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        with contextlib.suppress(NoAnswer):
+            self.read(unit, source)
+        return self.write(unit, address, words)
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         self.probes[unit] = tuple(probes)

@@ -191,6 +191,28 @@ def test_calls_are_made_between_transactions_in_order(bus: Bus, link: FakeLink) 
     assert seen == list(range(5))
 
 
+@pytest.mark.parametrize('lost', [False, True])
+def test_nothing_goes_between_a_read_and_the_write_behind_it(
+    bus: Bus, link: FakeLink, lost: bool
+) -> None:
+    def answer(done: Done) -> Words:
+        if lost and done.number == 1:
+            raise NoAnswer('silence')
+        return (done.number,)
+
+    async def job() -> Words:
+        reply = await bus.read_then_write(UNIT, register(1), register(2), (0,), Priority.STOP)
+        return reply.words
+
+    link.answer = answer
+    with link.held():
+        hold(bus, link)
+        waiting = [ask(bus, 3, Priority.STOP), bus.run(job()), ask(bus, 4, Priority.STOP, (1,))]
+    assert [result(future) for future in waiting] == [(3,), (2,), (4,)]
+    # as any write of a stop it goes ahead of what only looks
+    assert link.numbers == [0, 1, 2, 4, 3]
+
+
 def test_probes_are_passed_to_the_link(bus: Bus, link: FakeLink) -> None:
     bus.use_probes(3, (register(1), register(2, 2)))
     wait_until(lambda: link.probes == {3: (register(1), register(2, 2))})

@@ -39,7 +39,6 @@ from test_rtu_link import test_late_answer_is_not_taken_for_the_next_one  # noqa
 from test_rtu_link import test_late_answer_to_a_write_does_not_end_the_doubt  # noqa: F401
 from test_rtu_link import test_line_that_begins_to_babble_is_no_reason_to_hang  # noqa: F401
 from test_rtu_link import test_lost_port_is_passed_on  # noqa: F401
-from test_rtu_link import test_nothing_is_sent_while_both_probes_are_in_doubt  # noqa: F401
 from test_rtu_link import test_probe_has_another_shape  # noqa: F401
 from test_rtu_link import test_read_and_write  # noqa: F401
 from test_rtu_link import test_refusal  # noqa: F401
@@ -47,7 +46,6 @@ from test_rtu_link import test_refusal_is_not_taken_for_that_of_another_request 
 from test_rtu_link import test_refusal_of_another_function_is_believed_in_doubt  # noqa: F401
 from test_rtu_link import test_refused_probe_is_an_answer  # noqa: F401
 from test_rtu_link import test_reply_says_when_its_last_byte_came  # noqa: F401
-from test_rtu_link import test_unit_without_probes_is_left_alone  # noqa: F401
 from test_rtu_link import test_write_goes_out_at_once_even_in_doubt  # noqa: F401
 from virtual_wire import AsciiWire
 from virtual_wire import Fate
@@ -87,18 +85,32 @@ def in_parts(bench: Bench, frame: bytes, cuts: list[int], pause: float) -> None:
 
 
 @pytest.mark.parametrize('cuts', [[1], [2], [5], [13], [14], [1, 7, 14]])
-def test_frame_may_pause_for_a_second(cuts: list[int]) -> None:
+def test_frame_may_pause_as_long_as_it_may_take_to_begin(cuts: list[int]) -> None:
     bench = Bench()
-    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), cuts, 0.95)
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), cuts, 0.95 * TIMEOUT)
     assert bench.read(A).words == (77,)
+
+
+def test_frame_may_pause_for_a_second_at_most() -> None:
+    for pause, whole in ((0.95, True), (1.1, False)):
+        bench = Bench(settings=LineSettings(char_format='7E1', response_timeout=2.0))
+        in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), [7, 9], pause)
+        in_time = bench.wire.far_end
+        # the time for the answer to begin is over with its first characters
+        bench.wire.far_end = lambda frame, end, take=in_time: take(frame, end + 1.99)
+        if whole:
+            assert bench.read(A).words == (77,)
+        else:
+            bench.expect(DamagedAnswer, lambda bench=bench: bench.read(A))
 
 
 def test_frame_that_pauses_longer_is_given_up() -> None:
     bench = Bench()
-    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), [7], 1.1)
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), [7], 1.2 * TIMEOUT)
     error = bench.expect(DamagedAnswer, lambda: bench.read(A))
     assert error.maybe_done
     assert '7 bytes' in str(error)
+    assert bench.wire.now - bench.wire.sent[0][0] < 1.5 * TIMEOUT
 
 
 def test_lower_case_is_read() -> None:
@@ -126,7 +138,7 @@ def test_frame_that_never_ends_is_given_up(babble: bytes) -> None:
 def test_frame_begun_again_is_found() -> None:
     bench = Bench()
     frame = opinion.ascii_frame(b'\x01\x03\x02\x00\x4d')
-    in_parts(bench, frame[:9] + frame, [9], 0.3)
+    in_parts(bench, frame[:9] + frame, [9], 0.5 * TIMEOUT)
     assert bench.read(A).words == (77,)
 
 

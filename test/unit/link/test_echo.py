@@ -52,7 +52,6 @@ from nfo_sinus_driver.link.echo import Echo
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.open import line_settings
@@ -338,25 +337,12 @@ def test_second_refusal_is_noticed_even_where_the_probes_are_refused() -> None:
     bench.expect(DamagedAnswer, lambda: bench.read(B))
 
 
-def test_same_words_of_a_unit_without_probes_wait() -> None:
+def test_same_words_of_a_unit_without_probes_are_believed_when_it_was_asked_who_it_is() -> None:
     bench = Bench(probes=())
     bench.slave = SameWords(bench.wire)
-    bench.read(A)
-    bench.expect(DamagedAnswer, lambda: bench.read(B))
-    # not for ever
-    bench.wire.now = until(bench, B)
-    bench.read(B)
-    bench.read(B)
-    bench.wire.now = until(bench, B)
-    bench.read(B)
-
-
-def until(bench: Bench, address: Address) -> float:
-    """When a unit that is left alone may be asked again."""
-    error = bench.expect(NotReady, lambda: bench.read(address))
-    assert isinstance(error, NotReady)
-    assert error.until > bench.wire.now
-    return error.until
+    for address in (A, B, A):
+        bench.read(address)
+    assert [function for _, function, _, _ in bench.slave.requests] == [3, 3, 17, 3]
 
 
 AGAIN = st.lists(

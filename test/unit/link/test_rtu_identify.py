@@ -28,7 +28,6 @@ import pymodbus_opinion as opinion
 import pytest
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.doubts import LATEST_ANSWER
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -677,12 +676,11 @@ def test_silence_costs_one_time_out_each() -> None:
     unit.answers.update({17: silent, 43: silent})
     before = unit.wire.now
     assert unit.identify() == Identification()
-    # between them a probe, for the line is not to be trusted then
-    assert unit.functions == [43, 3, 17]
+    assert unit.functions == [43, 17]
     assert 2 * TIMEOUT < unit.wire.now - before < 2.5 * TIMEOUT
-    assert unit.read() == (5,)
-    assert unit.functions == [43, 3, 17, 3, 3]
-    assert unit.read() == (6,), 'the doubt is over'
+    assert unit.read() == (3,)
+    assert unit.identify() == Identification()
+    assert unit.functions == [43, 17, 3, 43, 17], 'the doubt was over'
     unit.wire.check_gaps()
 
 
@@ -694,8 +692,7 @@ def test_late_answer_is_not_taken_for_another(function: int) -> None:
     assert found.vendor == ('' if function == 43 else KNOWN.vendor)
     assert found.serial == ('' if function == 17 else KNOWN.serial)
     assert unit.read() == (len(unit.functions),)
-    # what the unit says now is asked only after a probe
-    assert unit.functions[unit.functions.index(function) + 1] == 3
+    assert unit.functions == [43, 17, 3]
 
 
 def test_a_late_refusal_is_not_taken_for_another_one() -> None:
@@ -744,23 +741,17 @@ def test_doubled_answer_is_noticed() -> None:
     unit = Unit()
     unit.answers[43] = lambda frame: 2 * device_answer(1, REGULAR, G2)
     assert unit.identify() == KNOWN
-    assert unit.functions == [43, 3, 17]
+    assert unit.read() == (len(unit.functions),)
 
 
-def test_nobody_is_asked_while_answers_may_be_on_their_way() -> None:
+def test_a_unit_whose_reads_are_in_doubt_can_say_who_it_is() -> None:
     unit = Unit()
     unit.answers[3] = silent
     for address in (ONE, TWO):
         with pytest.raises(NoAnswer):
             unit.read(address)
-    inquiry = unit.link.identify(1)
-    with unit.wire.time(), pytest.raises(NotReady) as refusal:
-        inquiry.ask()
-    assert unit.functions == [3, 3]
-    assert refusal.value.until <= unit.wire.now + LATEST_ANSWER * TIMEOUT
-    unit.wire.now = refusal.value.until
-    with unit.wire.time():
-        assert asked_all(inquiry) == KNOWN
+    assert unit.identify() == KNOWN
+    assert unit.functions == [3, 3, 43, 17]
 
 
 # --- write and read in one ------------------------------------------------------------------------

@@ -202,6 +202,40 @@ def nothing(frame: Frame) -> bytes:
     return b''
 
 
+@pytest.mark.parametrize(
+    'reply',
+    [
+        answer,
+        nothing,
+        lambda frame: refusal(frame, Refused.ILLEGAL_ADDRESS),
+        lambda frame: refusal(frame, Refused.NO_ANSWER),
+        lambda frame: pack(frame[0], frame[1][:1] + b'\x7f'),
+    ],
+)
+def test_whatever_becomes_of_the_read_the_write_is_the_next_frame(
+    gateway: Gateway, hasty: TcpLink, reply: Callable[[Frame], bytes]
+) -> None:
+    gateway.then(reply, answer)
+    # a busy machine may miss the answer to the write
+    with contextlib.suppress(GatewaySilent):
+        assert hasty.read_then_write(1, A, B, (0,)).words == ()
+    deadline = time.monotonic() + PATIENCE
+    while len(gateway.requests) < 2 and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert [message[1:4] for _, message in gateway.requests] == [b'\x03\x04\x00', b'\x06\x02\x64']
+
+
+def test_once_the_read_was_sent_it_may_have_been_done(gateway: Gateway, patient: TcpLink) -> None:
+    gateway.then(answer, lambda frame: refusal(frame, Refused.DEVICE_FAILURE))
+    with pytest.raises(Refused) as refused:
+        patient.read_then_write(1, A, B, (0,))
+    assert refused.value.maybe_done
+    gateway.then(lambda frame: None)
+    with pytest.raises(PortError):
+        patient.read_then_write(1, A, B, (0,))
+    assert len(gateway.requests) == 3
+
+
 def test_late_answer_is_told_by_its_number(gateway: Gateway, hasty: TcpLink) -> None:
     late: list[bytes] = []
 

@@ -28,6 +28,7 @@ from unittest import mock
 
 import pymodbus_opinion as opinion
 
+from nfo_sinus_driver.link import classic_link
 from nfo_sinus_driver.link import doubts
 from nfo_sinus_driver.link import serial_link
 from nfo_sinus_driver.link.settings import LineSettings
@@ -77,7 +78,7 @@ class Wire:
         """Let the link see this clock."""
         clock = SimpleNamespace(monotonic=self.monotonic)
         with contextlib.ExitStack() as stack:
-            for module in (serial_link, doubts):
+            for module in (serial_link, classic_link, doubts):
                 stack.enter_context(mock.patch.object(module, 'time', clock))
             yield
 
@@ -181,6 +182,10 @@ class Slave:
         """Answer from now on, but for the next requests' fates."""
         self._fates = iter(fates)
 
+    def identified(self, frame: bytes) -> bytes:
+        """What it says to functions 17 and 43/14: it does not have them; nothing if empty."""
+        return opinion.exception(frame[0], frame[1], 1)
+
     @staticmethod
     def words(register: int, count: int, number: int) -> tuple[int, ...]:
         """What a register holds when the request with this number is carried out."""
@@ -193,17 +198,24 @@ class Slave:
 
     def _take(self, frame: bytes, end: float) -> None:
         number = len(self.requests)
-        unit, function, register, count, words = opinion.decoded(frame)
+        if frame[1] in (17, 43):
+            unit, function, register, count, words = frame[0], frame[1], 0, 0, ()
+        else:
+            unit, function, register, count, words = opinion.decoded(frame)
         self.requests.append((unit, function, register, count))
         fate = next(self._fates, GOOD)
         if fate.what == 'drop':
             return
         if fate.what.startswith('refuse'):
             answer = opinion.exception(unit, function, self.code(number))
+        elif function in (17, 43):
+            answer = self.identified(frame)
         elif function == 3:
             answer = opinion.read_answer(unit, self.words(register, count, number))
         else:
             answer = opinion.write_answer(unit, register, words)
+        if not answer:
+            return
         answer = self._wire.pack(answer)
         if fate.what == 'damage':
             answer = answer[:-1] + bytes((answer[-1] ^ 1,))

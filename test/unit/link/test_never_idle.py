@@ -1,0 +1,391 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line that is never left unused in doubt, and a write that nothing holds back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+import functools
+import heapq
+
+from classic_far_end import FarEnd
+from classic_far_end import Fate as ClassicFate
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from link_bench import SETTINGS
+from link_bench import TIMEOUT
+from link_bench import TWO
+from link_bench import UNIT
+from link_bench import A
+from link_bench import B
+from link_bench import Bench
+from link_bench import C
+from link_bench import D
+import pymodbus_opinion as opinion
+import pytest
+from test_classic_link import Bench as ClassicBench
+from test_read_then_write import AsciiBench
+from test_rtu_link import FATES
+from test_rtu_link import STEPS
+from test_rtu_link import lumps_or_doubles
+from virtual_wire import Fate
+from virtual_wire import Slave
+from virtual_wire import Wire
+
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.settings import LineSettings
+
+LOST = Fate(what='drop')
+NAMES = {'A': A, 'B': B, 'C': C, 'D': D}
+
+
+class G2(Slave):
+    """Says who it is, as a G2 does [M0 §6.2.4]."""
+
+    def identified(self, frame: bytes) -> bytes:
+        if frame[1] == 17:
+            message = frame[:2] + b'\x10' + b'0123456789ABCDEF'
+        else:
+            message = frame[:4] + bytes((0x82, 0, 0, 1, frame[4], 0))
+        return message + opinion.crc(message)
+
+
+class Old(Slave):
+    """Does not even refuse what it does not know."""
+
+    def identified(self, frame: bytes) -> bytes:
+        return b''
+
+
+UNITS = {'G2': G2, 'Optimal': Slave, 'old': Old}
+
+
+def modbus_bench(
+    unit: str, fates: Iterator[Fate] | None = None, make: type[Bench] = Bench
+) -> Bench:
+    bench = make()
+    bench.slave = UNITS[unit](bench.wire, fates)
+    return bench
+
+
+# --- questions that are never in doubt all together -----------------------------------------------
+
+
+@pytest.mark.parametrize('unit', ['G2', 'Optimal'])
+@pytest.mark.parametrize('make', [Bench, AsciiBench])
+def test_however_many_answers_are_lost_something_is_asked_at_once(
+    make: type[Bench], unit: str
+) -> None:
+    bench = modbus_bench(unit, iter([LOST] * 30), make)
+    for _ in range(30):
+        before = bench.wire.now
+        bench.expect(NoAnswer, lambda: bench.read(A))
+        assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
+    # what was read last, then two questions of other kinds, and none is asked in doubt
+    assert [function for _, function, _, _ in bench.slave.requests[:6]] == [3, 3, 17, 43, 3, 3]
+    assert bench.asked[:2] == [A.numbers[0], TWO.numbers[0]]
+    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
+
+
+def test_a_unit_of_which_nothing_is_known_is_asked_who_it_is() -> None:
+    bench = Bench([LOST], probes=())
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    assert bench.read(B).words == bench.answer_of(2)
+    assert [function for _, function, _, _ in bench.slave.requests] == [3, 17, 3]
+
+
+def test_a_unit_of_which_nothing_is_known_is_left_alone_for_one_time_out_at_most() -> None:
+    bench = Bench([LOST] * 3, probes=())
+    for _ in range(3):
+        bench.expect(NoAnswer, lambda: bench.read(A))
+    error = bench.expect(NotReady, lambda: bench.read(A))
+    assert isinstance(error, NotReady)
+    assert bench.wire.now < error.until <= bench.wire.now + TIMEOUT
+    bench.wire.now = error.until
+    assert bench.read(A).words == bench.answer_of(3)
+
+
+def test_what_cannot_be_confused_needs_no_probe() -> None:
+    bench = Bench([Fate(1.5)])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    assert bench.read(C).words == bench.answer_of(1)
+    # and it has told that nothing is left
+    assert bench.read(B).words == bench.answer_of(2)
+    assert len(bench.asked) == 3
+
+
+def test_a_refusal_that_may_be_an_earlier_one_is_asked_for_again() -> None:
+    bench = Bench([Fate(1.5, 'refuse'), Fate(what='refuse'), Fate(), Fate(what='refuse')])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.expect(DamagedAnswer, lambda: bench.read(C))
+    error = bench.expect(Refused, lambda: bench.read(C))
+    assert isinstance(error, Refused)
+    assert error.code == bench.slave.code(len(bench.asked) - 1)
+
+
+@hypothesis_settings(max_examples=300)
+@given(FATES, STEPS, st.sampled_from(sorted(UNITS)))
+def test_whatever_is_lost_late_doubled_or_damaged_the_line_is_used(
+    fates: list[Fate], steps: list[tuple[str, float]], unit: str
+) -> None:
+    bench = modbus_bench(unit, lumps_or_doubles(fates))
+    for what, _ in steps:
+        address = NAMES[what[-1]]
+        before = len(bench.asked)
+        try:
+            if what.startswith('write'):
+                bench.write(address, *(7,) * address.words)
+            else:
+                words = bench.read(address).words
+                assert bench.asked[-1] == address.numbers[0]
+                assert words == bench.answer_of(len(bench.asked) - 1)
+        except Refused as refusal:
+            assert bench.asked[-1] == address.numbers[0]
+            assert refusal.code == bench.slave.code(len(bench.asked) - 1)
+        except NotReady as refusal:
+            assert not what.startswith('write')
+            assert len(bench.asked) == before
+            assert bench.wire.now < refusal.until <= bench.wire.now + TIMEOUT + 1e-9
+            bench.wire.now = refusal.until
+        except LinkError:
+            pass
+        if what.startswith('write'):
+            assert len(bench.asked) == before + 1
+    bench.wire.check_gaps()
+
+
+@hypothesis_settings(max_examples=300)
+@given(
+    st.lists(st.builds(Fate, st.floats(0, 3), st.sampled_from(['answer', 'drop'])), max_size=25),
+    st.lists(st.sampled_from(sorted(NAMES)), max_size=25),
+)
+def test_nobody_waits_where_answers_are_only_lost_or_late(
+    fates: list[Fate], names: list[str]
+) -> None:
+    bench = modbus_bench('G2', iter(fates))
+    for name in names:
+        before = bench.wire.now, len(bench.wire.sent)
+        try:
+            words = bench.read(NAMES[name]).words
+        except (NoAnswer, DamagedAnswer):
+            pass
+        else:
+            assert words == bench.answer_of(len(bench.asked) - 1)
+        first = bench.wire.sent[before[1]][0]
+        # a late answer may have to end first
+        assert first - before[0] <= 2 * bench.wire.gap + 9 * SETTINGS.char_time
+
+
+# --- bursts ---------------------------------------------------------------------------------------
+
+RATES = (19200, 57600)
+BURSTS = st.floats(0.05, 1.0)
+
+
+def lose(wire: Wire, begin: float, end: float, *, noise: bool) -> None:
+    """Lose every frame that touches a stretch of time; have rubbish come instead, or nothing."""
+    far_end = wire.far_end
+
+    def take(frame: bytes, sent: float) -> None:
+        if sent < begin or wire.now > end:
+            far_end(frame, sent)
+        wire._arrivals = [
+            (at, order, data)
+            for at, order, data in wire._arrivals
+            if data == b'\xa5' or not begin <= at <= end
+        ]
+        heapq.heapify(wire._arrivals)
+
+    if noise:
+        for number in range(int((end - begin) / 0.001)):
+            wire._put(begin + 0.001 * number, b'\xa5')
+    wire.far_end = take
+
+
+def check_status(wire: Wire, end: float, reads: list[Callable[[], object]]) -> None:
+    """Read again and again; after the burst the first request and the first status come soon."""
+    done = 0
+    while done < len(reads) or wire.now < end:
+        try:
+            reads[done % len(reads)]()
+            done = done + 1 if wire.now >= end else 0
+        except NotReady as error:
+            wire.now = error.until
+        except LinkError:
+            pass
+    first = next(at for at, _ in wire.sent if at >= end)
+    assert first - end <= 0.25
+    assert wire.now - first <= 0.2
+
+
+@pytest.mark.parametrize('noise', [False, True])
+@pytest.mark.parametrize('rate', RATES)
+@pytest.mark.parametrize('make', [Bench, AsciiBench])
+@hypothesis_settings(max_examples=60)
+@given(
+    burst=BURSTS, begin=st.floats(0.0, 0.05), reads=st.sampled_from([(A, B), (A, C), (C, D)])
+)
+def test_after_a_burst_the_line_is_used_and_the_status_known_at_once(
+    make: type[Bench],
+    rate: int,
+    noise: bool,
+    burst: float,
+    begin: float,
+    reads: tuple[Address, Address],
+) -> None:
+    for unit in ('G2', 'Optimal'):
+        bench = make(settings=LineSettings(rate, '8E1' if make is Bench else '7E1', 0.2))
+        bench.slave = UNITS[unit](bench.wire)
+        at = bench.wire.now + begin
+        lose(bench.wire, at, at + burst, noise=noise)
+        status = [functools.partial(bench.read, address) for address in reads]
+        check_status(bench.wire, at + burst, status)
+
+
+@pytest.mark.parametrize('noise', [False, True])
+@pytest.mark.parametrize('rate', RATES)
+@hypothesis_settings(max_examples=60)
+@given(burst=BURSTS, begin=st.floats(0.0, 0.05))
+def test_classic_after_a_burst_the_line_is_used_and_the_status_known_at_once(
+    rate: int, noise: bool, burst: float, begin: float
+) -> None:
+    bench = ClassicBench(settings=LineSettings(rate, '7E1', 0.2))
+    at = bench.wire.now + begin
+    lose(bench.wire, at, at + burst, noise=noise)
+    status = [functools.partial(bench.read, Address((number,), 1)) for number in (0xE9, 0x29)]
+    check_status(bench.wire, at + burst, status)
+
+
+# --- writes ---------------------------------------------------------------------------------------
+
+
+def babble(wire: Wire, byte: int, period: float) -> None:
+    for number in range(int(1 / period)):
+        wire.arrive(wire.now + number * period, bytes((byte,)))
+
+
+@pytest.mark.parametrize('rate', [9600, 19200, 57600])
+@pytest.mark.parametrize('make', [Bench, AsciiBench])
+def test_a_stop_is_sent_into_noise_that_does_not_end(make: type[Bench], rate: int) -> None:
+    settings = LineSettings(rate, '8E1' if make is Bench else '7E1', 0.2)
+    bench = make(settings=settings)
+    bench.read(A)
+    babble(bench.wire, 0x55, bench.wire.gap / 2)
+    before = bench.wire.now
+    with contextlib.suppress(DamagedAnswer):
+        bench.write(A, 0)
+    assert bench.asked[1:] == [A.numbers[0]]
+    longest = (9 if make is Bench else 17) * settings.char_time
+    assert bench.wire.sent[-1][0] - before <= 2 * bench.wire.gap + max(0.02, longest)
+
+
+def test_what_was_not_sent_was_not_done() -> None:
+    bench = Bench()
+    babble(bench.wire, 0x55, SETTINGS.frame_gap / 2)
+    with pytest.raises(DamagedAnswer, match='never silent') as raised:
+        bench.read(A)
+    assert not raised.value.maybe_done
+    with pytest.raises(DamagedAnswer, match='never silent') as raised, bench.wire.time():
+        bench.link.read_then_write(UNIT, A, B, (0,))
+    assert not raised.value.maybe_done
+    assert bench.wire.sent == []
+
+
+def test_a_write_and_read_whose_probe_was_lost_was_not_done() -> None:
+    bench = Bench()
+    bench.wire.far_end = lambda frame, end: None
+    with bench.wire.time():
+        for done in (True, False):
+            with pytest.raises(NoAnswer) as raised:
+                bench.link.write_and_read(UNIT, A, (7,), B)
+            assert raised.value.maybe_done is done
+
+
+@pytest.mark.parametrize('lost', range(6))
+def test_a_write_goes_out_at_once_whatever_is_in_doubt(lost: int) -> None:
+    bench = Bench([LOST] * lost)
+    for _ in range(lost):
+        bench.expect(NoAnswer, lambda: bench.read(A))
+    before = bench.wire.now
+    assert bench.write(A, 0).words == ()
+    assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
+    assert len(bench.asked) == lost + 1
+
+
+# --- Classic --------------------------------------------------------------------------------------
+
+
+def test_classic_however_many_answers_are_lost_something_is_asked_at_once() -> None:
+    bench = ClassicBench(*[ClassicFate(what='drop')] * 30)
+    for _ in range(30):
+        before = bench.wire.now
+        with pytest.raises(NoAnswer):
+            bench.read(Address((0xE9,), 1))
+        assert bench.wire.sent[-1][0] == before
+    assert bench.asked[:5] == [0xE9, 0x29, 0x30, 0x0F, 0xE9]
+
+
+@pytest.mark.parametrize('what', ['drop', 'damage'])
+def test_classic_a_stop_that_failed_is_given_again_before_anything_is_read(what: str) -> None:
+    bench = ClassicBench(*[ClassicFate(what=what)] * 2)
+    for _ in range(2):
+        before = bench.wire.now
+        with pytest.raises((NoAnswer, DamagedAnswer)):
+            bench.write(Address((0x2A,), 1), 0)
+        assert bench.wire.sent[-1][0] == before
+    assert bench.asked == [0x2A, 0x2A]
+
+
+def test_classic_a_stop_is_sent_into_noise_that_does_not_end() -> None:
+    bench = ClassicBench()
+    babble(bench.wire, 0x7F, 0.001)
+    before = bench.wire.now
+    with pytest.raises(DamagedAnswer) as raised:
+        bench.write(Address((0x2A,), 1), 0)
+    assert raised.value.maybe_done
+    assert [at for at, _ in bench.wire.sent] == [before]
+
+
+@hypothesis_settings(max_examples=200)
+@given(
+    st.lists(
+        st.builds(ClassicFate, st.floats(0, 3), st.sampled_from(['answer', 'drop', 'damage'])),
+        max_size=25,
+    ),
+    st.lists(st.sampled_from([0xE9, 0x29, 0x1E, 0xB6]), max_size=25),
+)
+def test_classic_nobody_waits_longer_than_a_time_out(
+    fates: list[ClassicFate], numbers: list[int]
+) -> None:
+    bench = ClassicBench(*fates)
+    for number in numbers:
+        try:
+            words = bench.read(Address((number,), 1)).words
+        except NotReady as refusal:
+            assert bench.wire.now < refusal.until <= bench.wire.now + TIMEOUT + 1e-9
+            bench.wire.now = refusal.until
+        except LinkError:
+            pass
+        else:
+            index = len(bench.asked) - 1
+            assert words == (FarEnd.word(number, index),)
