@@ -42,33 +42,33 @@ _REFUSING = ('--stop-in-tuning', 'refused')
 _WAYS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
 
 
-def _succeeds(client: Client, driver: Process, way: str) -> bool:
+def _succeeds(client: Client, driver: Process, out: str) -> bool:
     """Stop the drive one way; tell whether that is said to have succeeded."""
-    if way == 'deactivate':
+    if out == 'deactivate':
         return client.change_state(Transition.TRANSITION_DEACTIVATE)
-    if way == 'shutdown signal':
+    if out == 'shutdown signal':
         driver.signal(signal.SIGTERM)
         return driver.wait() == 0
-    if way == 'disable':
+    if out == 'disable':
         return bool(client.enable(False).success)
-    return bool(client.call('/nfo_sinus_bus/stop_all' if way == 'stop_all' else way).success)
+    return bool(client.call('/nfo_sinus_bus/stop_all' if out == 'stop_all' else out).success)
 
 
 @needs('states')
-@pytest.mark.parametrize('way', _WAYS)
+@pytest.mark.parametrize('out', _WAYS)
 def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
-    bench: Bench, way: str
+    bench: Bench, out: str
 ) -> None:
     drive = bench.simulator(*_REFUSING)
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
     client = bench.client().connected()
     client.call_async('tune_full', Trigger)
     drive.wait_for(lambda state: state['inv_st'] == 28, timeout=PATIENCE)
-    success = _succeeds(client, driver, way)
+    success = _succeeds(client, driver, out)
     tuning = drive.state()['inv_st'] == 28
     # a machine that is slow enough sees the end of the tuning first
     assert success != tuning, driver.text
-    if way == 'deactivate':
+    if out == 'deactivate':
         assert client.state() == ('inactive' if success else 'active')
         drive.wait_for(lambda state: state['inv_st'] != 28, timeout=PATIENCE)
         wait_until(
@@ -163,4 +163,4 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
     waits = [request for request in asked_of[:stop] if request and request.unit == 2]
     # each of them keeps the line for a time-out: one on its way, one while the call came in
     assert len(waits) <= 2, asked_of[: stop + 1]
-    assert drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    assert drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE, address=1)
