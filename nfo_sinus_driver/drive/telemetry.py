@@ -58,13 +58,13 @@ async def watch_telemetry(
 ) -> None:
     """Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN."""
     values = dict.fromkeys((*FAST, *SLOW), NAN)
-    missing = {key for key in values if not inverter.has(key)}
+    missing: set[str] = set()
     # the first time all are read, so that the first message is whole
     due = deque(SLOW)
     first = True
 
     async def measure(key: str) -> None:
-        if key in missing:
+        if key in missing or not inverter.has(key):
             return
         try:
             values[key] = await registers.read_number(key, Priority.TELEMETRY, once=True)
