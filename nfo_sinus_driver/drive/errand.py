@@ -202,14 +202,14 @@ class Errands:
         loan.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await motion.method.take_control()
-        # no manual says that a drive has forgotten what it was told before
-        await motion.method.stop(control_mode)
         deadline = time.monotonic() + withdrawal.PATIENCE
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(motion, Mode(mode))
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
+            # no manual says that a drive has forgotten what it was told before
+            await motion.method.stop(control_mode)
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
         return Mode(mode)
 

@@ -227,8 +227,8 @@ class Parameters:
         finally:
             self._unread = 0
         self._keys = tuple(key for key in keys if key in self._words)
+        took = f'{time.monotonic() - started:.1f} s'
         if keys:
-            took = f'{time.monotonic() - started:.1f} s'
             inverter.tell(Severity.INFO, f'parameters: {self.progress} in {took}')
 
     async def _read_first(self, keys: Sequence[str]) -> None:
@@ -277,7 +277,6 @@ class Parameters:
                 except Refused:
                     pass
                 except LinkError:
-                    # the poll says so if the drive is lost
                     inverter.answering = False
             # many drives on a line take their time, lest nothing but that goes on
             pace = _ROUND * self._bus.refreshing / len(due)
