@@ -105,14 +105,14 @@ class Drive:
             lambda: self._connect(patient=False),
         )
         self._barred = False
+        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         #: The settings of the drive.
         self.parameters = Parameters(
-            bus, self._inverter, self._registers, self._run, self._take_parameters
+            bus, self._inverter, self._registers, errands, self._run, self._take_parameters
         )
         self._own_timeout = OwnTimeout(
             self._inverter, self.parameters, commanded=self._motion is not None
         )
-        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         self._error_log = ErrorLog(self._inverter, self._registers, errands)
         self._log_watch = LogWatch(bus, self._inverter, self._error_log, listener)
         self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, errands)

@@ -110,7 +110,7 @@ class Motion:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
-        :param prepare: does what has to be done before, once it is known that no fault stands.
+        :param prepare: does what has to be done before a run command, once the bus has control.
         :returns: what was done.
         :raises DriveError: it was not done, and why; the run command is taken back then.
         """
@@ -392,7 +392,6 @@ class Motion:
         self._explain_refusal(seen)
         require_no_fault(inverter, seen)
         self._require_no_stop()
-        await prepare()
         control_mode = await inverter.read_control_mode()
         expected = inverter.settings.expected_control_mode
         if expected and control_mode != expected:
@@ -402,6 +401,7 @@ class Motion:
             )
         await self._method.take_control()
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
+        await prepare()
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.run(self._await_start)

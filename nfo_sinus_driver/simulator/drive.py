@@ -18,8 +18,7 @@ A whole NFO Sinus made of software: parameters, commands, state machine, motor, 
 It knows parameters by catalog key and raw numbers, and time only as it is told of it; which
 protocol asks is not its business. Where the manuals leave the drive's behaviour open, it does
 what makes a careless driver fail: a run command stands through a lost RUN input, a set-point
-through a power cycle, and MODE = Ext or Auto starts the motor. In ``variant.py`` is what it can do
-this way or that.
+through a power cycle, and MODE = Ext or Auto starts the motor; or what its variant says.
 """
 
 from __future__ import annotations
@@ -224,7 +223,6 @@ class SimulatedDrive:
     def read_raw(self, key: str) -> int:
         """
         Read a parameter as the bus does, a number of the memory, side effects included.
-
 
         :raises Refused: ADDRESS; it can only be written.
         """
