@@ -65,8 +65,10 @@ ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY
 mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
 	@tools/run python test/mutants/run.py
 
-campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=500)
-	@HISTORIES=$(or $(HISTORIES),500) tools/run python $(PYTEST) -n auto test/unit/drive/test_any_order.py
+campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=3000)
+	@seed=$(or $(SEED),$$(od -An -N3 -tu4 /dev/urandom | tr -d ' ')); echo "seed $$seed"; \
+	SEED=$$seed HISTORIES=$(or $(HISTORIES),3000) tools/run python $(PYTEST) \
+		-n auto --dist worksteal test/unit/drive/test_any_order.py -k campaign
 
 fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=frame)
 	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \

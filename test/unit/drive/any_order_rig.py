@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
 import functools
+from random import Random
 import struct
 import sys
 import time
@@ -139,6 +140,7 @@ class DirectLink:
         any more; ``gone``: the port is.
     :ivar losses: how many answers are still lost although the line is whole.
     :ivar unheard: how many requests are.
+    :ivar noise: the share of the answers that are damaged or lost, by chance.
     :ivar doubled: how many answers come twice yet: each spoils the next.
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
@@ -149,17 +151,30 @@ class DirectLink:
         self._rig = rig
         self.state = 'whole'
         self.losses = self.unheard = self.doubled = 0
+        self.noise = 0.0
+        self._random = Random(0)
         self.frames: list[dict[str, Any]] = []
         self.asked_at = rig.clock.now
         self._not_ready_until = 0.0
 
     @property
     def whole(self) -> bool:
+        return self.passes and not self.noise
+
+    @property
+    def passes(self) -> bool:
+        """Whether requests are carried out and answers come, but for some by chance."""
         return self.state == 'whole' and not (self.losses or self.unheard or self.doubled)
+
+    def make_noise(self, share: float, seed: int) -> None:
+        """Damage or lose this share of the answers from now on."""
+        self.noise = share
+        self._random = Random(seed)
 
     def mend(self) -> None:
         """End all that is wrong with the line."""
         self.state = 'whole'
+        self.noise = 0.0
         self.losses = self.unheard = self.doubled = 0
 
     def open(self) -> None:
@@ -227,13 +242,22 @@ class DirectLink:
             words = carry_out(rig.far)
         except FarRefusal as error:
             words, length, refusal = (), 5, error
-        if not self.whole:
+        if not self.passes:
             self._lose_answer()
+        if self.noise and self._random.random() < self.noise:
+            self._spoil_answer()
         # the drive catches up when it is looked at next
         rig.clock.now += _TURNAROUND + length * _CHARACTER
         if refusal is not None:
             raise Refused(int(refusal.reason))
         return words
+
+    def _spoil_answer(self) -> None:
+        """Damage an answer or lose it, one as likely as the other."""
+        self._rig.elapse(RESPONSE_TIMEOUT)
+        if self._random.random() < 0.5:
+            raise DamagedAnswer('what came is no answer')
+        raise NoAnswer('nobody answers')
 
     def _lose_answer(self) -> None:
         if self.doubled:
