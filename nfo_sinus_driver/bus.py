@@ -44,6 +44,8 @@ from nfo_sinus_driver.jobs import Sleepers
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.jobs import inquire
+from nfo_sinus_driver.jobs import log_unexpected
 from nfo_sinus_driver.jobs import read_in_steps
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
@@ -54,6 +56,7 @@ from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.silence import Silences
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
 from nfo_sinus_driver.timers import tighten_timers
@@ -68,8 +71,6 @@ _T = TypeVar('_T')
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
 
-_NOWHERE = Address((), 0)
-
 
 class Bus:
     """
@@ -83,12 +84,15 @@ class Bus:
         self._port = Keeper(link)
         self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
         self._awake = threading.Event()
-        self._turns = Turns()
+        #: Which units do not answer, for coroutines on the worker.
+        self.silences = Silences()
+        self._turns = Turns(self.silences.is_silent)
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
         self._tasks: set[Task] = set()
-        self._recorder = Recorder()
+        #: For coroutines on the worker to count in.
+        self.recorder = Recorder()
         #: How many coroutines read parameters again and again; they share the time for it.
         self.refreshing = 0
         self._current: Task | None = None
@@ -146,7 +150,7 @@ class Bus:
 
     def statistics(self) -> Statistics:
         """Return the counters and times of the line."""
-        return self._recorder.statistics()
+        return self.recorder.statistics()
 
     @property
     def port_error(self) -> PortError | None:
@@ -191,7 +195,7 @@ class Bus:
         send = functools.partial(self._link.read_then_write, unit, source, address, words)
         return Transfer(unit, address, priority, words, send)
 
-    async def identify(self, unit: int, priority: Priority) -> Identification:
+    def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
         """
         Ask a unit who it is, one transaction at a time, and none of them twice (to be awaited).
 
@@ -199,15 +203,7 @@ class Bus:
 
         :raises PortError: the port is not open.
         """
-        inquiry = self._link.identify(unit)
-        while not inquiry.done:
-            try:
-                await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
-            except PortError:
-                raise
-            except LinkError as error:
-                _log.debug('unit %d does not say who it is: %s', unit, error)
-        return inquiry.found
+        return inquire(unit, self._link.identify(unit), priority)
 
     def sleep(self, seconds: float) -> Pause:
         """Let time pass (to be awaited)."""
@@ -234,7 +230,7 @@ class Bus:
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
         """Start a coroutine beside the present one; errors nobody expects are logged."""
         task = Task(coroutine)
-        task.future.add_done_callback(_log_unexpected)
+        task.future.add_done_callback(log_unexpected)
         self._advance(task, None, None)
         return task
 
@@ -259,18 +255,6 @@ class Bus:
         """End the pause of a task early; harmless if it is not in one."""
         if task.asleep:
             self._end_pause(task)
-
-    def note_cycle(self, unit: int, seconds: float) -> None:
-        """Record how long one round of polling took for a unit."""
-        self._recorder.cycle(unit, seconds)
-
-    def forget_cycle(self, unit: int) -> None:
-        """Take a unit that is no longer polled out of the statistics."""
-        self._recorder.forget_cycle(unit)
-
-    def note_retry(self) -> None:
-        """Count a request that is sent again."""
-        self._recorder.retries += 1
 
     # --- the worker ---------------------------------------------------------------------------
 
@@ -415,27 +399,28 @@ class Bus:
         except NotReady:
             raise
         except LinkError as error:
-            self._account(started, error)
+            self._account(transfer.unit, started, error)
             raise
         except BaseException as error:
             # a mistake in the link must reach the one who asked, not leave him waiting
             _log.exception('error in the link')
             raise LinkError(f'error in the link: {error!r}') from error
-        self._account(started, None)
+        self._account(transfer.unit, started, None)
         return reply
 
-    def _account(self, started: float, error: LinkError | None) -> None:
+    def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
+        self.silences.note(unit, started, now, error)
         self._turns.took(now - started)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
-            self._recorder.transaction(now, now - started, error)
+            self.recorder.transaction(now, now - started, error)
 
     def _open_when_due(self) -> None:
         now = time.monotonic()
         if now >= self._port.reopen_at and self._port.open(now + REOPEN_PERIOD):
-            self._recorder.opened()
+            self.recorder.opened()
 
     def _fail_all(self, error: PortError) -> None:
         """Tell everyone who waits that the port is not there."""
@@ -454,9 +439,3 @@ class Bus:
         except BaseException:
             # the others have to be told all the same
             _log.exception('error in a slot; the bus worker goes on')
-
-
-def _log_unexpected(future: Future[Any]) -> None:
-    error = future.exception()
-    if error is not None and not isinstance(error, (Cancelled, LinkError)):
-        _log.error('a job on the bus failed', exc_info=error)

@@ -23,14 +23,22 @@ from concurrent.futures import Future
 import enum
 import heapq
 import itertools
+import logging
 import math
 from typing import Any
 
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import Inquiry
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.link import in_steps
+
+_log = logging.getLogger(__name__)
+
+_NOWHERE = Address((), 0)
 
 
 class Priority(enum.IntEnum):
@@ -96,6 +104,22 @@ async def read_in_steps(unit: int, address: Address, priority: Priority) -> Repl
             return whole
 
 
+async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identification:
+    """
+    Ask a unit all questions about itself, each a transaction; return what it said.
+
+    :raises PortError: the port is not open.
+    """
+    while not inquiry.done:
+        try:
+            await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
+        except PortError:
+            raise
+        except LinkError as error:
+            _log.debug('unit %d does not say who it is: %s', unit, error)
+    return inquiry.found
+
+
 class Pause:
     """A wait until a moment, or until the task is woken."""
 
@@ -146,6 +170,13 @@ class Task:
         finally:
             self.running = False
         return None
+
+
+def log_unexpected(future: Future[Any]) -> None:
+    """Log how a task failed for which nobody waits, unless it was cancelled or the line's fault."""
+    error = future.exception()
+    if error is not None and not isinstance(error, (Cancelled, LinkError)):
+        _log.error('a job on the bus failed', exc_info=error)
 
 
 class Sleepers:

@@ -389,7 +389,7 @@ class Drive:
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')
-        self._own_timeout.warn_if_missing()
+        self._own_timeout.warn_if_unfit()
 
     async def _disconnect(self, timeout: float) -> str:
         # nobody may enable it while it is awaited that the motor stands
@@ -446,6 +446,6 @@ class Drive:
             self._telemetry_task = None
         if active:
             self._telemetry_task = self._bus.spawn(
-                watch_telemetry(self._bus, self._inverter, self._registers, self._listener)
+                watch_telemetry(self._bus, self._inverter, self._listener)
             )
             self._watch.wake()

@@ -277,7 +277,7 @@ class Parameters:
                 except Refused:
                     pass
                 except LinkError:
-                    inverter.answering = False
+                    inverter.missed()
             # many drives on a line take their time, lest nothing but that goes on
             pace = _ROUND * self._bus.refreshing / len(due)
             await self._bus.sleep(started + number * pace - time.monotonic())

@@ -192,8 +192,15 @@ class Withdrawal:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
         if not self._inverter.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
-        elif self._outcome is not _Outcome.UNHEARD:
+        elif self._outcome is not _Outcome.UNHEARD or self._is_lost:
             await self._bus.sleep(_RETRY_PERIOD)
+
+    @property
+    def _is_lost(self) -> bool:
+        """The drive has been silent for so long that the next poll gives it up."""
+        settings = self._inverter.settings
+        silent = self._bus.silences.lasts(settings.address, time.monotonic())
+        return silent >= settings.lost_after
 
     async def _attempt(self) -> _Outcome:
         try:
@@ -217,6 +224,11 @@ class Withdrawal:
             await self._method.stop(control_mode)
         except Refused as error:
             refusal = str(error)
+        except DamagedAnswer:
+            # among late answers a refusal is not believed, until something else was answered
+            if self._outcome is _Outcome.UNHEARD:
+                await self._inverter.look(Priority.STOP, once=True)
+            raise
         seen = await self._inverter.look(Priority.STOP, once=True)
         if refusal and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:

@@ -117,7 +117,7 @@ def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:
     drive = bench.simulator('--set', 'control.retard=60', '--set', 'control.accel=1')
-    driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'drive_timeout:=1.0')
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'drive_timeout:=1.5')
     client = bench.client().connected()
     with client.run_at(20.0):
         driver.signal(signal.SIGTERM)
@@ -134,11 +134,11 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     drive = bench.simulator(
         '--set', 'control.retard=60', '--set', 'control.accel=1', '--set', 'serial.auto_stop=OFF'
     )
-    driver = bench.driver('-p', 'drive_timeout:=1.0')
+    driver = bench.driver('-p', 'drive_timeout:=1.5')
     client = bench.client().connected()
     with client.run_at(20.0):
         parameters = drive.state()['parameters']
-        assert parameters['serial.sio_tot'] == 1.0
+        assert parameters['serial.sio_tot'] == 1.5
         assert parameters['serial.auto_stop'] is True
         driver.signal(signal.SIGKILL)
         assert driver.wait() == -signal.SIGKILL
@@ -150,7 +150,7 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
     # without telemetry, and with a poll every five seconds, only the keeping alive is left
-    settings = ('drive_timeout:=1.0', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
+    settings = ('drive_timeout:=1.5', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
     bench.driver(*(word for setting in settings for word in ('-p', setting)))
     client = bench.client().connected()
     with client.run_at(20.0):
