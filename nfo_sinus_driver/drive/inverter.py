@@ -47,7 +47,7 @@ _LONGEST_START_DELAY = 3600.0
 _SOON = 2.0
 _NOT_ASKED = (
     'its firmware is not asked for while the bus has control, which firmware before 4.28 takes for '
-    'a fault: it is treated like that one until this driver connects while the bus has no control; '
+    'a fault: it is treated like that one until it is connected to while the bus has no control; '
     'set classic_dialect to v2.03 or v5.0 to know it at once'
 )
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
