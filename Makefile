@@ -23,7 +23,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants campaign bench parameters build clean
+.PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench parameters build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -67,6 +67,10 @@ mutants: setup ## break each law in a copy and see that a test fails (a quarter 
 
 campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=500)
 	@HISTORIES=$(or $(HISTORIES),500) tools/run python $(PYTEST) -n auto test/unit/drive/test_any_order.py
+
+fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=frame)
+	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \
+		--frames $(or $(FRAMES),1000000) $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
 
 # Not a part of setup: only the comparison needs other masters.
 bench: setup ## measure its speed, and that of others (over an hour; BENCH=--quick: 10 minutes)

@@ -56,6 +56,7 @@ from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.silence import Silences
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
 from nfo_sinus_driver.timers import tighten_timers
@@ -83,12 +84,15 @@ class Bus:
         self._port = Keeper(link)
         self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
         self._awake = threading.Event()
-        self._turns = Turns()
+        #: Which units do not answer, for coroutines on the worker.
+        self.silences = Silences()
+        self._turns = Turns(self.silences.is_silent)
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
         self._tasks: set[Task] = set()
-        self._recorder = Recorder()
+        #: For coroutines on the worker to count in.
+        self.recorder = Recorder()
         #: How many coroutines read parameters again and again; they share the time for it.
         self.refreshing = 0
         self._current: Task | None = None
@@ -146,7 +150,7 @@ class Bus:
 
     def statistics(self) -> Statistics:
         """Return the counters and times of the line."""
-        return self._recorder.statistics()
+        return self.recorder.statistics()
 
     @property
     def port_error(self) -> PortError | None:
@@ -251,18 +255,6 @@ class Bus:
         """End the pause of a task early; harmless if it is not in one."""
         if task.asleep:
             self._end_pause(task)
-
-    def note_cycle(self, unit: int, seconds: float) -> None:
-        """Record how long one round of polling took for a unit."""
-        self._recorder.cycle(unit, seconds)
-
-    def forget_cycle(self, unit: int) -> None:
-        """Take a unit that is no longer polled out of the statistics."""
-        self._recorder.forget_cycle(unit)
-
-    def note_retry(self) -> None:
-        """Count a request that is sent again."""
-        self._recorder.retries += 1
 
     # --- the worker ---------------------------------------------------------------------------
 
@@ -407,27 +399,28 @@ class Bus:
         except NotReady:
             raise
         except LinkError as error:
-            self._account(started, error)
+            self._account(transfer.unit, started, error)
             raise
         except BaseException as error:
             # a mistake in the link must reach the one who asked, not leave him waiting
             _log.exception('error in the link')
             raise LinkError(f'error in the link: {error!r}') from error
-        self._account(started, None)
+        self._account(transfer.unit, started, None)
         return reply
 
-    def _account(self, started: float, error: LinkError | None) -> None:
+    def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
+        self.silences.note(unit, started, now, error)
         self._turns.took(now - started)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
-            self._recorder.transaction(now, now - started, error)
+            self.recorder.transaction(now, now - started, error)
 
     def _open_when_due(self) -> None:
         now = time.monotonic()
         if now >= self._port.reopen_at and self._port.open(now + REOPEN_PERIOD):
-            self._recorder.opened()
+            self.recorder.opened()
 
     def _fail_all(self, error: PortError) -> None:
         """Tell everyone who waits that the port is not there."""

@@ -96,6 +96,10 @@ class Recorder:
         """Record the round trip of a transaction that was answered."""
         self._round_trips.append(seconds)
 
+    def retry(self) -> None:
+        """Count a request that is sent again."""
+        self.retries += 1
+
     def cycle(self, unit: int, seconds: float) -> None:
         """Record how long one round of polling took for a unit."""
         self._cycles[unit] = seconds

@@ -22,6 +22,7 @@ What waits for the line, and which of it goes next. No thread, no clock and noth
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from collections.abc import Iterator
 from typing import Literal
 from typing import NamedTuple
@@ -34,8 +35,10 @@ from nfo_sinus_driver.jobs import Transfer
 __all__ = ['BACKGROUND_SHARE', 'Turns', 'Waiting']
 
 #: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above asks
-#: for more.
+#: for more; of the time that set-points leave, for else these would take nearly all from the polls.
 BACKGROUND_SHARE = 1 / 6
+#: The same for all polls of units that do not answer: each of them may cost a whole time-out.
+RETRY_SHARE = 1 / 2
 #: How much of its share each may be owed while it waits for it, s: what it earns by two requests
 #: that nobody answers, when the time-out is that of the factory.
 _MOST_OWED = 0.07
@@ -43,10 +46,18 @@ _MOST_OWED = 0.07
 _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 
+#: A poll of a unit that did not answer the last request.
+_RETRY: Literal['retry'] = 'retry'
 _SLOT: Literal['slot'] = 'slot'
 #: What makes a motor stop, ahead of what only looks whether one does.
 _COMMAND: Literal['command'] = 'command'
-_Rank = Priority | Literal['slot', 'command']
+_Rank = Priority | Literal['slot', 'command', 'retry']
+_STOPS = (_COMMAND, Priority.STOP)
+_SHARES: dict[_Rank, float] = {
+    _RETRY: RETRY_SHARE,
+    Priority.TELEMETRY: BACKGROUND_SHARE,
+    Priority.REFRESH: BACKGROUND_SHARE,
+}
 
 
 class Waiting(NamedTuple):
@@ -64,42 +75,64 @@ class Turns:
     waits for the transaction on the line and no other. The background, TELEMETRY and REFRESH, goes
     ahead of all else as long as it is owed its share of the time; who is owed more goes first.
     Set-points may come faster than the line can carry them, and who then no longer polls does not
-    see the fault that should stop the motor: so after each of them something else has a turn, the
-    background's share included.
+    see the fault that should stop the motor: so after each of them something else has a turn, and
+    the background's share is of the time between them.
+
+    A unit that does not answer keeps the line for a time-out with every poll. All of these together
+    have no more than their share of the time as long as anybody else waits. A stop that a unit does
+    not answer is repeated at once, and after each of them somebody else has a turn, too.
+
+    :param is_silent: tells whether a unit has not answered the last request.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_silent: Callable[[int], bool] = lambda unit: False) -> None:
+        self._is_silent = is_silent
         self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (_COMMAND, *Priority, _SLOT)
+            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY)
         }
-        #: How much time the background is owed, s; it owes if that is negative.
-        self._owed = dict.fromkeys(_BACKGROUND, 0.0)
+        #: How much time those that have a share are owed, s; they owe if that is negative.
+        self._owed = dict.fromkeys(_SHARES, 0.0)
         self._given: _Rank = _SLOT
         self._slot_went = False
+        #: Who was told to stop just now, and who did not answer that.
+        self._told_to_stop: int | None = None
+        self._unheard: int | None = None
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
-        self._queues[_rank(entry)].append(entry)
+        self._queues[self._rank(entry)].append(entry)
 
     def take(self) -> Slot | Waiting | None:
         """Take out what goes next; ``None`` if nothing waits."""
         for rank in self._order():
-            if self._queues[rank]:
-                self._given = rank
-                return self._queues[rank].popleft()
-        return None
+            for entry in self._queues[rank]:
+                unit = None if isinstance(entry, Slot) else entry.transfer.unit
+                if unit is None or unit != self._unheard:
+                    self._queues[rank].remove(entry)
+                    self._given = rank
+                    self._told_to_stop = unit if rank in _STOPS else None
+                    return entry
+        if self._unheard is None:
+            return None
+        # nobody else waits
+        self._unheard = None
+        return self.take()
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
-        for priority in _BACKGROUND:
-            owed = self._owed[priority] + seconds * BACKGROUND_SHARE
-            if priority == self._given:
+        told = self._told_to_stop
+        self._unheard = told if told is not None and self._is_silent(told) else None
+        for rank, share in _SHARES.items():
+            if self._slot_went and rank in _BACKGROUND:
+                continue
+            owed = self._owed[rank] + seconds * share
+            if rank == self._given:
                 # no debt beyond this one transaction, for what is sent on an idle line harms nobody
-                self._owed[priority] = max(owed - seconds, -seconds)
+                self._owed[rank] = max(owed - seconds, -seconds)
             else:
-                most = _MOST_OWED if self._queues[priority] else _MOST_SAVED
-                self._owed[priority] = min(owed, most)
+                most = _MOST_OWED if self._queues[rank] else _MOST_SAVED
+                self._owed[rank] = min(owed, most)
 
     def withdraw(self, task: Task) -> None:
         """Take out all that a task waits to send."""
@@ -116,22 +149,24 @@ class Turns:
         return entries
 
     def _order(self) -> Iterator[_Rank]:
-        yield _COMMAND
-        yield Priority.STOP
+        yield from _STOPS
         if not self._slot_went:
             yield _SLOT
         background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
         for priority in background:
             if self._owed[priority] > 0:
                 yield priority
-        yield from (Priority.SETPOINT, Priority.SERVICE, Priority.POLL)
-        yield _SLOT
+        yield from (Priority.SETPOINT, Priority.SERVICE)
+        if self._owed[_RETRY] > 0:
+            yield _RETRY
+        yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background
 
-
-def _rank(entry: Slot | Waiting) -> _Rank:
-    if isinstance(entry, Slot):
-        return _SLOT
-    transfer = entry.transfer
-    commands = transfer.priority is Priority.STOP and transfer.words is not None
-    return _COMMAND if commands else transfer.priority
+    def _rank(self, entry: Slot | Waiting) -> _Rank:
+        if isinstance(entry, Slot):
+            return _SLOT
+        transfer = entry.transfer
+        if transfer.priority is Priority.POLL and self._is_silent(transfer.unit):
+            return _RETRY
+        commands = transfer.priority is Priority.STOP and transfer.words is not None
+        return _COMMAND if commands else transfer.priority

@@ -106,6 +106,7 @@ class Dialect:
     :ivar mode: the codes of MODE.
     :ivar command: the codes of SCMD or SMODE.
     :ivar state: gives the state that a status word shows.
+    :ivar stateless: a status word may show none; where not, such a word is none of this drive.
     :ivar by_bit: which facts each bit of the status word tells.
     :ivar by_state: which facts only the state tells.
     :ivar codes: its inverter status codes by what they mean.
@@ -119,6 +120,11 @@ class Dialect:
     by_bit: Mapping[int, Fact]
     by_state: Mapping[State, Fact]
     codes: Codes
+    stateless: bool = False
+
+    def may_say(self, word: int) -> bool:
+        """Tell whether a status word is one of those that the manual knows."""
+        return self.stateless or self.state(word) is not State.UNKNOWN
 
     @functools.cached_property
     def valid(self) -> Fact:
@@ -244,5 +250,7 @@ DIALECTS: Mapping[str, Dialect] = {
             tuned=frozenset({44, 45, 46, 47}),
             tuning_failed=frozenset({16, 17, 18, 19}),
         ),
+        # [M1] describes bits and no states
+        stateless=True,
     ),
 }

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -75,6 +76,11 @@ class Model(Mapping[str, Parameter]):
     def settings(self) -> tuple[Parameter, ...]:
         """The parameters that become ROS parameters, in the order of the manual."""
         return tuple(parameter for parameter in self.values() if parameter.is_setting)
+
+    @property
+    def inv_st_codes(self) -> Collection[int]:
+        """The inverter status codes that the manual lists."""
+        return self._inv_st.keys()
 
     def inv_st(self, code: int) -> InvStCode:
         """Return what an inverter status code means; an unknown code is shown as its number."""

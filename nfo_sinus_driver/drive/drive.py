@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
 from concurrent.futures import Future
+import math
 from typing import Any
 from typing import TypeVar
 
@@ -60,6 +61,8 @@ from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
 
+#: How long an exit waits for the first answer of a drive that has never answered yet, s.
+_FIRST_ANSWER = 1.0
 #: What the unit of set-points follows from.
 _MODE_KEYS = frozenset(('control.mode', 'pi_reg.unit'))
 
@@ -144,6 +147,11 @@ class Drive:
     def identity(self) -> Identity | None:
         """Who answered, or ``None`` if nobody did yet."""
         return self._inverter.identity
+
+    @property
+    def heard(self) -> bool:
+        """Somebody has answered at its address, be it only once."""
+        return self._bus.silences.heard_at(self._unit) > -math.inf
 
     @property
     def armed(self) -> bool:
@@ -381,7 +389,7 @@ class Drive:
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')
-        self._own_timeout.warn_if_missing()
+        self._own_timeout.warn_if_unfit()
 
     async def _disconnect(self, timeout: float) -> str:
         # nobody may enable it while it is awaited that the motor stands
@@ -412,6 +420,9 @@ class Drive:
         self._set_active(False)
         if self._motion is None or not self._motion.concerned:
             return ''
+        if patience is not None and not self.heard:
+            # it may not be there at all, or be just about to answer for the first time
+            patience = min(patience, _FIRST_ANSWER)
         return await self._motion.stop(patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
@@ -435,6 +446,6 @@ class Drive:
             self._telemetry_task = None
         if active:
             self._telemetry_task = self._bus.spawn(
-                watch_telemetry(self._bus, self._inverter, self._registers, self._listener)
+                watch_telemetry(self._bus, self._inverter, self._listener)
             )
             self._watch.wake()

@@ -91,6 +91,8 @@ class Inverter:
         self.connected = False
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
         self.answering = False
+        #: Called when a request to it failed, whoever asked.
+        self.on_missed: Callable[[], None] = lambda: None
         #: It did not answer just before it was last looked at.
         self.was_silent = False
         self.identity: Identity | None = None
@@ -100,6 +102,8 @@ class Inverter:
         #: The status that first showed the fault that stands, and whether that was soon.
         self.fault: InverterStatus | None = None
         self.fault_is_fresh = False
+        #: Measured values that were told to be impossible.
+        self._told_impossible: set[str] = set()
         #: Hz and rpm, as last polled.
         self.frequency = math.nan
         self.speed = math.nan
@@ -190,6 +194,31 @@ class Inverter:
             self.fault_is_fresh = before is not None and seen.at - before.at < _SOON
             self.on_fault()
 
+    def missed(self) -> None:
+        """Take note that a request failed; until it is known why, nobody should wait for it."""
+        self.answering = False
+        self.on_missed()
+
+    async def measure(self, key: str, priority: Priority) -> float:
+        """
+        Read a measured value once; NaN if the drive says what cannot be, and that again.
+
+        :raises LinkError: it does not answer, or refuses.
+        """
+        words = await self._registers.read_words(key, priority, once=True)
+        value = self._registers.number(key, words)
+        if self._registers.can_be(key, words):
+            return value
+        if key not in self._told_impossible:
+            self._told_impossible.add(key)
+            unit = self.model[key].unit
+            self.tell(
+                Severity.WARNING,
+                f'it says that {key} is {value:g} {unit}, which cannot be: that is not published; '
+                'check motor and scaling in the drive, and that no other master is on the line',
+            )
+        return math.nan
+
     @property
     def can_time_out(self) -> bool:
         """It has a time-out of its own that can be read and set over this line."""
@@ -250,19 +279,21 @@ class Inverter:
         )
         return self.identity
 
-    async def read_control_mode(self, priority: Priority = Priority.SERVICE) -> str:
+    async def read_control_mode(
+        self, priority: Priority = Priority.SERVICE, *, once: bool = False
+    ) -> str:
         """
         Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``.
 
         The Optimal has no register that tells it [C58]: it is what the settings expect.
         """
         if self._registers.reaches('control.mode'):
-            mode = await self.read_label('control.mode', priority)
+            mode = await self.read_label('control.mode', priority, once=once)
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
-            unit = await self.read_label('pi_reg.unit', priority)
+            unit = await self.read_label('pi_reg.unit', priority, once=once)
         # both at once: nobody is told of the one without the other
         self.control_mode, self.unit = mode, unit
         return mode
@@ -279,9 +310,11 @@ class Inverter:
             return await self.read_number('control.run_dly')
         return _LONGEST_START_DELAY
 
-    async def read_label(self, key: str, priority: Priority = Priority.SERVICE) -> str:
+    async def read_label(
+        self, key: str, priority: Priority = Priority.SERVICE, *, once: bool = False
+    ) -> str:
         """Read a parameter that is an enumeration."""
-        return str(await self._registers.read(key, priority))
+        return str(await self._registers.read(key, priority, once=once))
 
     async def read_number(self, key: str) -> float:
         """Read a parameter that is a number."""

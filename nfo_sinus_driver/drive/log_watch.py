@@ -112,7 +112,7 @@ class LogWatch:
                     _log.debug('%s', error)
                 except LinkError:
                     # the poll says so if the drive is lost
-                    inverter.answering = False
+                    inverter.missed()
             await self._bus.sleep(self._pause() if there else _WAIT)
 
     def _pause(self) -> float:

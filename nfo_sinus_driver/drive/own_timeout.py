@@ -19,6 +19,7 @@ from __future__ import annotations
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.drive.snapshot import Severity
 
@@ -87,22 +88,31 @@ class OwnTimeout:
         )
         return ', '.join(str(change) for change in changes)
 
-    def warn_if_missing(self) -> None:
-        """Tell that the motor would run on without us, once for each reason in a row."""
+    def warn_if_unfit(self) -> None:
+        """Tell that it is missing, or strikes too soon; once for each reason in a row."""
+        complaint = self._complaint() if self._commanded else ''
+        if complaint and complaint != self._told:
+            self._told = complaint
+            self._inverter.tell(Severity.WARNING, complaint)
+
+    def _complaint(self) -> str:
         inverter = self._inverter
-        if not self._commanded or (inverter.sio_tot and inverter.auto_stop):
-            return
+        least = inverter.settings.lost_after + DRIVE_TIMEOUT_MARGIN
         if not inverter.can_time_out:
             why, remedy = 'none is known of this model', 'use the RUN input'
-        elif inverter.sio_tot:
-            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
-        else:
+        elif not inverter.sio_tot:
             why, remedy = 'SioTot is 0', 'set drive_timeout'
-        if why == self._told:
-            return
-        self._told = why
-        inverter.tell(
-            Severity.WARNING,
+        elif not inverter.auto_stop:
+            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
+        elif inverter.sio_tot < least - 1e-9:
+            return (
+                f'the time-out of the drive itself (SioTot {inverter.sio_tot:g} s) is less than '
+                f'lost_after + {DRIVE_TIMEOUT_MARGIN:g} s: noise that this driver waits out may '
+                f'stop the motor; set drive_timeout to at least {least:g}'
+            )
+        else:
+            return ''
+        return (
             f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
-            f'is cut, the motor runs on; {remedy}',
+            f'is cut, the motor runs on; {remedy}'
         )

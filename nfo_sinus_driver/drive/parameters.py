@@ -276,7 +276,7 @@ class Parameters:
                     pass
                 except LinkError:
                     # the poll says so if the drive is lost
-                    inverter.answering = False
+                    inverter.missed()
             # many drives on a line take their time, lest nothing but that goes on
             pace = _ROUND * self._bus.refreshing / len(due)
             await self._bus.sleep(started + number * pace - time.monotonic())

@@ -24,6 +24,7 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -36,6 +37,8 @@ from nfo_sinus_driver.link.classic_refusal import flag_names
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
+#: How often at most what cannot be is read, until it is believed that the drive has it.
+_READINGS = 3
 #: The flag of SioErr that says that a fault kept a message from being carried out [M2 table 4].
 _BLOCKED = 1
 #: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
@@ -63,6 +66,8 @@ class Registers:
         self._retries = retries
         #: How many requests nobody answered.
         self.unanswered = 0
+        #: What cannot be, and what the drive says all the same, read more than once.
+        self._odd: dict[str, Words] = {}
         #: How parameters are addressed on this line.
         self.protocol = Protocol(bus.space)
         bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
@@ -136,12 +141,12 @@ class Registers:
         self, key: str, priority: Priority, *, once: bool = False
     ) -> tuple[Value, float]:
         """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        reply = await self._ask(self.address(key), priority, None, once)
+        reply = await self._read(key, priority, once)
         return self.value(key, reply.words), reply.arrived
 
     async def read_words(self, key: str, priority: Priority, *, once: bool = False) -> Words:
         """Read a parameter as it stands in the drive."""
-        return (await self._ask(self.address(key), priority, None, once)).words
+        return (await self._read(key, priority, once)).words
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
@@ -161,6 +166,21 @@ class Registers:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
         return (await self._ask(self.address(key), priority, None, once=True)).words
+
+    async def acknowledge_and_write(self, key: str, target: str, value: Value) -> None:
+        """
+        Read a parameter whose reading acknowledges, and write another as the very next frame.
+
+        :raises LinkError: the write was not answered, or refused; whatever became of the reading.
+        """
+        assert self.model[key].access is Access.ACKNOWLEDGE, key
+        await self._bus.read_then_write(
+            self._unit,
+            self.address(key),
+            self.address(target),
+            self.words(target, value),
+            Priority.STOP,
+        )
 
     async def acknowledge_serial_fault(self) -> str:
         """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
@@ -199,6 +219,27 @@ class Registers:
         """Write words to an address."""
         await self._ask(address, priority, words, once)
 
+    def can_be(self, key: str, words: Words) -> bool:
+        """Tell whether words mean a value that the manual knows of this parameter."""
+        try:
+            return can_be(self.model, key, self.value(key, words))
+        except ValueError:
+            return False
+
+    async def _read(self, key: str, priority: Priority, once: bool) -> Reply:
+        """Read a parameter; what cannot be counts only when it comes again."""
+        address = self.address(key)
+        reply = await self._ask(address, priority, None, once)
+        before = self._odd.pop(key, None)
+        for _ in range(_READINGS - 1):
+            if reply.words == before or self.can_be(key, reply.words):
+                break
+            before = reply.words
+            reply = await self._ask(address, priority, None, once)
+        if not self.can_be(key, reply.words):
+            self._odd[key] = reply.words
+        return reply
+
     async def _ask(
         self, address: Address, priority: Priority, words: Words | None, once: bool
     ) -> Reply:
@@ -220,4 +261,4 @@ class Registers:
                     raise
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)
-            self._bus.note_retry()
+            self._bus.recorder.retry()

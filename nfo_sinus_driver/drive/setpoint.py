@@ -189,11 +189,12 @@ class Setpoint:
             assert transfer.words is not None
             self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
         else:
-            # asking a silent drive again at once would starve its neighbours
-            self._inverter.answering = False
+            # the poll asks at once whether it is there, and has the time that a silent drive may
+            # take from its neighbours
             self._registers.unanswered += isinstance(error, NoAnswer)
             self._waits_for_answer = True
             self._written = ()
+            self._inverter.missed()
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Tell whether a refusal only means that the drive is busy, and not for long yet."""

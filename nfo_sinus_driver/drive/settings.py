@@ -45,6 +45,9 @@ MONITOR_REFUSAL = (
 )
 
 _LONGEST_DRIVE_TIMEOUT = 25.0
+#: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
+#: in noise that the driver waits out.
+DRIVE_TIMEOUT_MARGIN = 0.5
 #: On Classic, the one of a drive that is alone on its line, whatever its own is [M0 §6.1.2].
 POINT_TO_POINT = 0
 #: What a drive can be asked by: [M0 §6.2.2]; [M0 §6.1.2], where 95 is everybody [C10].
@@ -74,9 +77,11 @@ class DriveSettings:
         with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
     :ivar telemetry_rate: Hz; 0 turns telemetry off.
+    :ivar lost_after: s; after so long without a valid frame a drive that is asked is lost.
     :ivar setpoint_timeout: s; 0 turns it off.
     :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
-    :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are.
+    :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are. At
+        least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
     :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
         older ``v5.0``; '' asks it for its firmware.
     :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
@@ -89,6 +94,7 @@ class DriveSettings:
     reference: str = 'fieldbus'
     poll_rate: float = 0.0
     telemetry_rate: float = 2.0
+    lost_after: float = 1.0
     setpoint_timeout: float = 2.5
     setpoint_max: float = 0.0
     expected_control_mode: str = ''
@@ -120,14 +126,17 @@ class DriveSettings:
             raise ValueError(f'address {self.address}: allowed are 0 to 247')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
+        _between('lost_after', self.lost_after, 0.2, 60, 's')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
         _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: the limit of the drive)')
         _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
         _between('drive_timeout', self.drive_timeout, 0, _LONGEST_DRIVE_TIMEOUT, 's (0: as it is)')
-        if 0 < self.drive_timeout < 1:
+        least = self.lost_after + DRIVE_TIMEOUT_MARGIN
+        if 0 < self.drive_timeout < least - 1e-9:
             raise ValueError(
-                f'drive_timeout {self.drive_timeout:g} s: at least 1 s, '
-                'so that a repeated request does not stop the motor'
+                f'drive_timeout {self.drive_timeout:g} s: with lost_after {self.lost_after:g} s it '
+                f'must be at least {math.ceil(least * 10 - 1e-6) / 10:g} s, so that noise which '
+                'the driver waits out does not stop the motor; or set lost_after to less'
             )
         tenths = self.drive_timeout * 10
         if abs(tenths - round(tenths)) > 1e-3:

@@ -22,7 +22,6 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Telemetry
@@ -49,28 +48,38 @@ SLOW = (
     'status.sigma_e_out',
 )
 
+#: What a drive answers that does not have a parameter, and how often until it is believed.
+_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
+_DENIALS = 3
 #: How often the settings are looked at while telemetry is turned off, s.
 _OFF_PERIOD = 0.5
 
 
 async def watch_telemetry(
-    bus: Bus, inverter: Inverter, registers: Registers, listener: Listener
+    bus: Bus, inverter: Inverter, listener: Listener
 ) -> None:
-    """Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN."""
+    """
+    Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
+
+    One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
+    """
     values = dict.fromkeys((*FAST, *SLOW), NAN)
-    missing = {key for key in values if not inverter.has(key)}
+    #: How often in a row the drive said that it has none of them.
+    denied = {key: 0 if inverter.has(key) else _DENIALS for key in values}
     # the first time all are read, so that the first message is whole
     due = deque(SLOW)
     first = True
 
     async def measure(key: str) -> None:
-        if key in missing:
+        if denied[key] >= _DENIALS:
             return
         try:
-            values[key] = await registers.read_number(key, Priority.TELEMETRY, once=True)
-        except Refused:
+            values[key] = await inverter.measure(key, Priority.TELEMETRY)
+            denied[key] = 0
+        except Refused as error:
             values[key] = NAN
-            missing.add(key)
+            # over Classic it says so of everything while it tunes
+            denied[key] += error.code in _NONE_SUCH and not inverter.tuning
 
     while True:
         started = time.monotonic()
@@ -86,7 +95,7 @@ async def watch_telemetry(
                 listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost
-                inverter.answering = False
+                inverter.missed()
                 values.update(dict.fromkeys(FAST, NAN))
         period = 1 / rate if rate else _OFF_PERIOD
         await bus.sleep(period - (time.monotonic() - started))

@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
 import logging
 import math
 import time
 from typing import Any
+from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
@@ -44,6 +46,7 @@ from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
 _log = logging.getLogger(__name__)
+_T = TypeVar('_T')
 
 #: How often a drive is looked at while its node is not active, s.
 _IDLE_PERIOD = 0.5
@@ -51,11 +54,15 @@ _IDLE_PERIOD = 0.5
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
 _WATCH_PERIOD = 0.2
-#: How often a drive that does not answer is tried again, at first and at last, s.
+#: How often a drive that is lost is tried again, at first and at last, s.
 _RECONNECT_PERIOD = 1.0
 _SLOWEST_RECONNECT = 4.0
 #: The bus is silent for no more than this share of the drive's own time-out.
 _KEEP_ALIVE_SHARE = 1 / 3
+#: So long before its own time-out stops it, a drive that is lost is tried again and again, s.
+_LAST_CHANCE = 0.6
+#: How often at most, if the port is gone too, s.
+_SHORTEST_PAUSE = 0.02
 #: The value that is polled beside frequency and speed, by control mode.
 _ACTUAL_KEYS = {'Torque': 'status.trq_act', 'PI-Reg': 'status.reg_act'}
 
@@ -90,9 +97,10 @@ class Watch:
         self.active = False
         #: The newest poll.
         self.snapshot = take_picture(inverter, setpoint, None)
-        self._misses = 0
-        #: How often in a row nobody answered an attempt to connect.
-        self._silences = 0
+        #: Since when every poll failed, although the drive may have answered.
+        self._failing_since = math.inf
+        #: How often in a row it could not be connected to.
+        self._failures = 0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint = ''
@@ -100,6 +108,7 @@ class Watch:
         #: How many requests nobody had answered when it was last looked at.
         self._unanswered = 0
         self._notices = Notices(inverter)
+        inverter.on_missed = self._look_soon
 
     @property
     def begun(self) -> bool:
@@ -115,13 +124,18 @@ class Watch:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
-        self._bus.forget_cycle(self._inverter.settings.address)
+        self._bus.recorder.forget_cycle(self._inverter.settings.address)
         self._publish(None)
 
     def wake(self) -> None:
         """Look at the drive at once."""
         if self._task is not None:
             self._bus.wake(self._task)
+
+    def _look_soon(self) -> None:
+        """Find out at once whether a drive is there that did not answer somebody else."""
+        if self._inverter.connected:
+            self.wake()
 
     def read_mode_soon(self) -> None:
         """Read the control mode with the next poll: it may be another one now."""
@@ -130,7 +144,8 @@ class Watch:
 
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
-        self._misses = self._silences = 0
+        self._failing_since = math.inf
+        self._failures = 0
         self._complaint = ''
 
     async def _poll_for_ever(self) -> None:
@@ -145,15 +160,15 @@ class Watch:
                     await self._poll()
                 else:
                     await self._look()
-                self._misses = 0
+                self._failing_since = math.inf
             except (LinkError, DriveError) as error:
-                self._miss(error)
+                self._failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
-                self._miss(DriveError(f'error in the driver: {error!r}'))
+                self._failed(DriveError(f'error in the driver: {error!r}'))
             if due:
                 if self._inverter.connected and self.active and polled_at > 0:
-                    self._bus.note_cycle(self._inverter.settings.address, started - polled_at)
+                    self._bus.recorder.cycle(self._inverter.settings.address, started - polled_at)
                 polled_at = started
             await self._bus.sleep(self._pause(polled_at))
 
@@ -162,7 +177,11 @@ class Watch:
         inverter = self._inverter
         if not inverter.connected:
             # a drive that stays silent costs its neighbours less and less
-            return min(_RECONNECT_PERIOD * max(1, self._silences), _SLOWEST_RECONNECT)
+            pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
+            strikes_in = self._heard_at + inverter.sio_tot - time.monotonic()
+            if strikes_in > 0:
+                pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
+            return pause
         pause = polled_at + self._period - time.monotonic()
         # however seldom somebody wants to read the status, a motor that runs is watched, and so is
         # one whose run command may still stand, for a fault that ends would let it go on
@@ -182,6 +201,17 @@ class Watch:
         return period
 
     @property
+    def _heard_at(self) -> float:
+        """When the drive said anything, s."""
+        return self._bus.silences.heard_at(self._inverter.settings.address)
+
+    @property
+    def _silent_for_long(self) -> bool:
+        """It has answered nobody for so long that it is lost."""
+        silent = self._bus.silences.lasts(self._inverter.settings.address, time.monotonic())
+        return silent >= self._inverter.settings.lost_after
+
+    @property
     def _mode_is_due(self) -> bool:
         """The control mode is to be read again; it can only change while the motor stands."""
         stands = self._setpoint.armed and self._inverter.frequency == 0
@@ -189,14 +219,14 @@ class Watch:
 
     async def _look(self) -> InverterStatus:
         """Read the status and judge it."""
-        # a request that fails is not repeated at once, so that a silent drive costs its
-        # neighbours no more than one time-out in each of their cycles
         inverter = self._inverter
-        # one that is busy, or whose answer was damaged, was there
-        silent = self._registers.unanswered > self._unanswered
         alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
-        seen = await inverter.look(Priority.POLL, once=True, alarming=alarming)
-        inverter.answering, inverter.was_silent = True, silent
+        # both words of a status are of one moment, so they are repeated together
+        seen = await self._insist(
+            lambda: inverter.look(Priority.POLL, once=True, alarming=alarming)
+        )
+        # one that is busy, or whose answer was damaged, was there
+        inverter.was_silent = self._registers.unanswered > self._unanswered
         self._unanswered = self._registers.unanswered
         told = self._motion is not None and self._motion.watch(seen)
         self._tell_fault(seen, told)
@@ -209,7 +239,10 @@ class Watch:
         if self._mode_is_due:
             self._mode_read_at = time.monotonic()
             before = inverter.control_mode
-            if await inverter.read_control_mode(Priority.POLL) != before and self._motion:
+            mode = await self._insist(
+                lambda: inverter.read_control_mode(Priority.POLL, once=True)
+            )
+            if mode != before and self._motion:
                 # before it is told: a set-point never has the unit of another mode
                 self._motion.watch(seen)
         inverter.frequency = frequency = await self._measure('status.frq_act')
@@ -230,34 +263,61 @@ class Watch:
     async def _measure(self, key: str) -> float:
         """Read a measured value; NaN if the drive refuses it, for it answers all the same."""
         try:
-            return await self._registers.read_number(key, Priority.POLL, once=True)
+            return await self._insist(lambda: self._inverter.measure(key, Priority.POLL))
         except Refused:
             return NAN
 
-    def _miss(self, error: LinkError | DriveError) -> None:
-        """Count a failed poll; too many in a row and the drive is lost."""
-        inverter = self._inverter
-        self._misses += 1
-        inverter.answering = False
-        if inverter.connected and (
-            self._misses > inverter.settings.retries or isinstance(error, PortError)
-        ):
-            inverter.connected = False
-            explained = self._explain(error)
-            self._bus.forget_cycle(self._inverter.settings.address)
-            goes_on = 'tried again for ever'
-            if self._motion is not None and self._motion.lost():
-                goes_on += ', and stopped as soon as it answers; then call ~/enable to go on'
-            inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
+    async def _insist(self, read: Callable[[], Awaitable[_T]]) -> _T:
+        """
+        Repeat a read at once until the drive answers; what was read before it stays good.
+
+        :raises LinkError: the drive has been silent for too long, or refuses; or the port is gone.
+        """
+        while True:
             try:
-                self._publish(None)
-            except Exception:
-                # a mistake of who listens must not end the watch
-                _log.exception('the loss of the drive could not be told')
-        elif not inverter.connected:
-            self._silences += 1
+                answer = await read()
+            except (PortError, Refused):
+                raise
+            except LinkError:
+                self._inverter.answering = False
+                if self._silent_for_long:
+                    raise
+                self._bus.recorder.retry()
+            else:
+                self._inverter.answering = True
+                self._setpoint.answered()
+                return answer
+
+    def _failed(self, error: LinkError | DriveError) -> None:
+        """Judge a poll that failed, or an attempt to connect."""
+        inverter, now = self._inverter, time.monotonic()
+        inverter.answering = False
+        if not inverter.connected:
+            self._failures += 1
             if isinstance(error, DriveError):
                 self._complain(str(error))
+            return
+        self._failing_since = min(self._failing_since, now)
+        # one that answers, but tells no status, cannot be watched either
+        unwatched = now - self._failing_since >= inverter.settings.lost_after
+        if isinstance(error, PortError) or self._silent_for_long or unwatched:
+            self._lose(error)
+
+    def _lose(self, error: LinkError | DriveError) -> None:
+        """Give the drive up until it can be connected to again, and say why."""
+        inverter = self._inverter
+        inverter.connected = False
+        explained = self._explain(error)
+        self._bus.recorder.forget_cycle(inverter.settings.address)
+        goes_on = 'tried again for ever'
+        if self._motion is not None and self._motion.lost():
+            goes_on += ', and stopped as soon as it answers; then call ~/enable to go on'
+        inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
+        try:
+            self._publish(None)
+        except Exception:
+            # a mistake of who listens must not end the watch
+            _log.exception('the loss of the drive could not be told')
 
     def _complain(self, text: str) -> None:
         """Say what keeps the drive from being used, once."""

@@ -19,8 +19,16 @@ from __future__ import annotations
 import os
 import threading
 
+_STREAMS = (1, 2)
 _CHUNK = 65536
 _LAST_WORDS = 1.0
+
+
+def open_closed_streams() -> None:
+    """Let what whoever started us has closed go nowhere, before another file gets its number."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= max(_STREAMS):
+        continue
+    os.close(number)
 
 
 class Output:
@@ -33,31 +41,32 @@ class Output:
     """
 
     def __init__(self) -> None:
-        self._originals: list[tuple[int, int]] = []
-        self._threads: list[threading.Thread] = []
-        for descriptor in (1, 2):
-            try:
-                original = os.dup(descriptor)
-            except OSError:
-                # closed by whoever started us
-                continue
-            reading, writing = os.pipe()
-            os.set_blocking(writing, False)
-            os.dup2(writing, descriptor)
-            os.close(writing)
-            thread = threading.Thread(
-                target=_pump, args=(reading, original), name='output', daemon=True
-            )
-            thread.start()
-            self._originals.append((descriptor, original))
-            self._threads.append(thread)
+        self._threads = [_begin_to_pump(descriptor) for descriptor in _STREAMS]
 
     def close(self) -> None:
-        """Write what is waiting, unless that takes too long, and put things back."""
-        for descriptor, original in self._originals:
-            os.dup2(original, descriptor)
+        """
+        Write what is waiting, unless that takes too long.
+
+        What is said from now on goes nowhere: the process has yet to end, ROS has yet more to log
+        then, and the reader may still not read.
+        """
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for descriptor in _STREAMS:
+            os.dup2(nowhere, descriptor)
+        os.close(nowhere)
         for thread in self._threads:
             thread.join(_LAST_WORDS)
+
+
+def _begin_to_pump(descriptor: int) -> threading.Thread:
+    original = os.dup(descriptor)
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    os.dup2(writing, descriptor)
+    os.close(writing)
+    thread = threading.Thread(target=_pump, args=(reading, original), name='output', daemon=True)
+    thread.start()
+    return thread
 
 
 def _pump(reading: int, original: int) -> None:

@@ -205,6 +205,15 @@ DRIVE_SETTINGS = (
     ),
     Setting('telemetry_rate', 2.0, 'Measured values, Hz; 0: off', 0, 100, unit='Hz'),
     Setting(
+        'lost_after',
+        1.0,
+        'No valid frame from the drive for this long although it is asked, s: it is lost and '
+        'stopped; any valid answer, a refusal too, begins it anew',
+        0.2,
+        60,
+        unit='s',
+    ),
+    Setting(
         'setpoint_timeout',
         2.5,
         'No fresh set-point for this long, s: ramp to a stop and warn; 0: off',
@@ -235,7 +244,7 @@ DRIVE_SETTINGS = (
         0,
         25,
         unit='s',
-        constraints='0 or at least 1.0',
+        constraints='0 or at least lost_after + 0.5',
     ),
     Setting(
         'shutdown_timeout',

@@ -537,8 +537,8 @@ MUTANTS = (
         3,
         'in any order: a drive that is lost is still told as connected',
         _WATCH,
-        '            inverter.connected = False\n            explained',
-        '            explained',
+        '        inverter.connected = False\n        explained',
+        '        explained',
         _G2_CONTROL,
     ),
     Mutant(

@@ -254,12 +254,18 @@ class Client(contextlib.ExitStack):
         self.listen('statistics', BusStatistics, '/nfo_sinus_bus/statistics', 10)
         self._setpoint = self.node.create_publisher(Float32, f'{name}/setpoint', 1)
         self._clients: dict[str, Any] = {}
-        executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(self.node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        thread = threading.Thread(target=self._executor.spin, daemon=True)
         thread.start()
         self.callback(thread.join, 5.0)
-        self.callback(executor.shutdown, 5.0)
+        self.callback(self._executor.shutdown, 5.0)
+
+    def where_it_spins(self, call: Callable[[], Any]) -> Any:
+        """Call something in the thread that hears the answers; return what it returned."""
+        task = self._executor.create_task(call)
+        wait_until(task.done, 'the thread that spins has called it')
+        return task.result()
 
     # --- seeing -------------------------------------------------------------------------------
 

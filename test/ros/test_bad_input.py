@@ -279,7 +279,7 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
         pytest.param(
             ['-p', 'char_format:=8E1'], ['char_format', '7 data bits', '7E1'], marks=needs('seven')
         ),
-        (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1 s']),
+        (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1.5 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
         (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
         (['-p', 'protocol:=canopen'], ['protocol', 'modbus_rtu']),

@@ -293,7 +293,7 @@ def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: i
 @needs('parameters')
 def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     drive = _simulator(bench)
-    driver = bench.driver(*_MODEST, '-p', 'drive_timeout:=1.0')
+    driver = bench.driver(*_MODEST, '-p', 'drive_timeout:=1.5')
     client = bench.client().connected()
     with client.run_at(_SPEED):
         driver.signal(signal.SIGKILL)

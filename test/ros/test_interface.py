@@ -56,6 +56,7 @@ _SETTINGS = {
     'setpoint_max': 0.0,
     'expected_control_mode': '',
     'drive_timeout': 0.0,
+    'lost_after': 1.0,
     'shutdown_timeout': 4.0,
     'frame_id': '',
 }
@@ -238,8 +239,8 @@ def test_the_settings_have_their_defaults_and_descriptions(idle: Bench) -> None:
         ('address', 5, 'unconfigured'),
         ('control_method', 'monitor', 'unconfigured'),
         ('setpoint_timeout', -1.0, 'setpoint_timeout'),
-        ('drive_timeout', 0.55, 'at least 1 s'),
-        ('drive_timeout', 1.25, 'lies between two steps of the drive, 1.2 and 1.3'),
+        ('drive_timeout', 0.55, 'at least 1.5 s'),
+        ('drive_timeout', 2.25, 'lies between two steps of the drive, 2.2 and 2.3'),
         ('drive_timeout', 26.0, 'drive_timeout'),
         ('expected_control_mode', 'Warp', "choose one of '', 'Freque'"),
         ('poll_rate', 'fast', 'write a number'),

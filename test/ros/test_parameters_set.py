@@ -265,7 +265,7 @@ def test_several_at_once_are_all_written(rig: Rig) -> None:
         ('control.acel', 6.0, ('control.acel',)),
         ('poll_rate', -1.0, ('poll_rate',)),
         ('poll_rate', 'fast', ()),
-        ('drive_timeout', 0.5, ('drive_timeout', '1 s')),
+        ('drive_timeout', 0.5, ('drive_timeout', '1.5 s')),
         ('drive_timeout', 2.05, ('drive_timeout', '2 and 2.1')),
         ('address', 2, ('address', 'unconfigured')),
         ('autostart', False, ('autostart',)),

@@ -1051,10 +1051,10 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
     bus.start()
     for _ in range(6):  # one of them is not ready at first and asked again
         wait_until(ask(bus, 1, Priority.POLL).done)
-    bus.call(bus.note_retry)
-    bus.call(lambda: bus.note_cycle(1, 0.3))
-    bus.call(lambda: bus.note_cycle(2, 0.5))
-    bus.call(lambda: bus.note_cycle(1, 0.2))
+    bus.call(bus.recorder.retry)
+    bus.call(lambda: bus.recorder.cycle(1, 0.3))
+    bus.call(lambda: bus.recorder.cycle(2, 0.5))
+    bus.call(lambda: bus.recorder.cycle(1, 0.2))
     result(bus.run(nothing()))
     figures = bus.statistics()
     assert figures.transactions == 6
@@ -1066,7 +1066,7 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
     assert figures.round_trip_min == pytest.approx(0.01)
     assert figures.round_trip_mean == pytest.approx(0.025)
     assert figures.round_trip_max == pytest.approx(0.04)
-    bus.call(lambda: bus.forget_cycle(2))
+    bus.call(lambda: bus.recorder.forget_cycle(2))
     result(bus.run(nothing()))
     assert bus.statistics().cycle_time == 0.2
     bus.close()

@@ -132,13 +132,50 @@ def test_background_has_a_sixth_of_the_time_each(
     assert found[Priority.REFRESH] == pytest.approx(BACKGROUND_SHARE, rel=0.02)
 
 
-def test_background_has_its_share_beside_set_points_and_polls_without_end() -> None:
-    found = share(without_end((_SLOT, Priority.POLL, *_BACKGROUND), {}), {})
-    assert found[Priority.TELEMETRY] == pytest.approx(BACKGROUND_SHARE, rel=0.02)
-    assert found[Priority.REFRESH] == pytest.approx(BACKGROUND_SHARE, rel=0.02)
-    # every other turn is theirs, and nobody starves
-    assert found[_SLOT] == pytest.approx(0.5, rel=0.02)
-    assert found[Priority.POLL] == pytest.approx(1 / 2 - 2 * BACKGROUND_SHARE, rel=0.03)
+@pytest.mark.parametrize('setpoint', [_READ, 0.023])
+def test_set_points_without_end_halve_the_turns_of_polls_and_background_alike(
+    setpoint: float,
+) -> None:
+    # at 1000 Hz they took three of four turns from the polls: half the line, and the background its
+    # shares of the whole out of the other half
+    took: dict[object, float] = {_SLOT: setpoint}
+    without = Counter(without_end((Priority.POLL, *_BACKGROUND), took))
+    among = Counter(without_end((_SLOT, Priority.POLL, *_BACKGROUND), took))
+    assert among[_SLOT] == _TURNS // 2
+    for kind in (Priority.POLL, *_BACKGROUND):
+        assert among[kind] == pytest.approx(without[kind] / 2, rel=0.02)
+
+
+def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
+    silent, timeout = {7, 8}, 0.2
+    turns = Turns(silent.__contains__)
+    polls = {unit: Transfer(unit, Address((1,), 1), Priority.POLL) for unit in (1, 2, 7, 8)}
+    for transfer in polls.values():
+        turns.add(Waiting(cast(Task, ''), transfer))
+    took: Counter[int] = Counter()
+    gaps, gap = [], 0.0
+    while sum(took.values()) < 60.0:
+        taken = turns.take()
+        assert isinstance(taken, Waiting)
+        unit = taken.transfer.unit
+        seconds = timeout if unit in silent else _READ
+        turns.took(seconds)
+        took[unit] += seconds
+        gap = gap + seconds if unit in silent else 0.0
+        gaps.append(gap)
+        turns.add(taken)
+    assert took[7] + took[8] == pytest.approx(30.0, rel=0.02)
+    assert took[7] == pytest.approx(took[8], rel=0.02)
+    # and one time-out at a time
+    assert max(gaps) == pytest.approx(timeout)
+
+
+def test_units_that_do_not_answer_wait_for_nobody_when_nobody_else_waits() -> None:
+    turns = Turns(lambda unit: True)
+    for _ in range(10):
+        turns.add(entry(Priority.POLL))
+        assert kind_of(turns.take()) == Priority.POLL
+        turns.took(0.2)
 
 
 def test_what_only_a_part_of_the_background_wants_goes_to_no_other() -> None:
@@ -240,6 +277,44 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
     # the first has nothing to say any more
     turns.take()
     assert kind_of(turns.take()) == _SLOT
+
+
+def stop_of(unit: int) -> Waiting:
+    """A stop that waits."""
+    transfer = Transfer(unit, Address((1,), 1), Priority.STOP, (0,))
+    return Waiting(cast(Task, f'stop {unit}'), transfer)
+
+
+def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
+    silent, poll, other = stop_of(2), entry(Priority.POLL), stop_of(3)
+    turns = Turns(lambda unit: unit == 2)
+    turns.add(silent)
+    assert turns.take() is silent
+    turns.took(0.2)
+    for waiting in (silent, poll):
+        turns.add(waiting)
+    assert turns.take() is poll
+    turns.took(_READ)
+    assert turns.take() is silent
+    turns.took(0.2)
+    # nobody else waits
+    turns.add(silent)
+    assert turns.take() is silent
+    turns.took(0.2)
+    # a stop of somebody else goes first of all
+    for waiting in (silent, poll, other):
+        turns.add(waiting)
+    assert turns.take() is other
+
+
+def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
+    turns = Turns(lambda unit: False)
+    stops = [stop_of(2), stop_of(2)]
+    for waiting in (*stops, entry(Priority.POLL)):
+        turns.add(waiting)
+    for stop in stops:
+        assert turns.take() is stop
+        turns.took(_READ)
 
 
 # --- leaving --------------------------------------------------------------------------------------

@@ -29,6 +29,8 @@ from typing import Any
 
 from any_order_rig import Rig
 
+from nfo_sinus_driver.simulator.control_source import Source
+
 #: How the driver is set.
 POLL_RATE = 5.0
 SETPOINT_TIMEOUT = 1.0
@@ -48,6 +50,8 @@ TAKEN_BACK = 1.7
 #: A drive that was lost is found again within this, s.
 FOUND = 5.0
 
+#: By these the bus has control.
+BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
 #: Bit 0 of the control word [M0 table 14].
 SWITCH_ON = 1 << 0
 
@@ -203,7 +207,7 @@ class History:
     @property
     def by_bus(self) -> bool:
         """The bus controls the drive."""
-        return self._far.runner.source.value in ('scmd', 'control_word')
+        return self._far.runner.source in BUS_SOURCES
 
     @property
     def running(self) -> bool:
@@ -219,7 +223,7 @@ class History:
         runner = self._far.runner
         if self._optimal:
             return self.by_bus and bool(runner.scmd or runner._steps.run)
-        if runner.source.value == 'scmd':
+        if runner.source is Source.SCMD:
             return bool(runner.scmd & 1)
         return self.by_bus and bool(runner.word & SWITCH_ON)
 

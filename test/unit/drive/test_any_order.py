@@ -43,6 +43,7 @@ from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
+from support.variants import hardest
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -124,7 +125,7 @@ class AnyOrder(RuleBasedStateMachine):
         if restart_after is not None and not optimal:
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
-        far = SimulatedDrive(self.model, settings=parameters)
+        far = SimulatedDrive(self.model, settings=parameters, variant=hardest(self.model))
         self.rig = Rig(
             far,
             DriveSettings(

@@ -84,7 +84,7 @@ def timed_out(rig: VirtualRig) -> None:
     rig.kill()
     rig.elapse(3.0)
     assert rig.far.inv_st_text == 'Sio Fail'
-    rig.settings = dataclasses.replace(rig.settings, drive_timeout=1.0)
+    rig.settings = dataclasses.replace(rig.settings, drive_timeout=1.5)
     rig.begin()
     rig.send(None)
 
@@ -102,7 +102,7 @@ def test_a_serial_fault_that_stands_keeps_nobody_from_acknowledging_it(
     rig.wrote = lambda register, words: writes.append(register)
     assert 'enabled' in rig.answer(rig.drive.enable())
     assert writes[0] == rig.register('serial.sio_tot')
-    assert rig.far.peek('serial.sio_tot') == 1.0
+    assert rig.far.peek('serial.sio_tot') == 1.5
     # and once is enough
     rig.answer(rig.drive.stop())
     asked: list[int] = []

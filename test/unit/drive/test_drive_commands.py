@@ -691,7 +691,10 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
         ({'setpoint_timeout': -0.1}, 'allowed are 0 to 3600 s'),
         ({'setpoint_max': math.inf}, 'allowed are 0 to 32767'),
         ({'shutdown_timeout': -1.0}, 'allowed are 0 to 600 s'),
-        ({'drive_timeout': 0.5}, 'at least 1 s'),
+        ({'lost_after': 0.1}, 'allowed are 0.2 to 60 s'),
+        ({'lost_after': 61.0}, 'allowed are 0.2 to 60 s'),
+        ({'drive_timeout': 1.4}, 'with lost_after 1 s it must be at least 1.5 s'),
+        ({'drive_timeout': 1.2, 'lost_after': 0.75}, 'must be at least 1.3 s'),
         ({'drive_timeout': 25.1}, 'allowed are 0 to 25 s'),
         ({'drive_timeout': 2.55}, 'between two steps of the drive, 2.5 and 2.6'),
     ],
@@ -703,8 +706,11 @@ def test_settings_that_make_no_sense(setting: dict[str, Any], message: str) -> N
 
 
 def test_settings_that_do() -> None:
-    for timeout in range(10, 251):
+    for timeout in range(15, 251):
         assert DriveSettings(drive_timeout=timeout / 10).drive_timeout == timeout / 10
+    for timeout in range(7, 251):
+        longest = (timeout - 5) / 10
+        assert DriveSettings(drive_timeout=timeout / 10, lost_after=longest)
     assert DriveSettings(drive_timeout=0.0, setpoint_timeout=0.0, poll_rate=1000.0)
 
 

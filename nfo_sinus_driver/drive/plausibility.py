@@ -1,0 +1,53 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which values a drive cannot have, so that one that was spoiled on its way counts for nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+
+from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Value
+
+#: Beyond what any reference of the drive asks for in either direction, 150 Hz, 9000 rpm and 200 %
+#: ([M0 table 4], [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
+_MOST: Mapping[str, float] = {
+    'status.frq_act': 180.0,
+    'status.spd_act': 10800.0,
+    'status.trq_act': 400.0,
+}
+_CODES: Mapping[str, Callable[[Model, int], bool]] = {
+    'fieldbus.inv_st': lambda model, code: code in model.inv_st_codes,
+    'fieldbus.mode': lambda model, code: code in set(model.dialect.mode),
+    # the upper half is described nowhere [C24]
+    'fieldbus.drive_status': lambda model, word: model.dialect.may_say(word & 0xFFFF),
+}
+
+
+def can_be(model: Model, key: str, value: Value) -> bool:
+    """Tell whether a value of a drive is one that its manual knows, as far as the manual says."""
+    parameter = model[key]
+    if key in _CODES:
+        return _CODES[key](model, int(value))
+    if isinstance(value, str):
+        return not parameter.labels or value in parameter.labels.values()
+    return abs(value) <= _MOST.get(key, abs(value)) and _in_range(parameter, value)
+
+
+def _in_range(parameter: Parameter, value: float) -> bool:
+    low, high = parameter.minimum, parameter.maximum
+    return (low is None or value >= float(low)) and (high is None or value <= float(high))
