@@ -313,6 +313,15 @@ def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> 
     assert state['mode'] == 1, 'control was not given back'
 
 
+def test_a_driver_whose_streams_are_closed_takes_its_log_for_no_signal(bench: Bench) -> None:
+    bench.simulator('--set', 'control.accel=1')
+    driver = bench.driver(through=('sh', '-c', 'exec "$@" <&- >&- 2>&-', 'sh'))
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGTERM)
+        assert driver.wait() == 0
+
+
 def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.accel=1')
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
