@@ -411,7 +411,7 @@ class Bus:
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
         self._turns.took(now - started)
-        self.silences.note(unit, started, now, error)
+        self.silences.note(unit, now, error)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
