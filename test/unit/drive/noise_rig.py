@@ -83,12 +83,11 @@ class Line:
         clock = self._rig.clock
         while self._coming and self._coming[0][0] <= max(until, clock.now):
             at, _, to_drive, frame = heapq.heappop(self._coming)
-            self._rig.elapse(max(0.0, at - clock.now))
+            # the drive catches up when it hears something, or when the bus has nothing to do
+            clock.now = max(at, clock.now)
             if not to_drive:
                 return frame
             self._carry_out(frame)
-        self._rig.elapse(max(0.0, until - clock.now))
-        # not a rounding error earlier, for which somebody would wait for ever
         clock.now = max(until, clock.now)
         return b''
 
@@ -99,6 +98,7 @@ class Line:
 
     def _carry_out(self, frame: bytes) -> None:
         far = self._rig.far
+        far.advance_to(self._rig.clock.now)
         request = self._protocol.unwrap(frame)
         if request is None or not far.listening or request.address != far.address:
             return
@@ -144,7 +144,7 @@ class NoiseRig(Rig):
         self._line_settings = LineSettings(baud_rate=baud)
         self._seed = seed
         # the motor need not be exact here, and the time is long
-        self._coarse = mock.patch.object(simulated, '_STEP', 0.02)
+        self._coarse = mock.patch.object(simulated, '_STEP', 0.05)
         self._coarse.start()
         far = SimulatedDrive(settings={'control.accel': 0.5, 'control.retard': 0.5})
         super().__init__(far, DriveSettings(**settings))
