@@ -38,4 +38,4 @@ class Loan:
         :raises DriveError: somebody has.
         """
         if self.recalled:
-            raise DriveError(f'{self.what} was stopped')
+            raise DriveError(f'{self.what} was stopped before it began')

@@ -360,15 +360,18 @@ class Motion:
         refused_at, reason = self._refusal or (math.inf, '')
         if seen.at <= refused_at:
             return False
-        # a drive with a fault refuses everything
+        # it was told to stop when it refused; a drive with a fault refuses everything
         self._refusal = None
-        self.secure(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        self._tell_stopped(explain_fault(self._inverter, seen) if seen.faulted else reason)
         return True
 
     def secure(self, reason: str) -> None:
         """Disarm and stop for a reason that a person should know, with what to do about it."""
         self.disarm()
         self._withdrawal.begin()
+        self._tell_stopped(reason)
+
+    def _tell_stopped(self, reason: str) -> None:
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
             remedy = 'then call ~/fault_ack and ~/enable to go on'

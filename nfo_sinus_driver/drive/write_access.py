@@ -23,6 +23,7 @@ import contextlib
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.loan import Loan
 
@@ -63,7 +64,8 @@ class WriteAccess:
                     return
                 # what was had was lost: to somebody who stopped it, or by a serial fault that a
                 # refused write has caused
-                loan.require_wanted()
+                if loan.recalled:
+                    raise DriveError(f'{_WHAT} was stopped')
                 await stack.aclose()
                 loan = stack.enter_context(self._errands.had(_WHAT))
                 await stack.enter_async_context(self._errands.sent(loan))
