@@ -12,10 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which signals end a process that drives motors, and which it must not obey."""
+"""Which signals end a process that drives motors, which it must not obey, and how it gets them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+import contextlib
+import os
+import select
 import signal
 
 #: Signals that would suspend a process and leave the motors running.
@@ -48,3 +52,82 @@ def signal_name(number: int) -> str:
     except ValueError:
         # the real-time signals have no names but the first and the last
         return f'signal {number}'
+
+
+_HELD = ENDING | SUSPENDING
+
+
+class HeldSignals:
+    """
+    Holds signals back until they are asked for: nothing may end or freeze who drives a motor.
+
+    Whatever was inherited, ignored signals too, counts for nothing while the ``with`` block lasts.
+    It has to begin in the main thread and before any other does, for a thread that does not hold
+    them may get them; from there they are passed on, too.
+    """
+
+    def __init__(self) -> None:
+        self._cleanup = contextlib.ExitStack()
+        self._came = -1
+
+    def __enter__(self) -> HeldSignals:
+        self.hold()
+        return self
+
+    def hold(self) -> None:
+        """Begin without a ``with`` block, for as long as the process lasts."""
+        with contextlib.ExitStack() as cleanup:
+            blocked = signal.pthread_sigmask(signal.SIG_BLOCK, _HELD)
+            cleanup.callback(signal.pthread_sigmask, signal.SIG_SETMASK, blocked)
+            self._came, wakeup = os.pipe()
+            for end in (self._came, wakeup):
+                cleanup.callback(os.close, end)
+                os.set_blocking(end, False)
+            # each signal that comes to any thread leaves its number there
+            before = signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
+            cleanup.callback(signal.set_wakeup_fd, before)
+            for number in _HELD:
+                cleanup.callback(_put_back, number, signal.signal(number, _noted))
+            # what nobody asked for would end it when all is done
+            cleanup.callback(self._forget)
+            self._cleanup = cleanup.pop_all()
+
+    def __exit__(self, *_: object) -> None:
+        self._cleanup.close()
+
+    def next(self, timeout: float) -> int | None:
+        """Return the next signal, or ``None`` when none came in time, s."""
+        # not sigtimedwait: when it was suspended meanwhile, CPython takes for a signal what
+        # happens to be in its memory
+        with _let_through():
+            select.select([self._came], [], [], timeout)
+        try:
+            while number := os.read(self._came, 1):
+                if number[0] in _HELD:
+                    return number[0]
+        except BlockingIOError:
+            pass
+        return None
+
+    def _forget(self) -> None:
+        while self.next(0.0) is not None:
+            continue
+
+
+@contextlib.contextmanager
+def _let_through() -> Iterator[None]:
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_BLOCK, _HELD)
+
+
+def _noted(*_: object) -> None:
+    """Nothing more: its number has been left already."""
+
+
+def _put_back(number: int, handler: signal._HANDLER) -> None:
+    # one that does not come from Python cannot be
+    if handler is not None:
+        signal.signal(number, handler)

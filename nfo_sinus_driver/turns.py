@@ -52,6 +52,7 @@ _SLOT: Literal['slot'] = 'slot'
 #: What makes a motor stop, ahead of what only looks whether one does.
 _COMMAND: Literal['command'] = 'command'
 _Rank = Priority | Literal['slot', 'command', 'retry']
+_STOPS = (_COMMAND, Priority.STOP)
 _SHARES: dict[_Rank, float] = {
     _RETRY: RETRY_SHARE,
     Priority.TELEMETRY: BACKGROUND_SHARE,
@@ -78,7 +79,8 @@ class Turns:
     the background's share is of the time between them.
 
     A unit that does not answer keeps the line for a time-out with every poll. All of these together
-    have no more than their share of the time as long as anybody else waits.
+    have no more than their share of the time as long as anybody else waits. A stop that a unit does
+    not answer is repeated at once, and after each of them somebody else has a turn, too.
 
     :param is_silent: tells whether a unit has not answered the last request.
     """
@@ -92,6 +94,9 @@ class Turns:
         self._owed = dict.fromkeys(_SHARES, 0.0)
         self._given: _Rank = _SLOT
         self._slot_went = False
+        #: Who was told to stop just now, and who did not answer that.
+        self._told_to_stop: int | None = None
+        self._unheard: int | None = None
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
@@ -100,14 +105,24 @@ class Turns:
     def take(self) -> Slot | Waiting | None:
         """Take out what goes next; ``None`` if nothing waits."""
         for rank in self._order():
-            if self._queues[rank]:
-                self._given = rank
-                return self._queues[rank].popleft()
-        return None
+            for entry in self._queues[rank]:
+                unit = None if isinstance(entry, Slot) else entry.transfer.unit
+                if unit is None or unit != self._unheard:
+                    self._queues[rank].remove(entry)
+                    self._given = rank
+                    self._told_to_stop = unit if rank in _STOPS else None
+                    return entry
+        if self._unheard is None:
+            return None
+        # nobody else waits
+        self._unheard = None
+        return self.take()
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
+        told = self._told_to_stop
+        self._unheard = told if told is not None and self._is_silent(told) else None
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -134,8 +149,7 @@ class Turns:
         return entries
 
     def _order(self) -> Iterator[_Rank]:
-        yield _COMMAND
-        yield Priority.STOP
+        yield from _STOPS
         if not self._slot_went:
             yield _SLOT
         background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)

@@ -28,7 +28,6 @@ import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.cli.held_signals import HeldSignals
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
@@ -40,6 +39,7 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.signals import SUSPENDING
+from nfo_sinus_driver.signals import HeldSignals
 from nfo_sinus_driver.signals import signal_name
 
 _T = TypeVar('_T')

@@ -99,8 +99,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _signals_that_interrupt() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
+    """
+    Let SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up.
+
+    Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -49,9 +49,12 @@ from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.methods import method_in_charge
+from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
@@ -74,7 +77,17 @@ class Remote:
         self.model: Model = load_model(settings.model)
         self.registers = Registers(bus, settings.address, self.model, settings.retries)
         self.inverter = Inverter(self.model, self.registers, self, settings)
-        self.parameters = Parameters(bus, self.inverter, self.registers, self._run, self._count)
+        motion = None
+        if settings.control_method != 'monitor':
+            method = make_control_method(settings, self.registers)
+            setpoint = Setpoint(
+                bus, settings.address, self.registers, self.inverter, lambda reason: None
+            )
+            motion = Motion(bus, self.inverter, method, setpoint)
+        self._errands = Errands(bus, self.inverter, self.registers, motion)
+        self.parameters = Parameters(
+            bus, self.inverter, self.registers, self._errands, self._run, self._count
+        )
         self._step: Callable[[], None] = lambda: None
 
     def __str__(self) -> str:
@@ -119,8 +132,7 @@ class Remote:
 
     def error_log(self, most: int) -> tuple[LogEntry, ...]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
-        errands = Errands(self._bus, self.inverter, self.registers, None)
-        log = ErrorLog(self.inverter, self.registers, errands)
+        log = ErrorLog(self.inverter, self.registers, self._errands)
         return self.do(lambda: log.read_now(most))
 
     def method_in_charge(self) -> str:

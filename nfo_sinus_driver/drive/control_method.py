@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 from collections.abc import Callable
+import enum
 from typing import Protocol
 
 from nfo_sinus_driver.bus import Priority
@@ -29,6 +30,17 @@ from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
 Reached = Callable[[Callable[[InverterStatus], bool]], Awaitable[None]]
+
+
+class Removal(enum.Enum):
+    """What a drive with a fault has let go of, so that it does not turn the motor afterwards."""
+
+    #: It has refused everything: a run command may stand, and a set-point.
+    NOTHING = enum.auto()
+    #: The set-point is 0; a run command may stand.
+    SETPOINT = enum.auto()
+    #: No run command stands.
+    COMMAND = enum.auto()
 
 
 class ControlMethod(Protocol):
@@ -78,10 +90,22 @@ class ControlMethod(Protocol):
     async def release(self) -> None:
         """Give control back; never by a MODE that can start the motor [C43], [C51]."""
 
-    async def acknowledge(self, code: int) -> str:
+    async def remove(self, control_mode: str) -> Removal:
         """
-        Acknowledge a fault.
+        Remove run command and set-point while a fault is active, each by itself [C98].
 
-        :param code: the inverter status code that stands.
+        A drive may refuse any of it then, and may go on by what is left once the fault is over.
+
+        :raises LinkError: the drive does not answer, so that nobody knows.
+        """
+
+    async def acknowledge(self, code: int, control_mode: str) -> str:
+        """
+        Acknowledge a fault, run command and set-point first where the bus has control.
+
+        From a drive that refuses to let go of them the stop is the very next frame [C98].
+
+        :param code: the inverter status code that is shown.
         :returns: what more the drive said of it; ``''`` if nothing.
+        :raises LinkError: the drive does not answer; what it did is not known.
         """

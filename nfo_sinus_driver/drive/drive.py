@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
 from concurrent.futures import Future
+import math
 from typing import Any
 from typing import TypeVar
 
@@ -60,6 +61,8 @@ from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
 
+#: How long an exit waits for the first answer of a drive that has never answered yet, s.
+_FIRST_ANSWER = 1.0
 #: What the unit of set-points follows from.
 _MODE_KEYS = frozenset(('control.mode', 'pi_reg.unit'))
 
@@ -102,14 +105,14 @@ class Drive:
             lambda: self._connect(patient=False),
         )
         self._barred = False
+        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         #: The settings of the drive.
         self.parameters = Parameters(
-            bus, self._inverter, self._registers, self._run, self._take_parameters
+            bus, self._inverter, self._registers, errands, self._run, self._take_parameters
         )
         self._own_timeout = OwnTimeout(
             self._inverter, self.parameters, commanded=self._motion is not None
         )
-        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
         self._error_log = ErrorLog(self._inverter, self._registers, errands)
         self._log_watch = LogWatch(bus, self._inverter, self._error_log, listener)
         self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, errands)
@@ -144,6 +147,11 @@ class Drive:
     def identity(self) -> Identity | None:
         """Who answered, or ``None`` if nobody did yet."""
         return self._inverter.identity
+
+    @property
+    def heard(self) -> bool:
+        """Somebody has answered at its address, be it only once."""
+        return self._bus.silences.heard_at(self._unit) > -math.inf
 
     @property
     def armed(self) -> bool:
@@ -412,6 +420,9 @@ class Drive:
         self._set_active(False)
         if self._motion is None or not self._motion.concerned:
             return ''
+        if patience is not None and not self.heard:
+            # it may not be there at all, or be just about to answer for the first time
+            patience = min(patience, _FIRST_ANSWER)
         return await self._motion.stop(patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:

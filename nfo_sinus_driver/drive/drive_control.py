@@ -32,6 +32,7 @@ from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.catalog import words_optimal
 from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.drive.control_method import Reached
+from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.reference import references
@@ -145,22 +146,48 @@ class DriveControl:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> str:
+    async def remove(self, control_mode: str) -> Removal:
+        """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
+        try:
+            await self._change(~_RUN, Control(0), Priority.SERVICE, once=False)
+            return Removal.COMMAND
+        except Refused:
+            pass
+        try:
+            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+            if not await self.in_control(Priority.SERVICE):
+                return Removal.COMMAND
+        except Refused:
+            pass
+        try:
+            await self.zero_setpoint(control_mode, Priority.SERVICE)
+        except (Refused, DriveError):
+            return Removal.NOTHING
+        return Removal.SETPOINT
+
+    async def acknowledge(self, code: int, control_mode: str) -> str:
         """
         Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16].
 
-        While a serial fault stands only MODE = Stop is taken, which acknowledges it; over Classic
-        nothing can be written while any fault stands, so that reading has to do [M0 §6.1.5].
+        A serial fault by MODE = Stop alone first, else by reading SioErr [C99]. Over Classic
+        nothing can be written while any fault is active, so that reading has to do [M0 §6.1.5]; the
+        run bits that stand then lead nowhere without a new edge [M0 table 16].
         """
         registers, why = self._registers, ''
         if code == SIO_FAIL:
+            with contextlib.suppress(Refused):
+                await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
             why = await registers.acknowledge_serial_fault()
-            await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
         try:
             for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
                 await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
         except Refused:
-            await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+            if await self.remove(control_mode) is Removal.NOTHING:
+                await registers.acknowledge_and_write(
+                    'fieldbus.inv_st_with_ack', _WORD, self._ready
+                )
+            else:
+                await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
         return why
 
     async def _change(
@@ -241,7 +268,16 @@ class OptimalDriveControl:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write(_WORD, _OPTIMAL_READY, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> str:
+    async def remove(self, control_mode: str) -> Removal:
+        """Reset Switch on."""
+        word = int(await self._registers.read_number(_WORD, Priority.SERVICE))
+        try:
+            await self._registers.write(_WORD, word & ~_OPTIMAL_RUN, Priority.SERVICE)
+        except Refused:
+            return Removal.NOTHING
+        return Removal.COMMAND
+
+    async def acknowledge(self, code: int, control_mode: str) -> str:
         """Acknowledge a fault by one rising edge of bit 7 [M1]."""
         word = int(await self._registers.read_number(_WORD, Priority.SERVICE))
         low = word & ~(words_optimal.Control.FAULT_ACK | _OPTIMAL_RUN)

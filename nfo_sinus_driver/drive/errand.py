@@ -89,12 +89,36 @@ class Errands:
 
         :raises DriveError: it cannot be had, and why.
         """
-        motion = self.require(what)
+        self.require(what)
+        with self.had(what) as loan:
+            yield loan
+
+    @contextlib.contextmanager
+    def had(self, what: str) -> Iterator[Loan]:
+        """
+        Do as :meth:`lent` for what every control method may do, also while connecting.
+
+        :raises DriveError: somebody has the drive.
+        """
+        motion = self._motion
+        if motion is None:
+            raise DriveError(MONITOR_REFUSAL)
+        self._require_idle(what, motion)
         motion.loan = loan = Loan(what)
         try:
             yield loan
         finally:
             motion.loan = None
+
+    async def in_control(self, priority: Priority) -> bool:
+        """
+        Tell whether the bus has control of the drive.
+
+        :raises DriveError: this driver only reads.
+        """
+        if self._motion is None:
+            raise DriveError(MONITOR_REFUSAL)
+        return await self._motion.method.in_control(priority)
 
     @contextlib.asynccontextmanager
     async def sent(self, loan: Loan) -> AsyncIterator[None]:
@@ -176,6 +200,7 @@ class Errands:
                 'back to them could start the motor: press STOP at the drive first'
             )
         loan.require_wanted()
+        control_mode = inverter.control_mode or await inverter.read_control_mode()
         await motion.method.take_control()
         deadline = time.monotonic() + withdrawal.PATIENCE
         while not (await inverter.look(Priority.SERVICE)).standby:
@@ -183,6 +208,8 @@ class Errands:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(motion, Mode(mode))
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
+            # no manual says that a drive has forgotten what it was told before
+            await motion.method.stop(control_mode)
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
         return Mode(mode)
 

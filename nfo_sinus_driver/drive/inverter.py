@@ -45,6 +45,11 @@ _FIRST_OF_V2_03 = 4.28
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
 _SOON = 2.0
+_NOT_ASKED = (
+    'its firmware is not asked for while the bus has control, which firmware before 4.28 takes for '
+    'a fault: it is treated like that one until it is connected to while the bus has no control; '
+    'set classic_dialect to v2.03 or v5.0 to know it at once'
+)
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -244,10 +249,19 @@ class Inverter:
         priority = Priority.SERVICE if patient else Priority.POLL
         await self._registers.read('fieldbus.inv_st', priority, once=not patient)
         classic = self._registers.protocol is Protocol.CLASSIC
+        before, was_older = self.identity, self._older
         self._older = classic and self.settings.classic_dialect == 'v5.0'
         if self._older or not self._registers.reaches('fieldbus.sw_ver'):
             self.identity = Identity()
             return self.identity
+        if not await self._may_ask_firmware():
+            if before is None:
+                # what the older firmware knows the newer one knows, too
+                self.identity, self._older = Identity(), True
+                self.tell(Severity.WARNING, _NOT_ASKED)
+            else:
+                self._older = was_older
+            return self.identity or Identity()
         try:
             firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
             motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
@@ -260,6 +274,25 @@ class Inverter:
             self._older = classic and firmware < _FIRST_OF_V2_03
             self.identity = Identity(firmware, int(motor))
         return self.identity
+
+    async def _may_ask_firmware(self) -> bool:
+        """
+        Tell whether SWVer can be asked for without harm.
+
+        To older firmware it is unknown, which is a serial fault while the bus has control [C21].
+        Who commands by the control word says by that that the drive is not of those.
+        """
+        settings = self.settings
+        known = settings.classic_dialect or settings.control_method == 'drive_control'
+        if known or self._registers.protocol is not Protocol.CLASSIC:
+            return True
+        mode = await self._registers.read_number('fieldbus.mode', Priority.SERVICE)
+        return mode in (Mode.STOP, Mode.EXT)
+
+    @property
+    def settings_need_control(self) -> bool:
+        """It takes settings only while the bus has control [C100], or may be of those that do."""
+        return self._older
 
     async def introduce(self) -> Identity:
         """

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from collections.abc import Sequence
 import contextlib
 
@@ -26,12 +27,16 @@ from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.catalog.words_optimal import Mode as OptimalMode
 from nfo_sinus_driver.catalog.words_optimal import Smode
 from nfo_sinus_driver.drive.control_method import Reached
+from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.reference import references
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.link import Refused
+
+#: The priority of what an acknowledgement takes: with it the motor might go on.
+_ACK = Priority.SERVICE
 
 
 class ModeScmd:
@@ -45,6 +50,8 @@ class ModeScmd:
     coasts = True
     #: The parameter that takes the run command; its codes for stop and run are the same on both.
     _command = 'fieldbus.scmd'
+    #: What releases the motor soonest; SCMD = Stop would let it ramp down.
+    _soonest: tuple[str, int] = ('fieldbus.mode', Mode.STOP)
 
     def __init__(self, registers: Registers, run: int = Scmd.FIELDBUS) -> None:
         self._registers = registers
@@ -84,16 +91,18 @@ class ModeScmd:
         """
         Take the run command back and write set-point 0, at the head of the bus.
 
-        Does nothing to a drive that is not under bus control.
+        Does nothing to a drive that is under the control of its keypad or terminals.
 
-        :raises LinkError: the drive does not answer, or refuses although the bus has control.
+        :raises LinkError: the drive does not answer, or refuses although the bus has control or,
+            under Inhibit, nobody can say who has: it may be tuning [C101].
         """
         try:
             await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)
             for reference in self._references(control_mode):
                 await reference.write_zero(Priority.STOP)
         except Refused:
-            if await self.in_control(Priority.STOP):
+            mode = await self._registers.read('fieldbus.mode', Priority.STOP)
+            if mode in (Mode.INHIBIT, Mode.BUS):
                 raise
 
     async def quick_stop(self, control_mode: str) -> None:
@@ -113,15 +122,64 @@ class ModeScmd:
         if await self.in_control(Priority.SERVICE):
             await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> str:
-        """Acknowledge a fault; a serial fault is ended by MODE = Stop [M0 §6.1.5], [C42]."""
-        await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+    async def remove(self, control_mode: str) -> Removal:
+        """Write SCMD = Stop, set-point 0 and MODE = Stop, and read back what can be read."""
+        command = await self._taken(self._registers.write(self._command, Scmd.STOP, _ACK))
+        setpoint = await self._setpoint_removed(control_mode)
+        command |= await self._control_removed()
+        if command:
+            return Removal.COMMAND
+        return Removal.SETPOINT if setpoint else Removal.NOTHING
+
+    async def _setpoint_removed(self, control_mode: str) -> bool:
+        """Write set-point 0 wherever the motor would follow one; tell whether it is."""
+        references = self._references(control_mode)
+        writes = [reference.set_to_zero(_ACK) for reference in references]
+        return bool(writes) and all([await self._taken(write) for write in writes])
+
+    async def _control_removed(self) -> bool:
+        """Write MODE = Stop, with which no run command stands; tell whether it is."""
+        taken = await self._taken(self._registers.write('fieldbus.mode', Mode.STOP, _ACK))
+        return taken and not await self.in_control(_ACK)
+
+    @staticmethod
+    async def _taken(write: Awaitable[None]) -> bool:
+        """Tell whether the drive takes a write, and keeps it where that is looked at."""
+        try:
+            await write
+        except (Refused, DriveError):
+            return False
+        return True
+
+    async def acknowledge(self, code: int, control_mode: str) -> str:
+        """
+        Acknowledge a fault: a serial one by MODE = Stop, else by reading SioErr ([C42], [C99]).
+
+        Any other by reading the status that acknowledges, once nothing is left that could turn the
+        motor. If the drive lets go of nothing, what releases it soonest is the very next frame.
+        """
         if code != SIO_FAIL:
+            await self._acknowledge_by_reading(control_mode)
             return ''
-        # older firmware obeys no MODE while the fault stands [C9]
-        why = await self._registers.acknowledge_serial_fault()
-        await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+        await self._control_removed()
+        why = ''
+        if await self._shows(code):
+            # older firmware obeys no MODE that is for it alone while the fault is active [C9]
+            why = await self._registers.acknowledge_serial_fault()
+        if await self._shows(code):
+            await self._acknowledge_by_reading(control_mode)
         return why
+
+    async def _shows(self, code: int) -> bool:
+        return await self._registers.read('fieldbus.inv_st', _ACK) == code
+
+    async def _acknowledge_by_reading(self, control_mode: str) -> None:
+        key = 'fieldbus.inv_st_with_ack'
+        ours = await self.in_control(_ACK)
+        if ours and await self.remove(control_mode) is Removal.NOTHING:
+            await self._registers.acknowledge_and_write(key, *self._soonest)
+        else:
+            await self._registers.acknowledge(key, _ACK)
 
 
 class ModeSmode(ModeScmd):
@@ -137,6 +195,7 @@ class ModeSmode(ModeScmd):
 
     coasts = False
     _command = 'fieldbus.smode'
+    _soonest = ('fieldbus.smode', Smode.STOP)
 
     async def take_control(self) -> None:
         """Put the drive under bus control with no run command standing."""
@@ -167,7 +226,6 @@ class ModeSmode(ModeScmd):
             await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
             await self._registers.write('fieldbus.mode', OptimalMode.MANUAL, Priority.SERVICE)
 
-    async def acknowledge(self, code: int) -> str:
-        """Acknowledge a fault by reading the status that does [M1]."""
-        await self._registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
-        return ''
+    async def _control_removed(self) -> bool:
+        """Leave control where it is: Manual would hand it to the keypad."""
+        return False

@@ -110,7 +110,7 @@ class Motion:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
-        :param prepare: does what has to be done before, once it is known that no fault stands.
+        :param prepare: does what has to be done before a run command, once the bus has control.
         :returns: what was done.
         :raises DriveError: it was not done, and why; the run command is taken back then.
         """
@@ -120,6 +120,8 @@ class Motion:
             raise DriveError('it is being enabled already')
         if self.loan is not None:
             raise DriveError(f'{self.loan.what} is going on: wait for its end, or stop it')
+        if not self._withdrawal.held_by_fault:
+            self._require_no_stop()
         self._arming = self._bus.current
         try:
             await self._arm(prepare)
@@ -128,6 +130,7 @@ class Motion:
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._withdrawal.begin()
+            await self._settle()
             raise DriveError(str(error) or repr(error)) from error
         finally:
             self._arming = None
@@ -149,6 +152,8 @@ class Motion:
         seen = self._inverter.seen
         if self._withdrawal.held_by_fault:
             return self._withdrawal.by_fault
+        if seen is not None and seen.faulted and not seen.driven:
+            return f'stopped by fault {self._inverter.describe()}'
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
         if not seen.driven:
@@ -184,40 +189,45 @@ class Motion:
         self._releasing = True
         try:
             ours = ours or await self._method.in_control(Priority.STOP)
+            ours = ours or (await self._inverter.look(Priority.STOP)).tuning
             if ours:
                 await self._method.quick_stop(self._inverter.control_mode)
                 await self._await_status(
                     lambda seen: not seen.driven, Priority.STOP, withdrawal.PATIENCE
                 )
-            else:
-                await self._inverter.look(Priority.STOP)
         except (DriveError, LinkError) as error:
             self._withdrawal.begin()
+            with contextlib.suppress(LinkError):
+                await self._inverter.look(Priority.STOP)
             seen = self._inverter.seen
             by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
             if isinstance(error, Refused) and by_fault:
                 return self._withdrawal.by_fault
-            raise DriveError(f'the quick stop is NOT confirmed: {error}; trying a stop') from error
+            raise DriveError(
+                f'the quick stop is NOT confirmed: {error} ({self._inverter.describe()}); '
+                'trying a stop'
+            ) from error
         finally:
             self._releasing = False
         if not ours:
             return self._no_control(self._inverter.seen)
         self._withdrawal.begin()
+        await self._settle()
         return 'released: the motor coasts'
 
     async def acknowledge(self) -> str:
         """
-        Acknowledge a fault; take the run command back before or, by [M0 §6.1.5], just after it.
+        Acknowledge a fault; run command and set-point are removed before, where the drive lets us.
 
         :returns: what was acknowledged.
-        :raises DriveError: the fault still stands.
+        :raises DriveError: the fault is still active.
         """
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         fault = inverter.model.inv_st(seen.code)
         if not seen.faulted and fault.kind is Kind.STATUS:
             return f'nothing to acknowledge ({inverter.describe()})'
-        ours = self.concerned
+        ours = self.concerned or await self._method.in_control(Priority.SERVICE)
         self.disarm()
         name = inverter.describe()
         if seen.state is State.FAULT_REACTION_ACTIVE:
@@ -229,15 +239,16 @@ class Motion:
                     withdrawal.PATIENCE,
                 )
         try:
-            why = await self._method.acknowledge(seen.code)
+            why = await self._method.acknowledge(seen.code, inverter.control_mode)
         finally:
             # even if no answer came, the drive may be free to run now
             if ours:
-                self._withdrawal.begin()
+                self._withdrawal.begin_anew()
         try:
             await self._await_status(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
             )
+            await self._settle()
         except DriveError:
             now = inverter.seen or seen
             stands = inverter.model.inv_st(now.code)
@@ -282,7 +293,7 @@ class Motion:
         """The motor runs by us, or may do so, or at least the bus has control of it."""
         seen = self._inverter.seen
         ours = self.ours or self.stopping
-        return ours or seen is None or seen.from_bus
+        return ours or seen is None or seen.from_bus or seen.tuning
 
     # --- what happens by itself ---------------------------------------------------------------
 
@@ -296,7 +307,7 @@ class Motion:
                     f'the motor runs under bus control from before '
                     f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
                 )
-            self._withdrawal.begin()
+            self._withdrawal.begin_anew()
         elif self._lost_in_use and seen is not None and not seen.faulted:
             self._tell(Severity.WARNING, explain_loss(self._inverter))
         self._lost_in_use = False
@@ -322,7 +333,7 @@ class Motion:
         """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
         if self._withdrawal.held_by_fault and not seen.faulted:
-            self._withdrawal.wake()
+            self._withdrawal.begin_anew()
         if self._explain_refusal(seen):
             return True
         if seen.at < self._changed_at:
@@ -349,15 +360,18 @@ class Motion:
         refused_at, reason = self._refusal or (math.inf, '')
         if seen.at <= refused_at:
             return False
-        # a drive with a fault refuses everything
+        # it was told to stop when it refused; a drive with a fault refuses everything
         self._refusal = None
-        self.secure(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        self._tell_stopped(explain_fault(self._inverter, seen) if seen.faulted else reason)
         return True
 
     def secure(self, reason: str) -> None:
         """Disarm and stop for a reason that a person should know, with what to do about it."""
         self.disarm()
         self._withdrawal.begin()
+        self._tell_stopped(reason)
+
+    def _tell_stopped(self, reason: str) -> None:
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
             remedy = 'then call ~/fault_ack and ~/enable to go on'
@@ -380,7 +394,7 @@ class Motion:
         seen = await inverter.look(Priority.SERVICE)
         self._explain_refusal(seen)
         require_no_fault(inverter, seen)
-        await prepare()
+        self._require_no_stop()
         control_mode = await inverter.read_control_mode()
         expected = inverter.settings.expected_control_mode
         if expected and control_mode != expected:
@@ -388,9 +402,9 @@ class Motion:
                 f'the drive is in control mode {control_mode}, expected is {expected}: '
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
-        await self._withdrawal.finish()
         await self._method.take_control()
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
+        await prepare()
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.run(self._await_start)
@@ -435,6 +449,20 @@ class Motion:
             if time.monotonic() > deadline:
                 raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
+
+    def _require_no_stop(self) -> None:
+        """
+        See to it that nobody has asked for a stop that is not confirmed yet.
+
+        :raises DriveError: somebody has; who enables meanwhile may not know of it.
+        """
+        if self.stopping:
+            raise DriveError('a stop is on its way and not confirmed yet: wait for it, then enable')
+
+    async def _settle(self) -> None:
+        """Let a stop that comes with something else be confirmed, so that enable can follow."""
+        with contextlib.suppress(DriveError):
+            await self._withdrawal.finish()
 
     def _why_stopped(self, seen: InverterStatus) -> str:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)

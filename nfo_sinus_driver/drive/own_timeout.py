@@ -41,9 +41,11 @@ class OwnTimeout:
 
     async def prepare(self) -> None:
         """
-        Set it as the settings want it; while a fault stands, later if the drive takes nothing.
+        Set it as the settings want it; later, if the drive takes nothing now.
 
-        Who could not connect to such a drive could not acknowledge its fault.
+        That is so while a fault is active: who could not connect to such a drive could not
+        acknowledge its fault. Where settings need bus control [C100], it is so while others have
+        it.
 
         :raises DriveError: it cannot be set.
         """
@@ -51,8 +53,9 @@ class OwnTimeout:
         try:
             await self.require_set()
         except DriveError as error:
-            seen = self._inverter.seen
-            if seen is None or not seen.faulted:
+            inverter, seen = self._inverter, self._inverter.seen
+            barred = inverter.settings_need_control and seen is not None and not seen.from_bus
+            if not barred and (seen is None or not seen.faulted):
                 raise
             self._inverter.tell(
                 Severity.WARNING,

@@ -27,10 +27,13 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.write_access import Allow
+from nfo_sinus_driver.drive.write_access import WriteAccess
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
@@ -98,9 +101,10 @@ def describe_drift(drift: Change) -> str:
 class ParameterWriter:
     """Changes parameters of one drive, for coroutines on the bus."""
 
-    def __init__(self, inverter: Inverter, registers: Registers) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
         self._inverter = inverter
         self._registers = registers
+        self._access = WriteAccess(inverter, errands)
 
     async def write(self, wanted: Mapping[str, Words]) -> tuple[Change, ...]:
         """
@@ -113,18 +117,20 @@ class ParameterWriter:
             the message names what could not be.
         """
         done: list[Written] = []
-        try:
-            await self.write_each(wanted, done.append)
-        except ParameterError as error:
-            if not done:
+        async with self._access.granted() as allow:
+            try:
+                await self._write_all(wanted, done.append, allow)
+            except ParameterError as error:
+                if not done:
+                    raise
+                text, left = await self._put_back(done, allow)
+                raise ParameterError(f'{error}; {text}', (*error.left, *left)) from error
+            except Cancelled:
+                if done:
+                    changes = ', '.join(str(self.describe(entry)) for entry in done)
+                    text = f'ended half-way, NOT put back: {changes}'
+                    self._inverter.tell(Severity.WARNING, text)
                 raise
-            text, left = await self._put_back(done)
-            raise ParameterError(f'{error}; {text}', (*error.left, *left)) from error
-        except Cancelled:
-            if done:
-                changes = ', '.join(str(self.describe(entry)) for entry in done)
-                self._inverter.tell(Severity.WARNING, f'ended half-way, NOT put back: {changes}')
-            raise
         return tuple(self.describe(entry) for entry in done)
 
     async def write_each(
@@ -136,12 +142,18 @@ class ParameterWriter:
         :param wrote: told of each that was written; what it raises ends the writing.
         :raises ParameterError: something was not taken.
         """
+        async with self._access.granted() as allow:
+            await self._write_all(wanted, wrote, allow)
+
+    async def _write_all(
+        self, wanted: Mapping[str, Words], wrote: Callable[[Written], None], allow: Allow
+    ) -> None:
         waiting = sorted(wanted, key=self._order)
         while waiting:
             refused: dict[str, _BadValue] = {}
             for key in waiting:
                 try:
-                    for written in await self._write_one(key, wanted[key]):
+                    for written in await self._write_one(key, wanted[key], allow):
                         wrote(written)
                 except _BadValue as error:
                     refused[key] = error
@@ -178,7 +190,7 @@ class ParameterWriter:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""
         return key.startswith('serial.'), not self._registers.model[key].stopped
 
-    async def _write_one(self, key: str, words: Words) -> Iterable[Written]:
+    async def _write_one(self, key: str, words: Words, allow: Allow) -> Iterable[Written]:
         """Write one parameter if it differs; return what was written."""
         try:
             # between any two parameters, everybody who polls has a turn
@@ -187,6 +199,12 @@ class ParameterWriter:
             raise ParameterError(f'{key}: {self.explain(error)}') from error
         if before == words:
             return ()
+        try:
+            await allow()
+        except LinkError as error:
+            raise ParameterError(f'{key}: {self.explain(error)}') from error
+        except DriveError as error:
+            raise ParameterError(f'{key}: {error}') from error
         failure = await self._send(key, words)
         kept: Words | None = None
         try:
@@ -202,7 +220,7 @@ class ParameterWriter:
             raise (_BadValue if bad else ParameterError)(text) from failure
         trouble, left = '', list[str]()
         if kept != before:
-            trouble, left = await self._put_back([Written(key, before, words)])
+            trouble, left = await self._put_back([Written(key, before, words)], allow)
         if not left:
             raise ParameterError(f'{text}; it is {self._show(key, before)} as before') from failure
         if kept is None:
@@ -217,7 +235,7 @@ class ParameterWriter:
             return error
         return None
 
-    async def _restore(self, key: str, before: Words) -> str:
+    async def _restore(self, key: str, before: Words, allow: Allow) -> str:
         """
         See to it that a parameter is as it was; return why it is not.
 
@@ -227,6 +245,10 @@ class ParameterWriter:
         """
         trouble = ''
         for _ in range(_TRIES):
+            try:
+                await allow()
+            except DriveError as refused:
+                return str(refused)
             error = await self._send(key, before)
             try:
                 kept = await self._registers.read_words(key, _SERVICE)
@@ -238,7 +260,9 @@ class ParameterWriter:
             trouble = self.explain(error) if error else f'the drive keeps {self._show(key, kept)}'
         return trouble
 
-    async def _put_back(self, done: Sequence[Written]) -> tuple[str, list[str]]:
+    async def _put_back(
+        self, done: Sequence[Written], allow: Allow
+    ) -> tuple[str, list[str]]:
         """Undo what was written; return what to say of it, and what may not be as it was."""
         stuck: dict[str, str] = {}
         silence = ''
@@ -246,7 +270,7 @@ class ParameterWriter:
             trouble = silence
             if not silence:
                 try:
-                    trouble = await self._restore(entry.key, entry.before)
+                    trouble = await self._restore(entry.key, entry.before, allow)
                 except LinkError as error:
                     # two time-outs are enough for the others on the line
                     trouble = self.explain(error)

@@ -32,6 +32,7 @@ from typing import Any
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
 from nfo_sinus_driver.drive.parameter_guard import FOLLOWERS
@@ -79,6 +80,7 @@ class Parameters:
         bus: Bus,
         inverter: Inverter,
         registers: Registers,
+        errands: Errands,
         run: Run,
         told: Callable[[Collection[str]], None],
     ) -> None:
@@ -87,7 +89,7 @@ class Parameters:
         self._registers = registers
         self._run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, registers)
+        self._writer = ParameterWriter(inverter, registers, errands)
         self._keys: tuple[str, ...] = ()
         self._words: dict[str, Words] = {}
         self._values: dict[str, Value] = {}
@@ -225,9 +227,9 @@ class Parameters:
         finally:
             self._unread = 0
         self._keys = tuple(key for key in keys if key in self._words)
-        seconds = time.monotonic() - started
+        took = f'{time.monotonic() - started:.1f} s'
         if keys:
-            inverter.tell(Severity.INFO, f'parameters: {self.progress} in {seconds:.1f} s')
+            inverter.tell(Severity.INFO, f'parameters: {self.progress} in {took}')
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
@@ -287,9 +289,10 @@ class Parameters:
             await self._bus.sleep(_WAIT)
 
     def _cannot_change(self, key: str) -> bool:
-        """Tell whether a running motor keeps everybody from changing a parameter."""
+        """Tell whether a running motor keeps it from being changed, or this firmware has none."""
         seen = self._inverter.seen
-        return self._inverter.model[key].stopped and seen is not None and seen.driven
+        barred = self._inverter.model[key].stopped and seen is not None and seen.driven
+        return barred or not self._inverter.has(key)
 
     async def change_now(
         self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
@@ -401,7 +404,7 @@ class Parameters:
 
     async def _refresh(self) -> str:
         before = self._values
-        keys = self._keys
+        keys = [key for key in self._keys if self._inverter.has(key)]
         for key in keys:
             with contextlib.suppress(Refused):
                 # a person waits for it, so it goes by turns with the polls

@@ -167,6 +167,21 @@ class Registers:
         assert self.model[key].access is Access.ACKNOWLEDGE, key
         return (await self._ask(self.address(key), priority, None, once=True)).words
 
+    async def acknowledge_and_write(self, key: str, target: str, value: Value) -> None:
+        """
+        Read a parameter whose reading acknowledges, and write another as the very next frame.
+
+        :raises LinkError: the write was not answered, or refused; whatever became of the reading.
+        """
+        assert self.model[key].access is Access.ACKNOWLEDGE, key
+        await self._bus.read_then_write(
+            self._unit,
+            self.address(key),
+            self.address(target),
+            self.words(target, value),
+            Priority.STOP,
+        )
+
     async def acknowledge_serial_fault(self) -> str:
         """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
         if not self.reaches('fieldbus.sio_err'):

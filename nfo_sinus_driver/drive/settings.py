@@ -83,7 +83,7 @@ class DriveSettings:
     :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are. At
         least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
     :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
-        older ``v5.0``; '' asks it for its firmware.
+        older ``v5.0``; '' asks it for its firmware, while the bus has no control.
     :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
     :raises ValueError: a field that makes no sense; the message says what would.
     """
@@ -120,6 +120,8 @@ class DriveSettings:
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
             )
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
+        if (self.classic_dialect, self.control_method) == ('v5.0', 'drive_control'):
+            raise ValueError('classic_dialect v5.0 has no control word: use mode_scmd')
         modes = ('Freque', 'Speed') if self.model == 'sinus_optimal' else CONTROL_MODES
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         if not any(self.address in allowed for allowed in ADDRESSES.values()):

@@ -147,10 +147,22 @@ class InverterStatus:
         return self.runs_by_bus and not may_stop
 
     @property
+    def tuning(self) -> bool:
+        """It measures the motor, which is energised then, whatever else the status says."""
+        return self.code == self.codes.tuning
+
+    @property
+    def local(self) -> bool:
+        """The code says that keypad or terminals have control, and no word that the bus has."""
+        codes = self.codes
+        told = self.code in codes.terminals or self.code in codes.keypad
+        return told and self.code not in codes.anonymous and not self.from_bus
+
+    @property
     def driven(self) -> bool:
         """The output stage drives the motor, be it only to a stop."""
-        if self.state is State.UNKNOWN:
-            return self._driven_by_code
+        if self.state is State.UNKNOWN or self.tuning:
+            return self.tuning or self._driven_by_code
         return self.state in _DRIVEN
 
     @property

@@ -65,13 +65,14 @@ async def watch_telemetry(
     """
     values = dict.fromkeys((*FAST, *SLOW), NAN)
     #: How often in a row the drive said that it has none of them.
-    denied = {key: 0 if inverter.has(key) else _DENIALS for key in values}
+    denied = dict.fromkeys(values, 0)
     # the first time all are read, so that the first message is whole
     due = deque(SLOW)
     first = True
 
     async def measure(key: str) -> None:
-        if denied[key] >= _DENIALS:
+        # which firmware it has may be known only later
+        if denied[key] >= _DENIALS or not inverter.has(key):
             return
         try:
             values[key] = await inverter.measure(key, Priority.TELEMETRY)

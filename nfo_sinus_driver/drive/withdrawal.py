@@ -17,25 +17,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import enum
 import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.control_method import ControlMethod
+from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
 #: How long a drive may take to do what it was told, its start delay not counted, s.
 PATIENCE = 2.0
 #: How often the status is looked at while something is awaited, s.
 LOOK_PERIOD = 0.02
-#: How often a stop that does not get through is tried again, s.
+#: How often a stop is written again that was heard and is not confirmed, s.
 _RETRY_PERIOD = 0.2
-#: The same while the drive does not answer, for its neighbours' sake, s.
+#: How often one is that a lost drive does not hear, for its neighbours' sake, s.
 _LOST_RETRY_PERIOD = 1.0
 #: How often it is said that a stop is not confirmed, s.
 _COMPLAINT_PERIOD = 5.0
@@ -43,9 +47,21 @@ _COMPLAINT_PERIOD = 5.0
 _LONGEST_COMPLAINT_PERIOD = 60.0
 
 
+class _Outcome(enum.Enum):
+    """What became of one attempt to stop."""
+
+    CONFIRMED = enum.auto()
+    #: Nobody knows whether the drive has heard it: it is repeated at once.
+    UNHEARD = enum.auto()
+    #: It was heard, or it is known that it was not sent.
+    UNCONFIRMED = enum.auto()
+    #: A fault keeps the motor still, and the drive from taking the stop until it is over.
+    BLOCKED_BY_FAULT = enum.auto()
+
+
 class Withdrawal:
     """
-    Takes the run command of one drive back; there is one for a drive, whoever asks.
+    Takes the run command of one drive back; there is one for a drive, shared by all who ask.
 
     :param done: called when the drive has confirmed that it stops.
     """
@@ -63,9 +79,8 @@ class Withdrawal:
         self._done = done
         #: What takes the run command back, while there may be one that nobody wants any more.
         self._task: Task | None = None
-        self._again = False
-        #: The drive stands by a fault, and refuses the stop until it is acknowledged.
-        self.held_by_fault = False
+        #: What became of the last attempt; ``None`` before the first has ended.
+        self._outcome: _Outcome | None = None
         self._unconfirmed = ''
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
@@ -75,6 +90,11 @@ class Withdrawal:
         """A stop is not confirmed although there was time; no fault keeps the motor still."""
         waiting = self.going_on and not self.held_by_fault
         return waiting and time.monotonic() >= self._due
+
+    @property
+    def held_by_fault(self) -> bool:
+        """The drive stands by a fault, and refuses the stop until it is acknowledged."""
+        return self.going_on and self._outcome is _Outcome.BLOCKED_BY_FAULT
 
     @property
     def by_fault(self) -> str:
@@ -87,26 +107,32 @@ class Withdrawal:
         """A stop is not confirmed yet."""
         return self._task is not None
 
-    def wake(self) -> None:
-        """Try again now."""
-        if self._task is not None:
-            self._bus.wake(self._task)
-
     def begin(self) -> None:
-        """Take the run command back, again and again until the drive says that it stops."""
+        """
+        Take the run command back, again and again until the drive says that it stops.
+
+        Where that is going on already nothing has to be added: nobody is let start the motor
+        meanwhile.
+        """
         if self._task is None:
+            self._outcome = None
             self._unconfirmed = 'no answer yet'
             self._due = time.monotonic() + PATIENCE
             self._task = self._bus.spawn(self._keep_trying())
+
+    def begin_anew(self) -> None:
+        """Begin, or try again at once: what the last attempt has shown counts no more."""
+        if self._task is None:
+            self.begin()
         else:
-            # what was written may be overtaken by now
-            self._again = True
+            self._outcome = None
             self._bus.wake(self._task)
 
     async def finish(self, patience: float | None = None) -> None:
         """
         Wait until the drive has confirmed that it stops, or stands because of a fault.
 
+        :param patience: how long to wait, s; by default not for a drive that is lost.
         :raises DriveError: it does not in time; the withdrawal goes on.
         """
         task = self._task
@@ -114,7 +140,9 @@ class Withdrawal:
         while task is not None and not await self._bus.join(task, LOOK_PERIOD):
             if self.held_by_fault:
                 return
-            if time.monotonic() > deadline:
+            # who waits for a drive that is not there keeps others waiting, and learns no more
+            lost = patience is None and not self._inverter.connected and self._outcome is not None
+            if lost or time.monotonic() > deadline:
                 raise DriveError(
                     f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
                 )
@@ -122,7 +150,7 @@ class Withdrawal:
     async def _keep_trying(self) -> None:
         complain_at = self._due
         pause = 0.0
-        while not await self._tried():
+        while await self._attempt() is not _Outcome.CONFIRMED:
             if self.held_by_fault:
                 await self._fault_gone()
                 self._due = complain_at = time.monotonic() + PATIENCE
@@ -135,10 +163,8 @@ class Withdrawal:
                     f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
                     'Use the RUN input or the emergency stop if it turns',
                 )
-            if not self._again:
-                await self._rest()
+            await self._rest()
         self._task = None
-        self.held_by_fault = False
         self._done()
         if pause:
             text = f'the stop is confirmed now: {self._inverter.describe()}'
@@ -146,8 +172,8 @@ class Withdrawal:
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
-        while not self._again:
-            await self._rest()
+        while self.held_by_fault:
+            await self._bus.sleep(_RETRY_PERIOD)
             seen = self._inverter.seen
             if not self._inverter.connected:
                 # one that is only being connected to has no polls yet
@@ -163,28 +189,60 @@ class Withdrawal:
                 return
 
     async def _rest(self) -> None:
-        await self._bus.sleep(_RETRY_PERIOD if self._inverter.connected else _LOST_RETRY_PERIOD)
+        """Let some time pass before the next attempt, but none after one that nobody heard."""
+        if not self._inverter.connected:
+            await self._bus.sleep(_LOST_RETRY_PERIOD)
+        elif self._outcome is not _Outcome.UNHEARD or self._is_lost:
+            await self._bus.sleep(_RETRY_PERIOD)
 
-    async def _tried(self) -> bool:
+    @property
+    def _is_lost(self) -> bool:
+        """The drive has been silent for so long that the next poll gives it up."""
+        settings = self._inverter.settings
+        silent = self._bus.silences.lasts(settings.address, time.monotonic())
+        return silent >= settings.lost_after
+
+    async def _attempt(self) -> _Outcome:
         try:
-            return await self._withdrawn()
+            self._outcome = await self._try_once()
+        except (NoAnswer, DamagedAnswer) as error:
+            self._outcome, self._unconfirmed = _Outcome.UNHEARD, str(error)
         except Exception as error:
             # even a mistake of ours must not end the trying
-            self.held_by_fault = False
-            self._unconfirmed = str(error) or repr(error)
-            return False
+            self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, str(error) or repr(error)
+        return self._outcome
 
-    async def _withdrawn(self) -> bool:
-        """Try once; true when the drive took it and says that it stops."""
-        self._again = False
+    async def _try_once(self) -> _Outcome:
+        """
+        Write the stop, and look what the drive says.
+
+        :raises LinkError: it was not written, or the status could not be read.
+        """
+        control_mode = self._inverter.control_mode
         refusal = ''
         try:
-            await self._method.stop(self._inverter.control_mode)
-        except (Refused, DamagedAnswer) as error:
-            # among late answers a refusal is not believed, until an answer to something else came
+            await self._method.stop(control_mode)
+        except Refused as error:
             refusal = str(error)
+        except DamagedAnswer:
+            # among late answers a refusal is not believed, until something else was answered
+            if self._outcome is _Outcome.UNHEARD:
+                await self._inverter.look(Priority.STOP, once=True)
+            raise
         seen = await self._inverter.look(Priority.STOP, once=True)
-        # a drive with a fault may refuse everything; it stands, but would go on afterwards
-        self.held_by_fault = bool(refusal) and seen.faulted and not seen.runs_by_bus
-        self._unconfirmed = refusal or f'the drive says {self._inverter.describe()}'
-        return not refusal and not seen.keeps_running and not self._again
+        if refusal and seen.faulted and not seen.runs_by_bus:
+            if await self._method.remove(control_mode) is Removal.COMMAND:
+                return _Outcome.CONFIRMED
+            self._unconfirmed = refusal
+            return _Outcome.BLOCKED_BY_FAULT
+        self._unconfirmed = self._why_not(seen, refusal)
+        return _Outcome.UNCONFIRMED if self._unconfirmed else _Outcome.CONFIRMED
+
+    def _why_not(self, seen: InverterStatus, refusal: str) -> str:
+        """Return what keeps a stop from being confirmed; ``''`` if nothing does."""
+        told = self._inverter.describe()
+        if seen.tuning:
+            return f'the motor is energised by a tuning ({told})' + (refusal and f': {refusal}')
+        if refusal and not seen.local:
+            return refusal
+        return f'the drive says {told}' if seen.keeps_running else ''

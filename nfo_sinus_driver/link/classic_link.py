@@ -60,8 +60,9 @@ _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
 #: How long drives may be busy with a broadcast, which none of them confirms, s.
 _TURNAROUND = 0.1
-#: What every firmware has and may be read at any time [M0 §6.1.7], [M2 table 1]: InvSt without
-#: acknowledging, MODE, control mode and f-Nom. So many that one is always certain, see Doubts.
+#: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
+#: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
+#: certain, see Doubts.
 _EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
 #: How old the inverter status may be to show that a serial fault is new, s.
 _FRESH = 1.0

@@ -78,9 +78,9 @@ class SerialLink(ModbusLink):
     Between frames the line is silent for a gap at least, counted from the last byte seen on it.
 
     A read answer does not name its register. So whenever an answer is missing or damaged, or
-    bytes come that nobody asked for, the unit is in doubt: a request whose answer could be
-    confused with one still on its way is only sent after a request of another shape has been
-    answered (units answer in order), or after :data:`LATEST_ANSWER` time-outs of silence.
+    bytes come that nobody asked for, its shape is in doubt (:class:`Doubts`): a request whose
+    answer could be confused with it is only sent after one of another shape has been answered. A
+    write is sent at once, for it may be a stop, and its answer names what was written.
 
     For the same reason an answer with the very bytes of the one before is not believed at once: it
     may be the one before, told twice. The right one would come when a unit answers, so until then

@@ -29,6 +29,7 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.drive.broadcast import can_broadcast
 from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.line import COMMANDS
 from nfo_sinus_driver.node.line import Line
 
 #: How long all of them together may take, s. A start delay of a drive may last an hour.
@@ -55,7 +56,9 @@ class AllDrives:
             ('~/enable_all', self._enable),
         ):
             group = MutuallyExclusiveCallbackGroup()
-            node.create_service(Trigger, name, self._safe(callback), callback_group=group)
+            node.create_service(
+                Trigger, name, self._safe(callback), qos_profile=COMMANDS, callback_group=group
+            )
 
     def _safe(
         self, callback: Callable[[], tuple[list[str], list[str]]]

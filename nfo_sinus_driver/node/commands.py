@@ -22,12 +22,13 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import TYPE_CHECKING
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
+from nfo_sinus_driver.node.line import COMMANDS
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.node.drive_node import DriveNode
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 _LONGEST_COMMAND = 3700.0
 _LONGEST_STOP = 10.0
 _LONGEST_REFRESH = 300.0
+
+#: How many calls of ``~/enable`` of one drive may wait for an answer at once.
+CALLS_OF_ENABLE = 4
 
 _Command = Callable[[Drive], Future[str]]
 
@@ -50,9 +54,12 @@ class Commands:
 
     def __init__(self, node: DriveNode) -> None:
         self._node = node
-        # reentrant, for to disable must not wait for an enable that waits for a start delay
-        group = ReentrantCallbackGroup()
-        node.create_service(SetBool, '~/enable', self._on_enable, callback_group=group)
+        # several, for to disable must not wait for an enable that waits for a start delay; but not
+        # any number, for each keeps a thread that other drives may need
+        group = BoundedCallbackGroup(CALLS_OF_ENABLE)
+        node.create_service(
+            SetBool, '~/enable', self._on_enable, qos_profile=COMMANDS, callback_group=group
+        )
         self.offer('~/stop', Drive.stop, _LONGEST_STOP)
         self.offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
         self.offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
@@ -67,7 +74,9 @@ class Commands:
             return self._answer(response, command, timeout)
 
         group = MutuallyExclusiveCallbackGroup()
-        self._node.create_service(Trigger, name, answer, callback_group=group)
+        self._node.create_service(
+            Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
+        )
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response

@@ -37,6 +37,7 @@ import time
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 
 from nfo_sinus_driver.node.bench import Bench
 from nfo_sinus_driver.node.domain import own_domain
@@ -57,6 +58,9 @@ _STANDS_FOR = 1.5
 _COASTS_FOR = 2.5
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')
+#: What ends it before it is done, whatever was inherited.
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_INTERRUPTED = 130
 _REMARKS = {'title': 'Forward, backward, a fault, and on again', 'drive': 'simulated drive'}
 
 
@@ -108,6 +112,8 @@ def ride(rider: Rider, bench: Bench) -> None:
 
 def main() -> int:
     """Start everything, ride, end everything, and draw."""
+    for number in _ENDING:
+        signal.signal(number, signal.default_int_handler)
     folder = _output_folder()
     missing = _missing('rosbags', 'matplotlib')
     bag = None if 'rosbags' in missing else folder / 'ride'
@@ -131,6 +137,12 @@ def main() -> int:
             print(f'\nWhat driver and simulator said:\n{log.read().decode()}', file=sys.stderr)
             print(f'FAILED: {error}', file=sys.stderr)
             return 1
+        except KeyboardInterrupt:
+            # the driver now stops the motor, and that must not be cut short
+            for number in _ENDING:
+                signal.signal(number, signal.SIG_IGN)
+            print('ended before the ride was done', file=sys.stderr)
+            return _INTERRUPTED
     print('The ride is done: every step happened.')
     if bag:
         print(f'Its bag, for `ros2 bag play` and the like: {bag}')
@@ -147,7 +159,7 @@ def main() -> int:
 def _riding(bag: Path | None) -> Iterator[Rider]:
     """Have a rider, and a recorder if there is to be a bag, on a thread of their own."""
     with contextlib.ExitStack() as stack:
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.shutdown)
         executor = SingleThreadedExecutor()
         # before anything is there to be heard

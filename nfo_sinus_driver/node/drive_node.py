@@ -220,15 +220,19 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor and only keep watch."""
+        """Stop the motor and only keep watch; fails if the drive answers and does not stop."""
         self._note_person()
-        self._stop_for('deactivated', self._drive.deactivate)
+        if not self._let_go('deactivated'):
+            self._drive.activate()
+            return TransitionCallbackReturn.FAILURE
         return super().on_deactivate(state)
 
     @_guarded
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give control back and leave the drive alone."""
+        """Give control back and leave the drive alone; fails if it answers and does not stop."""
         self._note_person()
+        if not self._let_go('cleaned up'):
+            return TransitionCallbackReturn.FAILURE
         self._stop_for('cleaned up', self._disconnect)
         self.drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
@@ -260,6 +264,15 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _disconnect(self) -> Future[str]:
         return self._drive.disconnect(self.settings.shutdown_timeout)
+
+    def _let_go(self, what: str) -> bool:
+        """
+        Stop the motor; false if the drive answers and its motor is energised all the same.
+
+        One that does not answer is let go: it is told to stop as soon as it answers again.
+        """
+        self._stop_for(what, self._drive.deactivate)
+        return not (self._drive.stop_overdue and self._drive.snapshot.connected)
 
     def _stop_for(self, what: str, command: Callable[[], Future[str]]) -> None:
         try:

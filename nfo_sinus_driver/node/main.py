@@ -20,15 +20,14 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 
 from __future__ import annotations
 
-from collections import deque
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import ctypes
 import logging
-import signal
 import sys
 import threading
 import time
+import traceback
 
 import rclpy
 from rclpy.exceptions import InvalidNodeNameException
@@ -43,17 +42,20 @@ from nfo_sinus_driver.node.arguments import refuse_other_arguments
 from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.output import Output
+from nfo_sinus_driver.node.output import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 from nfo_sinus_driver.signals import ENDING
-from nfo_sinus_driver.signals import SUSPENDING
+from nfo_sinus_driver.signals import HeldSignals
 from nfo_sinus_driver.signals import signal_name
 
-#: Threads that callbacks of one drive may keep waiting: one for each of its callback groups.
-_GROUPS_OF_A_DRIVE = 16
+#: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
+#: more for ``~/enable``.
+_GROUPS_OF_A_DRIVE = 15 + CALLS_OF_ENABLE
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
@@ -66,9 +68,6 @@ _POLL_SIGNALS = 0.5
 _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
-
-#: Signals that came to threads of others; the worst of them would have ended us with no stop.
-_strays: deque[int] = deque()
 
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
@@ -152,17 +151,15 @@ class DriverProcess:
         # all are told before the first is waited for, and nobody can enable any of them again
         stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
-        # a drive that never answered was never started, and may well not be there
-        connected = [node for node in self._drives if node.drive.identity is not None]
         unconfirmed = [
             node
             for node, future in stops
-            if node in connected and not _confirmed(node, future, begun)
+            if self._may_be_there(node) and not _confirmed(node, future, begun)
         ]
         releases = [
             (node, node.drive.disconnect(_time_left(node, begun)))
-            for node in connected
-            if node not in unconfirmed
+            for node in self._drives
+            if node.drive.heard and node not in unconfirmed
         ]
         unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         for node in unconfirmed:
@@ -171,6 +168,11 @@ class DriverProcess:
                 'the emergency stop'
             )
         return not unconfirmed
+
+
+    def _may_be_there(self, node: DriveNode) -> bool:
+        """Tell whether there may be a motor: one that never answered was never started by us."""
+        return node.drive.heard or self._bus_node.line.bus.port_error is None
 
 
 def _await_callbacks(executor: MultiThreadedExecutor) -> None:
@@ -187,7 +189,11 @@ def _time_left(node: DriveNode, begun: float) -> float:
 
 
 def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
-    """Wait for the answer to a stop or a release, and log it."""
+    """
+    Wait for the answer to a stop or a release, and log it.
+
+    A drive that has never answered anything need not confirm: it may well not be there.
+    """
     log = node.get_logger()
     try:
         answer = future.result(_time_left(node, begun) + _LAST_ANSWER)
@@ -195,6 +201,8 @@ def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except DriveError as error:
+        if not node.drive.heard:
+            return True
         log.error(str(error))
         return False
     if answer:
@@ -236,28 +244,19 @@ def main(args: list[str] | None = None) -> int:
     """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _limit_arenas()
-    # blocked before our threads exist, so that none of them ever sees them
-    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | SUSPENDING)
-    for number in ENDING | SUSPENDING:
-        signal.signal(number, _take_stray)
+    open_closed_streams()
+    signals = HeldSignals()
+    # to the last, so that none cuts the end of the process short
+    signals.hold()
     output = Output()
     try:
-        return _run(*take_out_node_name(sys.argv if args is None else args))
+        return _run(signals, *take_out_node_name(sys.argv if args is None else args))
+    except Exception:
+        # while somebody can yet be told
+        traceback.print_exc()
+        return 1
     finally:
         output.close()
-
-
-def _take_stray(number: int, _: object) -> None:
-    """Keep a signal that came to a thread which libraries had started before we could block it."""
-    _strays.append(number)
-
-
-def _next_signal() -> int | None:
-    """Wait a while for a signal."""
-    caught = signal.sigtimedwait(ENDING | SUSPENDING, _POLL_SIGNALS)
-    if caught is not None:
-        return caught.si_signo
-    return _strays.popleft() if _strays else None
 
 
 def _limit_arenas() -> None:
@@ -268,7 +267,7 @@ def _limit_arenas() -> None:
         return
 
 
-def _run(arguments: list[str], single_name: str | None) -> int:
+def _run(signals: HeldSignals, arguments: list[str], single_name: str | None) -> int:
     try:
         refuse_other_arguments(arguments)
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -281,18 +280,18 @@ def _run(arguments: list[str], single_name: str | None) -> int:
     process.start()
     why = 'error in the driver'
     try:
-        why = _await_end(process)
+        why = _await_end(process, signals)
     finally:
         confirmed = process.stop(why)
         rclpy.shutdown()
     return 0 if confirmed else 1
 
 
-def _await_end(process: DriverProcess) -> str:
+def _await_end(process: DriverProcess, signals: HeldSignals) -> str:
     """Wait until something ends the driver; return what."""
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
-        number = _next_signal()
+        number = signals.next(_POLL_SIGNALS)
         if number is None:
             continue
         name = signal_name(number)

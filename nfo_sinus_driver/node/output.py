@@ -19,8 +19,24 @@ from __future__ import annotations
 import os
 import threading
 
+_INPUT = 0
+_STREAMS = (1, 2)
 _CHUNK = 65536
 _LAST_WORDS = 1.0
+
+
+def open_closed_streams() -> None:
+    """Let what whoever started us has closed go nowhere, before another file gets its number."""
+    standard = (_INPUT, *_STREAMS)
+    with open(os.devnull, 'r+b', buffering=0) as nowhere:
+        # each gets the lowest number that is free, and the last is none of the standard ones
+        first = nowhere.fileno()
+        others = [os.dup(first) for _ in standard]
+    if first in standard:
+        os.dup2(others[-1], first)
+    for number in others:
+        if number not in standard:
+            os.close(number)
 
 
 class Output:
@@ -33,31 +49,31 @@ class Output:
     """
 
     def __init__(self) -> None:
-        self._originals: list[tuple[int, int]] = []
-        self._threads: list[threading.Thread] = []
-        for descriptor in (1, 2):
-            try:
-                original = os.dup(descriptor)
-            except OSError:
-                # closed by whoever started us
-                continue
-            reading, writing = os.pipe()
-            os.set_blocking(writing, False)
-            os.dup2(writing, descriptor)
-            os.close(writing)
-            thread = threading.Thread(
-                target=_pump, args=(reading, original), name='output', daemon=True
-            )
-            thread.start()
-            self._originals.append((descriptor, original))
-            self._threads.append(thread)
+        self._threads = [_begin_to_pump(descriptor) for descriptor in _STREAMS]
 
     def close(self) -> None:
-        """Write what is waiting, unless that takes too long, and put things back."""
-        for descriptor, original in self._originals:
-            os.dup2(original, descriptor)
+        """
+        Write what is waiting, unless that takes too long.
+
+        What is said from now on goes nowhere: the process has yet to end, ROS has yet more to log
+        then, and the reader may still not read.
+        """
+        with open(os.devnull, 'wb', buffering=0) as nowhere:
+            for descriptor in _STREAMS:
+                os.dup2(nowhere.fileno(), descriptor)
         for thread in self._threads:
             thread.join(_LAST_WORDS)
+
+
+def _begin_to_pump(descriptor: int) -> threading.Thread:
+    original = os.dup(descriptor)
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    os.dup2(writing, descriptor)
+    os.close(writing)
+    thread = threading.Thread(target=_pump, args=(reading, original), name='output', daemon=True)
+    thread.start()
+    return thread
 
 
 def _pump(reading: int, original: int) -> None:

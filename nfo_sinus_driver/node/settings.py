@@ -276,7 +276,7 @@ DRIVE_SETTINGS = (
         'classic_dialect',
         '',
         'Which manual of the Classic protocol the drive follows: v2.03, or v5.0 for firmware '
-        "before 4.28; '': ask the drive, which older ones take for a fault",
+        "before 4.28; '': ask the drive, while the bus does not control it",
         constraints="'', v2.03 or v5.0",
     ),
     Setting('frame_id', '', 'frame_id of the headers'),

@@ -174,15 +174,16 @@ class Classic:
             raise _Wrong(SioErr.UNWRITABLE)
         place = parameter.place(Protocol.CLASSIC)
         raw = place.type.to_raw([word])
+        if key == 'fieldbus.scmd':
+            raw = _command(drive, raw)
+        if drive.faults and not self._in_spite_of_a_fault(drive, key, raw, to_all):
+            raise _Wrong(SioErr.BLOCKED)
+        if firmware.bus_only and not _permitted(drive, key, raw):
+            raise _Wrong(SioErr.NOT_PERMITTED)
         if key in firmware.codes and raw not in firmware.codes[key]:
             raise _Wrong(SioErr.OUT_OF_RANGE)
         if key == 'serial.address' and raw > firmware.most_address:
             raise _Wrong(SioErr.OUT_OF_RANGE)
-        if key == 'fieldbus.scmd':
-            raw = _command(drive, raw)
-        to_stop = key == 'fieldbus.mode' and raw == Mode.STOP
-        if to_stop and drive.faults.serial and not (to_all or firmware.obeys_stop):
-            raise _Wrong(SioErr.BLOCKED)
         try:
             drive.write_raw(key, _at_home(parameter, raw))
         except Refused as refused:
@@ -190,6 +191,14 @@ class Classic:
             raise _Wrong(SioErr.BLOCKED if blocked else _FLAGS[refused.reason]) from refused
         if key in COMMANDS:
             drive.runner.by_fieldbus = False
+
+    @staticmethod
+    def _in_spite_of_a_fault(drive: SimulatedDrive, key: str, raw: int, to_all: bool) -> bool:
+        """Whether a SELECT is one of those that an active fault does not keep off [M0 §6.1.5]."""
+        if key in ('fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'):
+            return True
+        stops = key == 'fieldbus.mode' and raw == Mode.STOP
+        return stops and drive.faults.serial and (to_all or drive.firmware.obeys_stop)
 
     def _find(self, drive: SimulatedDrive, id_: int) -> tuple[Parameter, int]:
         found = self._ids(drive.model).find(id_)
@@ -234,6 +243,15 @@ def _command(drive: SimulatedDrive, raw: int) -> int:
     if raw == Scmd.RESET_E_OUT:
         raise _Wrong(SioErr.OUT_OF_RANGE)
     return raw if raw & 1 or raw & Scmd.ERASE_E_LOG else Scmd.STOP
+
+
+def _permitted(drive: SimulatedDrive, key: str, raw: int) -> bool:
+    """Whether MODE permits a SELECT, where nothing is changed before MODE = Sio [C100]."""
+    mode = drive.runner.mode
+    if mode == Mode.INHIBIT:
+        # whether this is taken is left to the drive's variant [C101]
+        return key == 'fieldbus.scmd' and raw == Scmd.STOP
+    return mode == Mode.BUS or key == 'fieldbus.mode'
 
 
 def _at_home(parameter: Parameter, raw: int) -> int:

@@ -66,6 +66,12 @@ class ControlSteps:
         """Lose control to somebody else; the word stays as it was written."""
         self._asked = self._reached = 0
 
+    def drop_run(self) -> None:
+        """Forget the run command; its bit must be taken back and given again."""
+        before_run = len(_STEPS) - 1
+        self._asked = min(self._asked, before_run)
+        self._reached = min(self._reached, before_run)
+
     def wait(self, dt: float) -> None:
         """Let ``dt`` seconds pass."""
         self._left = max(0.0, self._left - dt)

@@ -17,15 +17,17 @@ A whole NFO Sinus made of software: parameters, commands, state machine, motor, 
 
 It knows parameters by catalog key and raw numbers, and time only as it is told of it; which
 protocol asks is not its business. Where the manuals leave the drive's behaviour open, it does
-what makes a careless driver fail: a run command stands through a lost RUN input and through a
-fault, a set-point through a power cycle, and MODE = Ext or Auto starts the motor.
+what makes a careless driver fail: a run command stands through a lost RUN input, a set-point
+through a power cycle, and MODE = Ext or Auto starts the motor; or what its variant says.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
+import contextlib
 from fractions import Fraction
 
 from nfo_sinus_driver.catalog import Access
@@ -59,6 +61,7 @@ from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 from nfo_sinus_driver.simulator.runner_optimal import OptimalRunner
 from nfo_sinus_driver.simulator.self_restart import SelfRestart
 from nfo_sinus_driver.simulator.serial_side import SerialSide
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: What a factory reset leaves as it is: without them the drive would not hear the line any more.
 LINE_SETTINGS = frozenset(
@@ -86,11 +89,13 @@ class SimulatedDrive:
     :param newer_functions: how it treats functions 17, 23 and 43: ``known``, ``refused`` as by
         older firmware, or ``silent``.
     :param lenient: a Classic message that it refuses is no serial fault.
+    :param variant: what it does where the manuals leave it open; by default as its family does.
     :raises ValueError: an unknown model or parameter, or a value that the drive would refuse.
 
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
     :ivar firmware: what its firmware does its own way.
     :ivar tears: how many times yet a counter goes on between the readings of its two halves.
+    :ivar step: the longest step of model time while something moves (s).
     :ivar time: model time since the start (s).
     :ivar identification: the objects of Read Device Identification, by number [M0 §6.2.4].
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
@@ -111,6 +116,7 @@ class SimulatedDrive:
         serial_number: str | None = None,
         newer_functions: str = KNOWN,
         lenient: bool = False,
+        variant: Variant | None = None,
     ) -> None:
         self.model = load_model(model)
         machine = machine_of(self.model)
@@ -129,6 +135,7 @@ class SimulatedDrive:
         self.motor = Motor(nameplate(self.memory))
         self.counters = Counters()
         self.runner = _RUNNERS[model](self.memory, self.motor, self.faults, self.counters)
+        self.runner.variant = variant or self.runner.usual
         self.runner.run_input = run_input
         self.serial_number = identification.serial_number(serial_number, address)
         self.identification = identification.device_objects(self.memory)
@@ -140,6 +147,7 @@ class SimulatedDrive:
         self.sio_err_reads = 0
         self.mode_ext_writes = 0
         self.tears = 0
+        self.step = _STEP
         self.time = 0.0
         self._lenient = lenient
         self._registers = RegisterMap(self.model)
@@ -154,8 +162,9 @@ class SimulatedDrive:
     def advance(self, dt: float) -> None:
         """Let ``dt`` seconds of model time pass."""
         while dt > 1e-9:
-            step = min(dt, _IDLE_STEP if self._resting else _STEP)
-            self._pass(step)
+            resting = self._resting
+            step = min(dt, _IDLE_STEP if resting else self.step)
+            self._pass(step, resting)
             dt -= step
 
     def advance_to(self, now: float) -> None:
@@ -215,7 +224,6 @@ class SimulatedDrive:
         """
         Read a parameter as the bus does, a number of the memory, side effects included.
 
-
         :raises Refused: ADDRESS; it can only be written.
         """
         if self.memory.model[key].access is Access.WRITE:
@@ -223,13 +231,13 @@ class SimulatedDrive:
         if key == 'fieldbus.inv_st_with_ack':
             self.ack_reads += 1
             code = self.inv_st
-            self.faults.acknowledge()
-            self._settle()
+            with self._acknowledging():
+                self.faults.acknowledge()
             return code
         if key == 'fieldbus.sio_err':
             self.sio_err_reads += 1
-            flags = self.faults.take_sio_err()
-            self._settle()
+            with self._acknowledging():
+                flags = self.faults.take_sio_err()
             return flags
         return self._peek(key)
 
@@ -246,7 +254,7 @@ class SimulatedDrive:
             raise Refused(Reason.ADDRESS, f'{key} cannot be written')
         Memory.check(parameter, raw)
         if not self.runner.write(key, raw):
-            self.runner.refuse_when_faulted()
+            self.runner.refuse_when_faulted(key)
             if parameter.stopped and (self.motor.driven or self.motor.turning):
                 raise Refused(Reason.STATE, f'{key} changes only while the motor stands')
             self._store(key, raw)
@@ -380,6 +388,15 @@ class SimulatedDrive:
         """Return a parameter in engineering units, without side effects."""
         return Memory.show(self.memory.model[key], self._peek(key))
 
+    @contextlib.contextmanager
+    def _acknowledging(self) -> Iterator[None]:
+        """Let an acknowledgement have its effect: with the last fault a run command may end."""
+        faulted = bool(self.faults)
+        yield
+        if faulted and not self.faults:
+            self.runner.acknowledged()
+        self._settle()
+
     def _store(self, key: str, raw: int) -> None:
         self.memory.put(key, raw)
         if key.startswith('motor.'):
@@ -409,7 +426,7 @@ class SimulatedDrive:
     def _bus_controls(self) -> bool:
         return self.runner.mode == Mode.BUS
 
-    def _pass(self, dt: float) -> None:
+    def _pass(self, dt: float, resting: bool) -> None:
         self.time += dt
         self._silent_left = max(0.0, self._silent_left - dt)
         if self._boot_left > 0:
@@ -425,7 +442,8 @@ class SimulatedDrive:
         self.self_restart.wait(dt, driven=self.motor.driven, voltage=self.motor.voltage_on)
         self.motor.advance(dt)
         self.counters.advance(dt, self.motor)
-        self._settle()
+        if not resting:
+            self._settle()
 
     def _settle(self) -> None:
         self.runner.settle()

@@ -92,7 +92,7 @@ class Faults:
         self.sio_err = SioErr(0)
 
     def __bool__(self) -> bool:
-        return bool(self.codes)
+        return bool(self._present) and bool(self.codes)
 
     @property
     def codes(self) -> list[int]:
@@ -107,7 +107,7 @@ class Faults:
     @property
     def shown(self) -> int:
         """What InvSt shows of them: the first fault, else the first alarm; 0 when none stands."""
-        return next(iter(self.codes + self.alarms), 0)
+        return next(iter(self.codes + self.alarms), 0) if self._present else 0
 
     @property
     def serial(self) -> bool:

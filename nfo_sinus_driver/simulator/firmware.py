@@ -50,6 +50,7 @@ class Firmware:
     :ivar even_stops: every even SCMD below 800h is Stop [C31].
     :ivar own_address: a message to address 0 is answered with the drive's own [C86].
     :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
+    :ivar bus_only: nothing but MODE is written while the bus has no control [C100].
     :ivar own_bus_codes: control over a fieldbus has InvSt codes of its own, four higher [C3].
     :ivar lacks: parameters that it does not have on Classic [C21].
     :ivar codes: enumerations of which it has these codes only.
@@ -69,6 +70,7 @@ class Firmware:
     even_stops: bool
     own_address: bool
     lower_case: bool
+    bus_only: bool
     own_bus_codes: bool
     lacks: frozenset[str] = frozenset()
     codes: Mapping[str, frozenset[int]] = field(default_factory=dict)
@@ -89,6 +91,7 @@ NEW = Firmware(
     even_stops=False,
     own_address=False,
     lower_case=False,
+    bus_only=False,
     own_bus_codes=False,
 )
 OLD = Firmware(
@@ -106,6 +109,7 @@ OLD = Firmware(
     even_stops=True,
     own_address=True,
     lower_case=True,
+    bus_only=True,
     own_bus_codes=True,
     lacks=frozenset(
         {

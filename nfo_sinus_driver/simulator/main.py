@@ -39,6 +39,8 @@ from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.timing import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import FORMATS
+from nfo_sinus_driver.simulator.variant import CHOICES
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: Lets the line's thread go on soon after another one was busy (s).
 _SWITCH_INTERVAL = 0.0002
@@ -48,7 +50,15 @@ While it runs, "simulator inject --link LINK VERB ..." makes things happen to it
 RUN input, the keypad, a power cycle, noise on the line; see "simulator inject --help".
 """
 
-
+#: What the options say that choose where the manuals leave a drive open.
+_OPEN = {
+    'run_command_in_fault': 'what an acknowledged fault does to a run command (default: drops; of '
+    'the Optimal keeps)',
+    'refuses_in_fault': 'what is refused while a fault is active; on Classic always all '
+    '(default: nothing)',
+    'stop_in_tuning': 'whether SCMD = Stop ends a tuning, or is refused until it is over '
+    '(default: taken)',
+}
 _ROS_ARGS = '--ros-args'
 
 
@@ -147,7 +157,15 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         boot_time=options.boot_time,
         serial_numbers=options.serial,
         newer_functions=options.newer_functions,
+        variant=_variant(options),
     )
+
+
+def _variant(options: argparse.Namespace) -> Variant | None:
+    """Return what the options say of what the manuals leave open; ``None`` if they say nothing."""
+    given = {name: getattr(options, name) for name in CHOICES}
+    chosen = {name: choice for name, choice in given.items() if choice is not None}
+    return Variant(**chosen) if chosen else None
 
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
@@ -282,4 +300,6 @@ def _parser() -> argparse.ArgumentParser:
         help='how drives treat functions 17, 23 and 43, which older ones do not have '
         '(default: known)',
     )
+    for name, choices in CHOICES.items():
+        add(f'--{name.replace("_", "-")}', choices=choices, help=_OPEN[name])
     return parser

@@ -33,6 +33,10 @@ from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.variant import ALL
+from nfo_sinus_driver.simulator.variant import DROPS
+from nfo_sinus_driver.simulator.variant import SCMD
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: InvSt by source: standing by, running, accelerating, retarding ([M0 table 19], [M1]).
 _BUS_CODES = (37, 38, 39, 40)
@@ -67,27 +71,31 @@ class Runner(abc.ABC):
     Takes the commands of one drive family and turns them into orders to the motor.
 
     :ivar source: who commands.
-    :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input and a
-        fault, so the motor starts by itself when they are over.
+    :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input, so the
+        motor starts by itself when that is over; through a fault as ``variant`` says.
     :ivar run_input: the digital input RUN.
     :ivar by_fieldbus: the bus that commands is a fieldbus, to the older firmware [C3].
     :ivar initialised: the self-test after power-on is over.
-    :ivar refuses_writes_when_faulted: while a fault stands every write is refused.
+    :ivar variant: what it does where the manuals leave it open; set it at any time.
     """
 
     #: The set-point register of each control mode, by the code of control.mode.
     setpoint_of: ClassVar[Mapping[int, str]]
     #: InvSt while the start is delayed.
     delayed: ClassVar[int]
+    #: What drives of this family do unless told otherwise.
+    usual: ClassVar[Variant]
+    #: The run command of this family.
+    run_command: ClassVar[str]
 
     scmd: int
-    refuses_writes_when_faulted: bool
 
     def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
         self._memory = memory
         self._motor = motor
         self._faults = faults
         self._counters = counters
+        self.variant = self.usual
         self.source = Source.STOP
         self.run_input = True
         self.initialised = False
@@ -185,14 +193,24 @@ class Runner(abc.ABC):
             return slower
         return faster if motor.trend > 0 else running
 
-    def refuse_when_faulted(self) -> None:
+    def refuse_when_faulted(self, key: str) -> None:
         """
-        Refuse what a drive does not take while a fault stands.
+        Refuse the write of a parameter that the drive does not take while a fault is active.
 
         :raises Refused: STATE.
         """
-        if self._faults and self.refuses_writes_when_faulted:
-            raise Refused(Reason.STATE, f'fault {self._faults.shown} stands')
+        refused = self.variant.refuses_in_fault
+        if self._faults and (refused == ALL or (refused == SCMD and key == self.run_command)):
+            raise Refused(Reason.STATE, f'fault {self._faults.shown} is active')
+
+    def acknowledged(self) -> None:
+        """Take note that an acknowledgement ended the last fault."""
+        if self.variant.run_command_in_fault == DROPS:
+            self._drop_run_command()
+
+    @abc.abstractmethod
+    def _drop_run_command(self) -> None:
+        """Forget the run command, whoever gave it; the terminals give theirs all the time."""
 
     @abc.abstractmethod
     def _wanted(self) -> bool:

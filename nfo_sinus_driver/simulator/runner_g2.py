@@ -51,6 +51,8 @@ from nfo_sinus_driver.simulator.state_machine import StateMachine
 from nfo_sinus_driver.simulator.tuning import FAILURES
 from nfo_sinus_driver.simulator.tuning import PROCEDURES
 from nfo_sinus_driver.simulator.tuning import Tuning
+from nfo_sinus_driver.simulator.variant import REFUSED
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: The regulated quantity of each control mode; PI-Reg regulates the process by the frequency.
 _REGULATION_OF = {
@@ -97,13 +99,14 @@ class G2Runner(Runner):
         3: 'status.spd_set',
     }
     delayed = START_DELAY
+    usual = Variant()
+    run_command = 'fieldbus.scmd'
 
     def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
         super().__init__(memory, motor, faults, counters)
         self.machine = StateMachine()
         self.scmd = Scmd.STOP
         self.word = RELEASED
-        self.refuses_writes_when_faulted = True  # [M0 §6.1.5]
         self._dc_brake_left = 0.0
         self.tuning: Tuning | None = None
         #: What InvSt says of the tuning that was finished, until the next command.
@@ -181,16 +184,16 @@ class G2Runner(Runner):
         if raw == Mode.STOP and self._faults.serial:
             self._faults.acknowledge_serial()
         else:
-            self.refuse_when_faulted()
+            self.refuse_when_faulted('fieldbus.mode')
         self.take(source)
 
     def _write_scmd(self, raw: int) -> None:
         if raw not in set(Scmd):
             raise Refused(Reason.VALUE, f'SCMD has no code {raw:#x}')
-        self.refuse_when_faulted()
+        self.refuse_when_faulted('fieldbus.scmd')
         if self.source.mode is not Mode.BUS:
             raise Refused(Reason.STATE, 'SCMD needs MODE = Bus')
-        if raw != Scmd.STOP:
+        if raw != Scmd.STOP or self.variant.stop_in_tuning == REFUSED:
             self._refuse_when_tuning()
         self.tuning, self._tuned = None, 0
         if raw in PROCEDURES:
@@ -206,9 +209,14 @@ class G2Runner(Runner):
         if self._motor.driven or self._motor.turning:
             raise Refused(Reason.STATE, 'tuning needs a motor that stands')
         self.command(Scmd.STOP)
-        # as a run command without RUN, it leads to nothing
-        if self.run_input or not PROCEDURES[raw].measures:
+        # as a run command without RUN or in a fault, it leads to nothing
+        if not self._faults and (self.run_input or not PROCEDURES[raw].measures):
             self.tuning = Tuning.begun(raw)
+
+    def _drop_run_command(self) -> None:
+        self.scmd = Scmd.STOP
+        if self.source is Source.KEYPAD:
+            self.take(Source.STOP)
 
     def _refuse_when_tuning(self) -> None:
         if self.tuning is not None:

@@ -21,7 +21,8 @@ does not expect it:
 
 * MODE = Manual is no stop: a running motor goes on, now as the keypad's.
 * Both control methods at once, which [M1] forbids: what one has started the other does not stop.
-* A run command is taken while a fault stands, and holds when it is acknowledged.
+* A run command is taken while a fault stands, and holds when it is acknowledged; a variant can
+  drop it.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.runner import Runner
+from nfo_sinus_driver.simulator.variant import KEEPS
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: Codes of the setting control.mode.
 _FREQUENCY, _SPEED = 0, 3
@@ -60,10 +63,12 @@ class OptimalRunner(Runner):
         _SPEED: 'fieldbus.input_speed_setpoint',
     }
     delayed = 54
+    # [M1] knows no refusal in a fault, and no table that ends a run command
+    usual = Variant(run_command_in_fault=KEEPS)
+    run_command = 'fieldbus.smode'
 
     def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
         super().__init__(memory, motor, faults, counters)
-        self.refuses_writes_when_faulted = False  # [M1] knows of no such thing
         self.scmd = Smode.STOP
         self._steps = ControlSteps()
         self._running = False
@@ -120,7 +125,7 @@ class OptimalRunner(Runner):
     def _write_mode(self, raw: int) -> None:
         if raw not in set(Mode):
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
-        self.refuse_when_faulted()
+        self.refuse_when_faulted('fieldbus.mode')
         if raw == Mode.MANUAL:
             self.take(Source.KEYPAD if self._running else Source.STOP)
         else:
@@ -129,17 +134,26 @@ class OptimalRunner(Runner):
     def _write_smode(self, raw: int) -> None:
         if raw not in set(Smode):
             raise Refused(Reason.VALUE, f'SMODE has no code {raw:#x}')
-        self.refuse_when_faulted()
+        self.refuse_when_faulted('fieldbus.smode')
         if not self._bus:
             raise Refused(Reason.STATE, 'SMODE needs MODE = Bus')
         self.scmd = Smode(raw)
 
     def _write_control(self, word: Control) -> None:
         shown = self.status_word
+        faulted = bool(self._faults)
         if word & ~self.control_word & Control.FAULT_ACK:
             self._faults.acknowledge()
         self._steps.write(word, shown)
+        if faulted and not self._faults:
+            self.acknowledged()
         if self.source is Source.CONTROL_WORD and not self._steps.has_control:
+            self.take(Source.STOP)
+
+    def _drop_run_command(self) -> None:
+        self.scmd = Smode.STOP
+        self._steps.drop_run()
+        if self.source is Source.KEYPAD:
             self.take(Source.STOP)
 
     def wait(self, dt: float) -> None:

@@ -50,6 +50,7 @@ from nfo_sinus_driver.simulator.report import describe
 from nfo_sinus_driver.simulator.timing import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 from nfo_sinus_driver.simulator.trace import Trace
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: How often every drive catches up with the clock while nobody asks it (s).
 _TICK = 0.05
@@ -83,6 +84,7 @@ class Simulator:
         their own.
     :param newer_functions: how the drives treat functions 17, 23 and 43: ``known``, ``refused``
         or ``silent``.
+    :param variant: what the drives do where the manuals leave it open; by default as their family.
     :raises ValueError: a wrong address, model, protocol, baud rate or parameter.
     :raises PortError: the port or link cannot be had.
     :raises ControlError: another simulator is there.
@@ -119,6 +121,7 @@ class Simulator:
         boot_time: float = 2.0,
         serial_numbers: Sequence[str] = (),
         newer_functions: str = KNOWN,
+        variant: Variant | None = None,
     ) -> None:
         machine = machine_of(load_model(model))
         known = with_firmware(machine, settings or {}, dialect)
@@ -154,6 +157,7 @@ class Simulator:
                 serial_number=number,
                 newer_functions=newer_functions,
                 lenient=lenient,
+                variant=variant,
             )
             for address, number in itertools.zip_longest(addresses, serial_numbers)
         }

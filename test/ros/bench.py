@@ -85,7 +85,9 @@ def wait_until(
             return result
         for process in _watched:
             process.has_not_crashed(what)
-        assert time.monotonic() < deadline, f'not within {timeout:g} s: {what}'
+        assert time.monotonic() < deadline, (
+            f'not within {timeout:g} s: {what}; {"; ".join(map(_last_words, _watched))}'
+        )
         time.sleep(period)
 
 
@@ -158,6 +160,10 @@ class Process:
             self._process.kill()
             self._process.wait()
             raise
+
+
+def _last_words(driver: Process) -> str:
+    return f'the driver says at last:\n{driver.text[-2000:]}'
 
 
 #: The drivers at work: what a test waits for will not come when one of them has ended by itself.
@@ -254,12 +260,18 @@ class Client(contextlib.ExitStack):
         self.listen('statistics', BusStatistics, '/nfo_sinus_bus/statistics', 10)
         self._setpoint = self.node.create_publisher(Float32, f'{name}/setpoint', 1)
         self._clients: dict[str, Any] = {}
-        executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(self.node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        thread = threading.Thread(target=self._executor.spin, daemon=True)
         thread.start()
         self.callback(thread.join, 5.0)
-        self.callback(executor.shutdown, 5.0)
+        self.callback(self._executor.shutdown, 5.0)
+
+    def where_it_spins(self, call: Callable[[], Any]) -> Any:
+        """Call something in the thread that hears the answers; return what it returned."""
+        task = self._executor.create_task(call)
+        wait_until(task.done, 'the thread that spins has called it')
+        return task.result()
 
     # --- seeing -------------------------------------------------------------------------------
 

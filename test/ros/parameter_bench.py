@@ -59,6 +59,8 @@ _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
 #: MODE, SCMD and the set-point: their Classic names [M0 §6.1], and their registers.
 _COMMANDS = {'E0029': 0x0294, 'E00AD': 0x0298, 'E001E': 0x03FC}
+#: MODE = Bus and Stop, SCMD = Stop, set-point 0: nothing turns by them.
+_HARMLESS = frozenset(((0x0294, (3,)), (0x0294, (1,)), (0x0298, (0,)), (0x03FC, (0,))))
 _ENDS = {ends.name: ends for ends in ENDS}
 _BY_ID = {ends.classic[0]: ends for ends in ENDS}
 
@@ -95,6 +97,8 @@ class Wire:
     def __init__(self, bench: Bench) -> None:
         self._trace = bench.trace
         self._written = _WRITTEN[bench.way.protocol]
+        #: Older firmware takes settings under bus control alone: MODE and a stop go along [C100].
+        self._aside = _HARMLESS if bench.way.dialect == '5.0' else frozenset()
         self._read = 0
 
     def writes(self) -> list[Write]:
@@ -107,7 +111,11 @@ class Wire:
         self._read += len(text)
         frames = (json.loads(line) for line in text.splitlines() if b'"request"' in line)
         writes = (self._written(bytes.fromhex(frame['hex'])) for frame in frames)
-        return [write for write in writes if write is not None]
+        return [
+            write
+            for write in writes
+            if write is not None and (write.register, write.words) not in self._aside
+        ]
 
 
 def _modbus(data: bytes) -> Write | None:

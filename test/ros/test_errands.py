@@ -180,7 +180,7 @@ def test_the_action_is_cancelled(bench: Bench) -> None:
     tuner = Tuner(client)
     handle = tuner.begin(Tune.Goal.FULL)
     simulator.wait_for(lambda state: state['inv_st'] == _TUNING)
-    handle.cancel_goal_async()
+    tuner.cancel(handle)
     status, result = tuner.result(handle)
     assert status == GoalStatus.STATUS_CANCELED
     assert not result.success and 'was stopped' in result.message

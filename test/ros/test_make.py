@@ -29,6 +29,8 @@ from bench import wait_until
 from ways import needs
 
 _DEMO_TIME = 100.0
+#: As a shell starts its background jobs.
+_BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 
 
 def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
@@ -55,9 +57,25 @@ def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
 
 
 @needs('own')
+def test_ctrl_c_ends_the_demo(bench: Bench) -> None:
+    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.node.demo']
+    folder = bench.folder / 'output'
+    process = Process(
+        [*command, '--output', str(folder)], dict(os.environ), bench.folder / 'demo.log'
+    )
+    bench.callback(process.end)
+    wait_until(lambda: 'enable: enabled' in process.text, 'it rides')
+    process.signal(signal.SIGINT)
+    assert process.wait() == 130, process.text
+    assert 'ended before the ride was done' in process.text
+    assert 'Traceback' not in process.text
+    assert not (folder / 'ride.png').exists()
+
+
+@needs('own')
 def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
-    command = [sys.executable, '-m', 'nfo_sinus_driver.node.make_run']
+    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.node.make_run']
     process = Process(command, environment, bench.folder / 'make_run.log')
     bench.callback(process.end)
     client = bench.client().connected()

@@ -24,9 +24,15 @@ from rclpy.action import ActionClient
 
 
 class Tuner:
-    """A client of the action."""
+    """
+    A client of the action.
+
+    An action client of rclpy knows of a request only once it is sent, and drops an answer that
+    another thread hears before: all requests are sent by the thread that hears the answers.
+    """
 
     def __init__(self, client: Client, name: str = '/nfo_sinus') -> None:
+        self._client = client
         self._action = ActionClient(client.node, Tune, f'{name}/tune')
         client.callback(self._action.destroy)
         wait_until(self._action.server_is_ready, 'there is an action server')
@@ -34,17 +40,26 @@ class Tuner:
 
     def begin(self, procedure: int):
         """Send a goal, and return its handle when it is accepted."""
-        future = self._action.send_goal_async(
-            Tune.Goal(procedure=procedure),
-            feedback_callback=lambda message: self.feedback.append(message.feedback),
+        handle = self._answer(
+            lambda: self._action.send_goal_async(
+                Tune.Goal(procedure=procedure),
+                feedback_callback=lambda message: self.feedback.append(message.feedback),
+            ),
+            'the goal is answered',
         )
-        wait_until(future.done, 'the goal is answered')
-        assert future.result().accepted
-        return future.result()
+        assert handle.accepted
+        return handle
 
-    @staticmethod
-    def result(handle):
+    def cancel(self, handle) -> None:
+        """Cancel a goal."""
+        self._answer(handle.cancel_goal_async, 'the cancel is answered')
+
+    def result(self, handle):
         """Wait for the end; return status and result."""
-        future = handle.get_result_async()
-        wait_until(future.done, 'there is a result')
-        return future.result().status, future.result().result
+        answer = self._answer(handle.get_result_async, 'there is a result')
+        return answer.status, answer.result
+
+    def _answer(self, send, what: str):
+        future = self._client.where_it_spins(send)
+        wait_until(future.done, what)
+        return future.result()

@@ -47,12 +47,14 @@ MAY_IMPORT = {
 }
 #: What else they may import beside the standard library; node may import anything.
 MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'}}
+#: What opens by number, and nothing but /dev/null.
+OPENS_NO_PORT = frozenset({'node/output.py'})
 #: Rooms in which serial ports are opened.
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
 PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
 
-MOST_LINES = 450
+MOST_LINES = 600
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
 LONGER: dict[str, int] = {}
 
@@ -130,7 +132,7 @@ def violations(path: str, source: str) -> list[str]:
         known = top in sys.stdlib_module_names or top in MAY_USE.get(room, ())
         if room != 'node' and not known:
             found.append(f'{room} imports {name}')
-    if room not in OPENS_PORTS:
+    if room not in OPENS_PORTS and path not in OPENS_NO_PORT:
         found += [f'{room} opens ports with {call}' for call in opens_ports(tree)]
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
@@ -240,7 +242,7 @@ for module in {modules!r}:
         ('bus.py', 'import pty', 'bus opens ports with pty'),
         ('bus.py', 'import os\nos.open("/dev/ttyUSB0", os.O_RDWR)', 'bus opens ports with os.open'),
         ('node/line.py', 'from os import open as o', 'node opens ports with os.open'),
-        ('drive/drive.py', '\n' * 451, '451 lines are too many'),
+        ('drive/drive.py', '\n' * 601, '601 lines are too many'),
         ('shed/tools.py', '', 'shed is no room of the house'),
     ],
 )
@@ -257,7 +259,7 @@ def test_checker_sees(path: str, source: str, complaint: str) -> None:
         ('simulator/modbus.py', 'from pymodbus import pdu\nfrom . import drive'),
         ('drive/drive.py', 'from nfo_sinus_driver.bus import Bus\nfrom .errors import DriveError'),
         ('catalog/model.py', 'import csv\nopen("sinus_g2.csv")\nos.path.open'),
-        ('drive/drive.py', '\n' * 450),
+        ('drive/drive.py', '\n' * 600),
     ],
 )
 def test_checker_lets_pass(path: str, source: str) -> None:

@@ -279,6 +279,44 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
     assert kind_of(turns.take()) == _SLOT
 
 
+def stop_of(unit: int) -> Waiting:
+    """A stop that waits."""
+    transfer = Transfer(unit, Address((1,), 1), Priority.STOP, (0,))
+    return Waiting(cast(Task, f'stop {unit}'), transfer)
+
+
+def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
+    silent, poll, other = stop_of(2), entry(Priority.POLL), stop_of(3)
+    turns = Turns(lambda unit: unit == 2)
+    turns.add(silent)
+    assert turns.take() is silent
+    turns.took(0.2)
+    for waiting in (silent, poll):
+        turns.add(waiting)
+    assert turns.take() is poll
+    turns.took(_READ)
+    assert turns.take() is silent
+    turns.took(0.2)
+    # nobody else waits
+    turns.add(silent)
+    assert turns.take() is silent
+    turns.took(0.2)
+    # a stop of somebody else goes first of all
+    for waiting in (silent, poll, other):
+        turns.add(waiting)
+    assert turns.take() is other
+
+
+def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
+    turns = Turns(lambda unit: False)
+    stops = [stop_of(2), stop_of(2)]
+    for waiting in (*stops, entry(Priority.POLL)):
+        turns.add(waiting)
+    for stop in stops:
+        assert turns.take() is stop
+        turns.took(_READ)
+
+
 # --- leaving --------------------------------------------------------------------------------------
 
 

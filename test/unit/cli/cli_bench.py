@@ -31,6 +31,8 @@ import time
 from typing import Any
 from typing import NamedTuple
 
+from support.variants import hardest
+
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -42,6 +44,8 @@ PATIENCE = 60.0
 #: The functions that write [M0 §6.2.3].
 WRITES = {6, 16, 23}
 COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+#: As a shell starts its background jobs.
+BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 
 
 MakeBench = Callable[..., 'Bench']
@@ -75,6 +79,7 @@ class Bench:
     def __init__(self, trace: Path, **options: Any) -> None:
         self._trace = trace
         options.setdefault('serial_numbers', ['NFO1001', 'NFO1002'])
+        options.setdefault('variant', hardest())
         self.simulator = Simulator([1, 2], trace=str(trace), boot_time=0.1, **options)
         self.options = ('--port', self.simulator.port, '--response-timeout', '2.0')
         for name in ('protocol', 'model'):
@@ -174,10 +179,12 @@ class Bench:
         )
         return Done(done.returncode, done.stdout, done.stderr)
 
-    def begin(self, *arguments: object) -> subprocess.Popen[str]:
-        """Begin to run it."""
+    def begin(
+        self, *arguments: object, through: tuple[str, ...] = ()
+    ) -> subprocess.Popen[str]:
+        """Begin to run it, by way of another command if need be."""
         return subprocess.Popen(
-            [*COMMAND, *self.options, *map(str, arguments)],
+            [*through, *COMMAND, *self.options, *map(str, arguments)],
             cwd=ROOT,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

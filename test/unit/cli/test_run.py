@@ -25,6 +25,7 @@ import pty
 import select
 import signal
 import subprocess
+import time
 from typing import Any
 
 from cli_bench import COMMAND
@@ -128,7 +129,7 @@ def test_the_set_point_stays_fresh(bench: Bench) -> None:
     assert 'no set-point' not in err and 'time-out' not in err
     lines = [line for line in out.splitlines() if 'Bus Run' in line]
     assert '10.0 Hz' in lines[-1] and '1 s left' in lines[-1]
-    assert bench.value('serial.sio_tot') == 1.0 and bench.value('serial.auto_stop') is True
+    assert bench.value('serial.sio_tot') == 1.5 and bench.value('serial.auto_stop') is True
     assert bench.state()['fault'] == 0
 
 
@@ -205,6 +206,21 @@ def test_a_signal_stops_the_motor_every_way(
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == SIGNALS[number], err
+    assert bench.stopped
+
+
+def test_it_takes_no_signal_for_granted_when_it_was_suspended(bench: Bench) -> None:
+    with bench.riding() as process:
+        process.send_signal(signal.SIGSTOP)
+        suspended = time.monotonic()
+        # longer than it ever waits for a signal
+        wait_until(lambda: time.monotonic() > suspended + 0.2)
+        process.send_signal(signal.SIGCONT)
+        wait_until(lambda: bench.state()['frequency'] > 9)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+    assert 'Ctrl-C: stopping the motor' in err
     assert bench.stopped
 
 

@@ -20,6 +20,7 @@ from collections.abc import Callable
 import json
 import signal
 
+from cli_bench import BACKGROUND
 from cli_bench import Bench
 from cli_bench import Done
 import pytest
@@ -245,8 +246,9 @@ def test_monitor_tells_of_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> No
     assert [json.loads(line)['connected'] for line in done.out.splitlines()][-1] is False
 
 
-def test_monitor_ends_with_ctrl_c(bench: Bench) -> None:
-    process = bench.begin('monitor', '--period', 0.05)
+@pytest.mark.parametrize('through', [(), BACKGROUND], ids=['foreground', 'background'])
+def test_monitor_ends_with_ctrl_c(bench: Bench, through: tuple[str, ...]) -> None:
+    process = bench.begin('monitor', '--period', 0.05, through=through)
     assert process.stdout is not None
     assert 'Hz' in process.stdout.readline()
     process.send_signal(signal.SIGINT)

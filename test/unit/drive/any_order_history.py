@@ -29,6 +29,8 @@ from typing import Any
 
 from any_order_rig import Rig
 
+from nfo_sinus_driver.simulator.control_source import Source
+
 #: How the driver is set.
 POLL_RATE = 5.0
 SETPOINT_TIMEOUT = 1.0
@@ -48,6 +50,11 @@ TAKEN_BACK = 1.7
 #: A drive that was lost is found again within this, s.
 FOUND = 5.0
 
+#: How much longer everything may take while answers are spoiled by chance, s.
+NOISY = 2.0
+
+#: By these the bus has control.
+BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
 #: Bit 0 of the control word [M0 table 14].
 SWITCH_ON = 1 << 0
 
@@ -148,7 +155,8 @@ class History:
         self.enabled_at = None
         self._ended_by_fault = None
         self.lost_at = self.now
-        self._no_run_from = max(self._no_run_from, self.now + within)
+        later = NOISY if self._rig.link.noise else 0.0
+        self._no_run_from = max(self._no_run_from, self.now + within + later)
 
     def disturbed(self) -> None:
         """Take note that somebody else did something to the drive."""
@@ -203,7 +211,7 @@ class History:
     @property
     def by_bus(self) -> bool:
         """The bus controls the drive."""
-        return self._far.runner.source.value in ('scmd', 'control_word')
+        return self._far.runner.source in BUS_SOURCES
 
     @property
     def running(self) -> bool:
@@ -219,7 +227,7 @@ class History:
         runner = self._far.runner
         if self._optimal:
             return self.by_bus and bool(runner.scmd or runner._steps.run)
-        if runner.source.value == 'scmd':
+        if runner.source is Source.SCMD:
             return bool(runner.scmd & 1)
         return self.by_bus and bool(runner.word & SWITCH_ON)
 
@@ -248,6 +256,9 @@ class History:
     # --- what is seen -----------------------------------------------------------------------------
 
     def _watch_line(self) -> None:
+        if self._rig.link.passes and self._rig.link.noise and self._far.listening:
+            self._watch_noise()
+            return
         if self._rig.link.whole and self._far.listening:
             if self._whole_since is None:
                 self._whole_since = self.now
@@ -266,6 +277,15 @@ class History:
             self.lose(TAKEN_BACK)
         # nobody can stop it now
         self._no_run_from = max(self._no_run_from, self.now + TAKEN_BACK)
+
+    def _watch_noise(self) -> None:
+        """Ask nothing to be prompt while answers are spoiled by chance; but all to be done."""
+        if self._broken_since is not None:
+            back = FOUND if not self._ours else TAKEN_BACK
+            self._no_run_from = max(self._no_run_from, self.now + back + NOISY)
+        self._whole_since = self._broken_since = self._stop_due = None
+        for command in self._commands:
+            command.undisturbed = False
 
     def _watch_conditions(self) -> None:
         conditions = tuple(self._present_conditions())

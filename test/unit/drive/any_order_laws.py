@@ -21,6 +21,7 @@ from it but what it publishes. What they are judged by is in ``any_order_history
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -59,22 +60,37 @@ class Broken(AssertionError):
     """A law is broken."""
 
 
+@dataclass
+class Compared:
+    """What was true and what was told, what of it differed, and when it was looked at last."""
+
+    truth: dict[str, Any]
+    told: dict[str, Any]
+    differing: list[str]
+    at: float = -math.inf
+
+
 class Laws(History):
     """Watches a rig; raises :class:`Broken` as soon as a law is."""
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
-        rig.looked, rig.wrote = self.look, self._wrote
+        rig.looked, rig.wrote, rig.changed = self.look, self._wrote, self._answered
+        self._control_modes = rig.far.memory.model['control.mode'].labels
         self._truth: dict[str, tuple[Any, float]] = {}
-        #: When what is told of a fact was right last.
+        self._seen: dict[str, Any] = {}
+        #: When what is told of a fact was right last, if it is wrong now.
         self._agreed_at: dict[str, float] = {}
+        self._compared = Compared({}, {}, [])
         self._last: Snapshot | None = None
         self._last_told: dict[str, Any] = {}
 
     def killed(self) -> None:
         super().killed()
         self._truth.clear()
+        self._seen = {}
         self._agreed_at.clear()
+        self._compared = Compared({}, {}, [])
 
     # --- the laws ---------------------------------------------------------------------------------
 
@@ -166,6 +182,10 @@ class Laws(History):
             elif self.now > command.at + LONGEST_COMMAND:
                 raise Broken(f'{command.name} is never answered')
 
+    def _answered(self) -> bool:
+        """Tell whether a command has been answered that nobody has judged yet."""
+        return any(command.future.done() for command in self._commands)
+
     def _judge_answer(self, command: Command) -> None:
         error = command.future.exception()
         if error is not None and type(error).__name__ != 'DriveError':
@@ -247,7 +267,8 @@ class Laws(History):
             truth['run input missing'] = not far.runner.run_input
             truth['sleeping'] = bool(far.runner._sleeping)
         else:
-            truth['control mode'] = str(far.peek('control.mode'))
+            code = far.memory.raw('control.mode')
+            truth['control mode'] = self._control_modes[code]
         return truth
 
     @staticmethod
@@ -270,9 +291,11 @@ class Laws(History):
 
     def _judge_status(self) -> None:
         truth = self._facts()
-        for name, value in truth.items():
-            if name not in self._truth or self._truth[name][0] != value:
-                self._truth[name] = value, self.now
+        if truth != self._seen:
+            self._seen = truth
+            for name, value in truth.items():
+                if name not in self._truth or self._truth[name][0] != value:
+                    self._truth[name] = value, self.now
         snapshot = self._rig.notes.snapshot
         if not self.watched or snapshot is None:
             return
@@ -281,20 +304,29 @@ class Laws(History):
             return
         if snapshot is not self._last:
             self._last, self._last_told = snapshot, self._told(snapshot)
-        told = self._last_told
         known_since = max(self.settled_since, self._active_at)
-        for name, (value, since) in self._truth.items():
+        for name in self._differing(truth, self._last_told):
+            value, since = self._truth[name]
             patience = self.noticed + (CONTROL_MODE_PERIOD if name == 'control mode' else 0.0)
-            if _agree(told[name], value):
-                self._agreed_at[name] = self.now
-                continue
             agreed_at = self._agreed_at.get(name, known_since)
             if self.now - max(since, known_since, agreed_at) > patience:
-                raise Broken(f'{name} is told as {told[name]}, and it is {value}')
+                raise Broken(f'{name} is told as {self._last_told[name]}, and it is {value}')
         running, since = self._truth['running']
         long_since = self.now - max(since, known_since) > self.noticed
         if snapshot.enabled and not running and long_since:
             raise Broken('it is told as enabled, and it does not run')
+
+    def _differing(self, truth: dict[str, Any], told: dict[str, Any]) -> list[str]:
+        """Return what is told otherwise than it is; note until when the rest was told right."""
+        before = self._compared
+        if before.truth != truth or before.told is not told:
+            for name in before.truth:
+                if name not in before.differing:
+                    self._agreed_at[name] = before.at
+            differing = [name for name, value in truth.items() if not _agree(told[name], value)]
+            self._compared = before = Compared(truth, told, differing)
+        before.at = self.now
+        return before.differing
 
     def _judge_connected(self, snapshot: Snapshot) -> None:
         if self._broken_since is not None and snapshot.connected:

@@ -27,6 +27,8 @@ from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
+import functools
+from random import Random
 import struct
 import sys
 import time
@@ -66,6 +68,12 @@ _LATEST = RESPONSE_TIMEOUT
 _SLICE = 0.02
 #: How often a program sends its set-point, s.
 _SENDING_PERIOD = 0.1
+
+
+@functools.lru_cache(maxsize=4096)
+def _framed(request: bytes) -> str:
+    """Return the frame of a request; most are sent again and again."""
+    return (request + crc(request).to_bytes(2, 'little')).hex()
 
 
 class Clock:
@@ -132,6 +140,8 @@ class DirectLink:
         any more; ``gone``: the port is.
     :ivar losses: how many answers are still lost although the line is whole.
     :ivar unheard: how many requests are.
+    :ivar noise: the share of the answers that are damaged or lost, by chance.
+    :ivar doubled: how many answers come twice yet: each spoils the next.
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
@@ -140,19 +150,32 @@ class DirectLink:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self.state = 'whole'
-        self.losses = self.unheard = 0
+        self.losses = self.unheard = self.doubled = 0
+        self.noise = 0.0
+        self._random = Random(0)
         self.frames: list[dict[str, Any]] = []
         self.asked_at = rig.clock.now
         self._not_ready_until = 0.0
 
     @property
     def whole(self) -> bool:
-        return self.state == 'whole' and not self.losses and not self.unheard
+        return self.passes and not self.noise
+
+    @property
+    def passes(self) -> bool:
+        """Whether requests are carried out and answers come, but for some by chance."""
+        return self.state == 'whole' and not (self.losses or self.unheard or self.doubled)
+
+    def make_noise(self, share: float, seed: int) -> None:
+        """Damage or lose this share of the answers from now on."""
+        self.noise = share
+        self._random = Random(seed)
 
     def mend(self) -> None:
         """End all that is wrong with the line."""
         self.state = 'whole'
-        self.losses = self.unheard = 0
+        self.noise = 0.0
+        self.losses = self.unheard = self.doubled = 0
 
     def open(self) -> None:
         self._require_port()
@@ -190,6 +213,13 @@ class DirectLink:
         self._exchange(request, 8, carry_out)
         return Reply((), self._rig.clock.now)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NotReady):
+            self.read(unit, source)
+        return self.write(unit, address, words)
+
     def _require_port(self) -> None:
         if self.state == 'gone':
             raise PortError('the port is gone')
@@ -200,8 +230,7 @@ class DirectLink:
         rig = self._rig
         self._require_port()
         self.asked_at = rig.clock.now
-        frame = (request + crc(request).to_bytes(2, 'little')).hex()
-        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame})
+        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': _framed(request)})
         rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
         if self.unheard or self.state == 'silent' or not rig.far.listening:
             self.unheard -= self.unheard > 0
@@ -213,15 +242,27 @@ class DirectLink:
             words = carry_out(rig.far)
         except FarRefusal as error:
             words, length, refusal = (), 5, error
-        if not self.whole:
+        if not self.passes:
             self._lose_answer()
+        if self.noise and self._random.random() < self.noise:
+            self._spoil_answer()
         # the drive catches up when it is looked at next
         rig.clock.now += _TURNAROUND + length * _CHARACTER
         if refusal is not None:
             raise Refused(int(refusal.reason))
         return words
 
+    def _spoil_answer(self) -> None:
+        """Damage an answer or lose it, one as likely as the other."""
+        self._rig.elapse(RESPONSE_TIMEOUT)
+        if self._random.random() < 0.5:
+            raise DamagedAnswer('what came is no answer')
+        raise NoAnswer('nobody answers')
+
     def _lose_answer(self) -> None:
+        if self.doubled:
+            self.doubled -= 1
+            raise DamagedAnswer('an answer came twice')
         self.losses -= self.losses > 0
         self._rig.elapse(RESPONSE_TIMEOUT)
         if self.state == 'noise':
@@ -237,6 +278,7 @@ class Rig:
 
     :param far: the simulated drive.
     :ivar looked: called whenever something may have happened.
+    :ivar changed: whether something else has happened since that a look would judge.
     :ivar wrote: called with each write, register and words, before it is sent.
     """
 
@@ -245,9 +287,11 @@ class Rig:
         self._stack = contextlib.ExitStack()
         self._stack.enter_context(self.clock.in_driver())
         self.far = far
+        self.far.step = _SLICE
         self.far.advance_to(self.clock.now)
         self.settings = settings
         self.looked: Callable[[], None] = lambda: None
+        self.changed: Callable[[], bool] = lambda: True
         self.wrote: Callable[[int, Words], None] = lambda register, words: None
         self.link = DirectLink(self)
         self._broken: AssertionError | None = None
@@ -277,17 +321,26 @@ class Rig:
     def pass_time(self, seconds: float) -> None:
         """Let time pass for all."""
         end = self.clock.now + seconds
+        self.judge(self.looked)
         while self.clock.now < end:
             if self._sent is not None and self.clock.now >= self._send_at:
                 self._send_at = self.clock.now + _SENDING_PERIOD
                 self.drive.set_setpoint(self._sent)
                 self.gave(self._sent)
+            before = self._shown
             until = min(self.bus.step(), end, self.clock.now + _SLICE)
-            self.judge(self.looked)
+            if self._shown != before or self.changed():
+                self.judge(self.looked)
             if self._broken is not None:
                 raise self._broken
             if until > self.clock.now:
                 self.elapse(until - self.clock.now)
+
+    @property
+    def _shown(self) -> tuple[object, ...]:
+        """All that a step of the bus may change beside what :attr:`changed` tells."""
+        notes = self.notes
+        return self.clock.now, len(self.link.frames), id(notes.snapshot), len(notes.events)
 
     def gave(self, value: float) -> None:
         """Take note of a set-point that was given; whoever wants to know puts himself here."""

@@ -32,6 +32,7 @@ from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import watch as watch_module
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.simulator.variant import Variant
 
 
 @pytest.fixture
@@ -87,9 +88,13 @@ def make_virtual() -> Iterator[MakeVirtual]:
         while rigs:
             rigs.pop().close()
 
-    def make(parameters: dict[str, Any] | None = None, **settings: Any) -> VirtualRig:
+    def make(
+        parameters: dict[str, Any] | None = None,
+        variant: Variant | None = None,
+        **settings: Any,
+    ) -> VirtualRig:
         end()
-        rigs.append(VirtualRig(parameters, **settings))
+        rigs.append(VirtualRig(parameters, variant, **settings))
         return rigs[-1]
 
     yield make

@@ -29,6 +29,7 @@ from typing import Any
 
 import pytest
 from support import trace_laws
+from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
@@ -117,6 +118,13 @@ class Tap:
         self.before(address.numbers[0], words)
         return self._link.write(unit, address, words)
 
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, words: Words
+    ) -> Reply:
+        self.before(source.numbers[0], None)
+        self.before(address.numbers[0], words)
+        return self._link.read_then_write(unit, source, address, words)
+
 
 class Rig:
     """
@@ -136,6 +144,7 @@ class Rig:
     ) -> None:
         self._trace = trace
         options.setdefault('boot_time', 0.2)
+        options.setdefault('variant', hardest(settings.model))
         self.simulator = Simulator(
             baud=BAUD,
             trace=str(trace),

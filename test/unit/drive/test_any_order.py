@@ -35,6 +35,7 @@ from any_order_laws import Laws
 from any_order_rig import Rig
 from hypothesis import HealthCheck
 from hypothesis import Phase
+from hypothesis import seed
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine
@@ -43,6 +44,7 @@ from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
+from support.variants import hardest
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -55,8 +57,11 @@ SETPOINTS = st.sampled_from((20.0, -20.0, 0.0, 5.0, 50.0, 400.0, -1e5, 0.004))
 #: Faults of the motor, the mains, the serial line and the fieldbus; 15 wants no acknowledgement.
 FAULTS = st.sampled_from((5, 7, 12, 14, 15))
 
-#: How many histories each machine has in a campaign; 0: a normal run.
+#: How many histories a campaign has in all, 0: a normal run; and where they come from.
 HISTORIES = int(os.environ.get('HISTORIES', '0'))
+SEED = int(os.environ.get('SEED', '0'))
+#: So many go to a worker at a time.
+_SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
     max_examples=40,
@@ -68,10 +73,10 @@ NORMAL = settings(
     suppress_health_check=list(HealthCheck),
     print_blob=False,
 )
-#: Others each time; what breaks a law is shortened.
+#: What breaks a law is shortened.
 CAMPAIGN = settings(
     NORMAL,
-    max_examples=max(HISTORIES, 1),
+    max_examples=_SHARE,
     derandomize=False,
     phases=(Phase.generate, Phase.shrink),
 )
@@ -124,7 +129,7 @@ class AnyOrder(RuleBasedStateMachine):
         if restart_after is not None and not optimal:
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
-        far = SimulatedDrive(self.model, settings=parameters)
+        far = SimulatedDrive(self.model, settings=parameters, variant=hardest(self.model))
         self.rig = Rig(
             far,
             DriveSettings(
@@ -251,6 +256,34 @@ class AnyOrder(RuleBasedStateMachine):
         self.let(0.05)
         self._give('stop', wait)
         self.rig.answer(reading)
+
+    @_driven
+    @rule(
+        names=st.sampled_from(
+            (
+                ('enable', 'stop'),
+                ('stop', 'enable'),
+                ('stop', 'stop'),
+                ('enable', 'enable', 'stop'),
+                ('enable', 'quick_stop', 'enable'),
+                ('quick_stop', 'acknowledge'),
+                ('acknowledge', 'acknowledge'),
+                ('stop', 'deactivate'),
+            )
+        ),
+        begun=st.sampled_from(('', '', 'enable', 'acknowledge')),
+        after=st.sampled_from((0.0, 0.004, 0.02)),
+        wait=WAITS,
+    )
+    def at_once(
+        self, names: tuple[str, ...], begun: str = '', after: float = 0.0, wait: float = 0.4
+    ) -> None:
+        """Let two clients call at the same moment, perhaps while a third one is being served."""
+        if begun:
+            self._give(begun, after)
+        for name in names:
+            self.laws.command(name, getattr(self.rig.drive, name)())
+        self.let(wait)
 
     @_driven
     @rule(wait=WAITS)
@@ -490,6 +523,24 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.link.losses = losses
         self.let(wait)
 
+    @_whole
+    @rule(share=st.sampled_from((0.01, 0.03, 0.1)), seed=st.integers(0, 999), wait=WAITS)
+    def noise(self, share: float = 0.1, seed: int = 0, wait: float = 1.0) -> None:
+        """Damage or lose answers by chance, until the line is mended."""
+        self.rig.link.make_noise(share, seed)
+        self.let(wait)
+
+    @rule(
+        share=st.sampled_from((0.03, 0.1)),
+        seed=st.integers(0, 999),
+        give=st.sampled_from(('stop', 'quick_stop', 'deactivate', 'enable')),
+    )
+    def ride_in_noise(self, share: float, seed: int, give: str) -> None:
+        self.ride()
+        self.noise(share, seed, 2.5)
+        if self.laws.watched:
+            self._give(give, 1.0)
+
     @rule(seconds=st.sampled_from((0.05, 0.3, 2.0)), wait=WAITS)
     def hold_silent(self, seconds: float, wait: float = 1.0) -> None:
         self.rig.far.silence(seconds)
@@ -595,7 +646,17 @@ def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> N
         state.teardown()
 
 
-@pytest.mark.timeout(3600)
+@pytest.mark.skipif(HISTORIES > 0, reason='a campaign')
 @pytest.mark.parametrize('machine', MACHINES)
 def test_any_order(machine: type[AnyOrder]) -> None:
-    run_state_machine_as_test(machine, settings=CAMPAIGN if HISTORIES else NORMAL)
+    run_state_machine_as_test(machine, settings=NORMAL)
+
+
+@pytest.mark.skipif(not HISTORIES, reason='only in a campaign')
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize('part', range(-(-HISTORIES // _SHARE)))
+def test_campaign(part: int) -> None:
+    """Go through a share of the histories; each has a seed of its own, and a machine in turn."""
+    machine = MACHINES[part % len(MACHINES)]
+    seeded = seed(f'{SEED} {part}')(type(machine.__name__, (machine,), {}))
+    run_state_machine_as_test(seeded, settings=CAMPAIGN)

@@ -236,6 +236,7 @@ def test_optimal_is_enabled_again_after_its_keypad(make_rig: MakeRig, key: str) 
     turn(rig)
     rig.simulator.inject('keypad', key)
     wait_until(lambda: not rig.drive.armed)
+    wait_until(lambda: not rig.drive.stop_unconfirmed)
     assert rig.enable().startswith('enabled')
 
 

@@ -132,7 +132,7 @@ def test_scmd_800_erases_the_error_log(rig: Rig) -> None:
     rig.connect()
     with rig.simulator.lock:
         rig.far.trip(5)
-        rig.far.faults.acknowledge()
+        rig.far.read_raw('fieldbus.inv_st_with_ack')
     rig.drive.erase_error_log().result(PATIENCE)
     assert 0x800 in rig.writes(SCMD)
     assert rig.far.faults.log == []

@@ -389,6 +389,7 @@ def test_refused_set_point_does_not_end_the_ride_after_it(make_rig: MakeRig) -> 
     rig.far.write_raw = refuse  # type: ignore[method-assign]
     rig.drive.set_setpoint(30.0)
     wait_until(lambda: not rig.drive.armed)
+    rig.drive.stop().result(PATIENCE)
     assert rig.enable().startswith('enabled')
     rig.next_snapshots(2)
     assert rig.drive.armed

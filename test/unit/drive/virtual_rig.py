@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import Any
 
 import any_order_rig
+from support.variants import hardest
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
@@ -28,6 +29,7 @@ from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: What a drive takes to say that it is busy, s.
 _BUSY_TIME = 0.004
@@ -41,10 +43,16 @@ class VirtualRig(any_order_rig.Rig):
         raises is the answer.
     """
 
-    def __init__(self, parameters: dict[str, Any] | None = None, **settings: Any) -> None:
+    def __init__(
+        self,
+        parameters: dict[str, Any] | None = None,
+        variant: Variant | None = None,
+        **settings: Any,
+    ) -> None:
         parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
         settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
-        super().__init__(SimulatedDrive(settings=parameters), DriveSettings(**settings))
+        far = SimulatedDrive(settings=parameters, variant=variant or hardest())
+        super().__init__(far, DriveSettings(**settings))
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         read, write = self.link.read, self.link.write
 

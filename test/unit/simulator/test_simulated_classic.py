@@ -26,6 +26,7 @@ from classic_bench import select
 import pytest
 
 from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.simulator.variant import Variant
 
 BLOCKED, CHECK_SUM, STRUCTURE, TIMEOUT, PREFIX = 0x1, 0x4, 0x8, 0x10, 0x20
 NOT_PERMITTED, UNKNOWN, UNREADABLE, UNWRITABLE, OUT_OF_RANGE = 0x40, 0x80, 0x100, 0x200, 0x400
@@ -222,12 +223,64 @@ def test_a_refusal_has_its_reason(dialect, frame, flag):
     if frame == enquiry('E0240') and dialect == '5.0':
         assert bench.read('E0240') == 0
         return
+    if flag == OUT_OF_RANGE and dialect == '5.0' and frame != select('E0029', 0):
+        flag = NOT_PERMITTED
     assert bench.say(frame) == NAK
     assert bench.flags == flag
     assert bench.drive.inv_st == 24, 'nobody has control, so it is no fault'
     assert bench.read('E00AC') == flag
     assert bench.read('E00AC') == 0
     assert bench.drive.sio_err_reads == 2
+
+
+def test_older_firmware_changes_nothing_but_mode_before_the_bus_has_control():
+    bench = ClassicBench('5.0')
+    for frame in [select('E001D', 20), select('E001E', 0), select('E00AD', 0)]:
+        assert bench.say(frame) == NAK
+        assert bench.read('E00AC') == NOT_PERMITTED
+    assert bench.drive.inv_st == 24, 'nobody has control, so it is no fault'
+    assert not bench.drive.writes
+    for mode in (2, 1, 3):
+        assert bench.write('E0029', mode) == ACK
+    assert bench.write('E001D', 20) == ACK
+    assert bench.read('E001D') == 20
+    assert bench.write('E0029', 2) == ACK
+    assert bench.write('E001D', 30) == NAK
+    assert bench.read('E001D') == 20
+
+
+def test_newer_firmware_takes_settings_from_whoever_has_control():
+    bench = ClassicBench('2.03')
+    for mode in (1, 2, 3):
+        assert bench.write('E0029', mode) == ACK
+        assert bench.write('E001D', 20 + mode) == ACK
+
+
+@both
+def test_while_it_tunes_mode_and_every_command_but_stop_are_refused(dialect):
+    bench = ClassicBench(dialect)
+    bench.write('E0029', 3)
+    assert bench.write('E00AD', 0x201) == ACK
+    for id_, value in [('E0029', 1), ('E0029', 3), ('E00AD', RUN)]:
+        assert bench.write(id_, value) == NAK
+    assert bench.write('E001D', 20) == (NAK if dialect == '5.0' else ACK)
+    assert bench.flags == NOT_PERMITTED
+    assert bench.drive.inv_st == 28, 'no serial fault: the bus does not control the motor'
+    assert bench.write('E00AD', 0) == ACK
+    assert bench.drive.inv_st == 37
+
+
+@both
+def test_a_drive_that_refuses_a_stop_while_it_tunes(dialect):
+    bench = ClassicBench(dialect, variant=Variant(stop_in_tuning='refused'))
+    bench.write('E0029', 3)
+    bench.write('E00AD', 0x201)
+    assert bench.write('E00AD', 0) == NAK
+    assert bench.flags == NOT_PERMITTED
+    assert bench.drive.inv_st == 28
+    bench.drive.advance(10)
+    assert bench.write('E00AD', 0) == ACK
+    assert bench.drive.inv_st == 37
 
 
 def test_not_while_it_runs():
@@ -260,8 +313,9 @@ def test_a_damaged_message_to_another_is_not_its_business():
 # ---- faults ----
 
 
-def test_a_fault_blocks_every_select_and_no_enquiry():
-    bench = ClassicBench()
+@pytest.mark.parametrize('refused', ['all', 'scmd', 'nothing'])
+def test_a_fault_blocks_every_select_and_no_enquiry(refused):
+    bench = ClassicBench(variant=Variant(refuses_in_fault=refused))
     bench.run()
     bench.drive.trip(5)
     for frame in [select('E0029', 1), select('E0029', 3), select('E00AD', 0), select('E001D', 20)]:
@@ -280,6 +334,7 @@ def test_a_fault_blocks_every_select_and_no_enquiry():
     [
         (select('E001E', 2000), OUT_OF_RANGE),
         (enquiry('E0019'), UNKNOWN),
+        (select('E0019', 100), UNKNOWN),
         (select('E0008', 100), NOT_PERMITTED),
         (select('E0029', 3)[:-1] + b'\x00', CHECK_SUM),
         (b'\x04!E0029\x06', STRUCTURE),
@@ -302,6 +357,19 @@ def test_under_bus_control_it_is_a_serial_fault(dialect, frame, flag):
     assert bench.read('E00E9') == 24
     assert bench.read('E00AC') == 0
     bench.run()
+
+
+@pytest.mark.parametrize('frame', [enquiry, lambda id_: select(id_, 1)], ids=['read', 'write'])
+@pytest.mark.parametrize('id_', ['E007D', 'E0075', 'E00FA'])
+def test_what_older_firmware_does_not_know_is_a_serial_fault_too(id_, frame):
+    assert ClassicBench('2.03').read(id_) is not None
+    bench = ClassicBench('5.0')
+    bench.run()
+    bench.drive.advance(1)
+    assert bench.say(frame(id_)) == NAK
+    assert not bench.running
+    assert bench.read('E00E9') == SIO_FAIL
+    assert bench.read('E00AC') == UNKNOWN
 
 
 @pytest.mark.parametrize('frame', [select('E001E', 2000), enquiry('E0019'), select('E00E9', 0)])
@@ -404,6 +472,7 @@ def test_the_setpoint_is_that_of_the_control_mode(mode, id_, raw):
     assert bench.write(id_, 7) == ACK
     assert bench.read('E001E') == 7
     old = ClassicBench('5.0')
+    old.write('E0029', 3)
     old.write('E0030', mode)
     old.write('E001E', raw)
     assert old.read(id_) == raw & 0xFFFF
@@ -480,8 +549,9 @@ def test_a_parameter_that_came_later():
 
 
 def test_line_settings_of_older_firmware():
-    new, old = ClassicBench('2.03'), ClassicBench('5.0')
+    new, old = ClassicBench('2.03', lenient=True), ClassicBench('5.0', lenient=True)
     for id_, code, of_new, of_old in [
+        ('E0029', 3, ACK, ACK),
         ('E00A8', 256, ACK, NAK),
         ('E00A8', 64, ACK, ACK),
         ('E00AA', 4, ACK, NAK),
@@ -498,8 +568,9 @@ def test_line_settings_of_older_firmware():
 
 def test_the_answer_to_a_new_address_comes_from_the_old_one():
     bench = ClassicBench('5.0')
+    assert bench.write('E0029', 3) == ACK
     assert bench.write('E00A9', 9) == ACK
-    assert bench.read('E0029', 9) == 1
+    assert bench.read('E0029', 9) == 3
 
 
 def test_who_controls_an_older_drive():

@@ -20,10 +20,13 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import load_model
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.self_restart import TRIES
+from nfo_sinus_driver.simulator.variant import CHOICES
+from nfo_sinus_driver.simulator.variant import Variant
 
 MODEL = load_model('sinus_g2')
 FAULTS = [code for code in range(48) if MODEL.inv_st(code).kind is Kind.FAULT]
 SERIAL = {14, 15}
+KEEPS = Variant(run_command_in_fault='keeps')
 
 
 def acknowledge(bench):
@@ -48,7 +51,71 @@ def test_a_fault_stops_the_motor_and_shows(bench, code):
 
 
 @pytest.mark.parametrize('code', [code for code in FAULTS if code not in SERIAL])
-def test_an_acknowledged_fault_lets_the_standing_command_run_again(bench, code):
+def test_an_acknowledged_fault_drops_the_run_command(bench, code):
+    bench.run(20, 5)
+    bench.drive.trip(code)
+    bench.drive.advance(20)
+    assert acknowledge(bench) == code
+    bench.drive.advance(1)
+    assert not bench.running
+    assert bench.inv_st == 37
+    bench.scmd(0x101)
+    assert bench.running
+
+
+def test_a_run_command_that_is_given_in_a_fault_is_dropped_too(bench):
+    bench.mode(3)
+    bench.drive.trip(5)
+    bench.scmd(0x101)
+    bench.drive.advance(1)
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert not bench.running
+
+
+def test_the_run_command_is_dropped_with_the_last_fault(bench):
+    bench.run(20, 5)
+    bench.drive.trip(5)
+    bench.drive.trip(3, cause_present=True)
+    acknowledge(bench)
+    assert bench.drive.runner.scmd == 0x101
+    bench.drive.end_fault_causes()
+    acknowledge(bench)
+    assert not bench.running
+
+
+def test_the_acknowledging_read_drops_nothing_without_a_fault(bench):
+    bench.run(20, 5)
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert bench.running
+
+
+def test_a_run_of_the_keypad_is_dropped_too(bench):
+    bench.drive.press_start()
+    bench.drive.advance(1)
+    assert bench.running
+    bench.drive.trip(5)
+    bench.drive.advance(5)
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert not bench.running
+
+
+def test_reading_sio_err_drops_what_was_commanded_in_a_serial_fault(make_bench):
+    for variant, runs in [(Variant(), False), (KEEPS, True)]:
+        bench = make_bench(variant=variant)
+        bench.drive.trip(14)
+        bench.mode(3)
+        bench.scmd(0x101)
+        bench.drive.read_raw('fieldbus.sio_err')
+        bench.drive.advance(1)
+        assert bench.running == runs
+
+
+@pytest.mark.parametrize('code', [code for code in FAULTS if code not in SERIAL])
+def test_an_acknowledged_fault_lets_the_standing_command_run_again(make_bench, code):
+    bench = make_bench(variant=KEEPS)
     bench.run(20, 5)
     bench.drive.trip(code)
     bench.drive.advance(20)
@@ -58,7 +125,8 @@ def test_an_acknowledged_fault_lets_the_standing_command_run_again(bench, code):
     assert bench.inv_st == 39
 
 
-def test_the_start_delay_runs_again_after_a_fault(bench):
+def test_the_start_delay_runs_again_after_a_fault(make_bench):
+    bench = make_bench(variant=KEEPS)
     bench.write('control.run_dly', 3)
     bench.run(20, 10)
     bench.drive.trip(5)
@@ -69,7 +137,8 @@ def test_the_start_delay_runs_again_after_a_fault(bench):
     assert bench.running
 
 
-def test_a_stop_cannot_be_given_while_a_fault_stands(bench):
+def test_a_drive_that_refuses_every_write_while_a_fault_is_active(make_bench):
+    bench = make_bench(variant=Variant(refuses_in_fault='all'))
     bench.run(20, 5)
     bench.drive.trip(5)
     for key, value in [
@@ -84,14 +153,40 @@ def test_a_stop_cannot_be_given_while_a_fault_stands(bench):
     assert bench.read('status.frq_set') == 20
 
 
-def test_a_drive_that_takes_writes_in_spite_of_a_fault(bench):
-    bench.drive.runner.refuses_writes_when_faulted = False
+def test_a_drive_that_refuses_only_the_run_command_while_a_fault_is_active(make_bench):
+    bench = make_bench(variant=Variant(run_command_in_fault='keeps', refuses_in_fault='scmd'))
     bench.run(20, 5)
     bench.drive.trip(5)
-    bench.scmd(0)
+    for command in (0, 0x101):
+        with bench.refuses(Reason.STATE):
+            bench.scmd(command)
+    bench.write('status.frq_set', 0)
+    bench.write('control.accel', 5.0)
+    bench.mode(1)
+    assert bench.inv_st == 5
     acknowledge(bench)
     bench.drive.advance(1)
     assert not bench.running
+
+
+def test_a_drive_that_takes_every_write_in_spite_of_a_fault(make_bench):
+    bench = make_bench(variant=KEEPS)
+    bench.run(20, 5)
+    bench.drive.trip(5)
+    bench.write('status.frq_set', 0)
+    bench.scmd(0)
+    bench.mode(1)
+    bench.mode(3)
+    assert bench.inv_st == 5
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert not bench.running
+
+
+@pytest.mark.parametrize('name', CHOICES)
+def test_a_variant_that_there_is_not(name):
+    with pytest.raises(ValueError, match=f'{name}: choose one of'):
+        Variant(**{name: 'sometimes'})
 
 
 def test_a_fault_whose_cause_lasts_is_not_acknowledged(bench):
@@ -117,7 +212,8 @@ def test_reading_with_ack_is_counted_even_without_a_fault(bench):
     assert bench.drive.ack_reads == 1
 
 
-def test_sio_fail_is_acknowledged_by_mode_stop_alone(bench):
+def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):
+    bench = make_bench(variant=Variant(refuses_in_fault='all'))
     bench.run(20, 5)
     bench.drive.trip(14)
     bench.drive.advance(20)
@@ -340,6 +436,7 @@ def test_the_tries_are_used_up_unless_it_runs_well_for_a_while(bench):
     bench.drive.advance(100)
     assert bench.inv_st == 5, 'it has used its tries up'
     acknowledge(bench)
+    bench.scmd(0x101)
     bench.drive.advance(11)
     assert bench.running
     bench.drive.trip(5)

@@ -38,6 +38,8 @@ from optimal_bench import SWITCHED_ON
 from optimal_bench import OptimalBench
 import pytest
 
+from nfo_sinus_driver.simulator.variant import Variant
+
 CONTROL = 0x4000
 ENABLE = CONTROL | 0x0008
 ON = ENABLE | 0x0001
@@ -202,6 +204,26 @@ def test_the_run_command_stands_through_a_fault(optimal):
     optimal.wait(10)
     optimal.write(DRIVE_CONTROL, ON | 0x80)
     assert optimal.running
+
+
+def test_a_variant_drops_the_run_command_by_a_fault():
+    optimal = OptimalBench(variant=Variant(run_command_in_fault='drops'))
+    optimal.switch_on(5)
+    optimal.drive.trip(5)
+    optimal.wait(10)
+    optimal.write(DRIVE_CONTROL, ON | 0x80)
+    optimal.wait(1)
+    assert not optimal.running
+    assert optimal.bits & ENABLED
+    optimal.write(DRIVE_CONTROL, ENABLE)
+    optimal.write(DRIVE_CONTROL, ON)
+    optimal.wait(0.1)
+    assert optimal.running
+    optimal.drive.trip(5)
+    optimal.wait(10)
+    optimal.read(STATUS)
+    optimal.wait(1)
+    assert not optimal.running
 
 
 @pytest.mark.parametrize('mode', [MANUAL, AUTO])

@@ -20,6 +20,7 @@ import pytest
 from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.tuning import PROCEDURES
+from nfo_sinus_driver.simulator.variant import Variant
 
 
 def settings(bench):
@@ -85,6 +86,28 @@ def test_nothing_but_a_stop_is_taken_meanwhile(bench):
     assert bench.inv_st == 37
     bench.drive.advance(10)
     assert settings(bench) == before
+
+
+def test_a_drive_that_refuses_a_stop_until_it_is_over(make_bench):
+    bench = make_bench(variant=Variant(stop_in_tuning='refused'))
+    begin(bench)
+    with bench.refuses(Reason.STATE):
+        bench.scmd(Scmd.STOP)
+    assert bench.inv_st == 28
+    bench.drive.advance(10)
+    assert bench.inv_st == 45
+    bench.scmd(Scmd.STOP)
+    assert bench.inv_st == 37
+
+
+def test_a_tuning_that_is_asked_for_in_a_fault_leads_to_nothing(bench):
+    bench.mode(3)
+    bench.drive.trip(5)
+    bench.scmd(Scmd.FULL_TUNING)
+    assert bench.read('fieldbus.mode') == 3
+    bench.read('fieldbus.inv_st_with_ack')
+    bench.drive.advance(1)
+    assert bench.inv_st == 37
 
 
 @pytest.mark.parametrize('what', ['run', 'keypad', 'fault', 'power'])

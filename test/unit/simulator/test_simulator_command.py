@@ -114,6 +114,36 @@ def test_without_link_it_names_the_device(start, capsys, open_master):
     assert status == 0
 
 
+def test_what_the_manuals_leave_open_is_chosen_by_options(start, link, capsys, open_master):
+    start(
+        *('--link', link, '--run-command-in-fault', 'keeps', '--refuses-in-fault', 'scmd'),
+        *('--stop-in-tuning', 'refused'),
+    )
+    master = open_master(link)
+
+    def scmd(code):
+        answer = master.ask(1, bytes.fromhex('060298') + code.to_bytes(2, 'big'), 8, timeout=0.3)
+        return answer[1] == 0x06 or answer[2]
+
+    def driven():
+        _, out, _ = inject(capsys, '--link', link, 'state')
+        return json.loads(out)['1']['driven']
+
+    master.ask(1, bytes.fromhex('0602940003'), 8)
+    assert scmd(0x101) is True
+    assert driven()
+    inject(capsys, '--link', link, 'fault', '5')
+    assert not driven()
+    assert scmd(0) == 4, 'SCMD is refused in a fault'
+    master.ask(1, bytes.fromhex('0302A40001'), 7)
+    assert driven(), 'the run command is kept'
+    assert scmd(0) is True
+    inject(capsys, '--link', link, 'power-cycle', '0')
+    master.ask(1, bytes.fromhex('0602940003'), 8)
+    assert scmd(0x201) is True
+    assert scmd(0) == 4, 'a tuning goes on to its end'
+
+
 def test_inject(start, link, capsys):
     start('--link', link, '--address', '1', '--address', '2')
 

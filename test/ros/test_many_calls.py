@@ -1,0 +1,60 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Many calls at once are all answered, and the motor stops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bench import PATIENCE
+from bench import Bench
+from bench import wait_until
+import pytest
+from rclpy.qos import QoSProfile
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+
+#: The answers must not be lost where they arrive, either.
+_QUALITY = QoSProfile(depth=1000)
+
+
+@pytest.mark.parametrize(
+    ('service', 'request_', 'calls'),
+    [
+        ('/nfo_sinus/stop', Trigger.Request(), 500),
+        ('/nfo_sinus/quick_stop', Trigger.Request(), 100),
+        ('/nfo_sinus/enable', SetBool.Request(data=False), 100),
+        ('/nfo_sinus/fault_ack', Trigger.Request(), 100),
+        ('/nfo_sinus_bus/stop_all', Trigger.Request(), 100),
+    ],
+    ids=['stop', 'quick_stop', 'enable_false', 'fault_ack', 'stop_all'],
+)
+def test_many_calls_at_once_are_all_answered(
+    bench: Bench, service: str, request_: Any, calls: int
+) -> None:
+    drive = bench.simulator(
+        '--set', 'control.accel=1', '--set', 'control.retard=1', paced=False
+    )
+    bench.driver()
+    client = bench.client().connected()
+    type_ = SetBool if isinstance(request_, SetBool.Request) else Trigger
+    many = client.node.create_client(type_, service, qos_profile=_QUALITY)
+    wait_until(many.service_is_ready, 'there is a service')
+    with client.run_at(20.0):
+        answers = [many.call_async(request_) for _ in range(calls)]
+        wait_until(lambda: all(answer.done() for answer in answers), 'all are answered')
+    assert all(answer.result().message for answer in answers)
+    if service.endswith('stop'):
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)

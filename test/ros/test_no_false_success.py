@@ -1,0 +1,166 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""No stop, transition or exit is a success while the motor has current and no stop is confirmed."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import Process
+from bench import wait_until
+from lifecycle_msgs.msg import Transition
+import pytest
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+from support.wire import Request
+from support.wire import understand
+from ways import needs
+
+from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import load_model
+
+_QUICK = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
+_REFUSING = ('--stop-in-tuning', 'refused')
+#: How a person, a manager of lifecycles or a script stops a drive.
+_WAYS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
+
+
+def _succeeds(client: Client, driver: Process, out: str) -> bool:
+    """Stop the drive one way; tell whether that is said to have succeeded."""
+    if out == 'deactivate':
+        return client.change_state(Transition.TRANSITION_DEACTIVATE)
+    if out == 'shutdown signal':
+        driver.signal(signal.SIGTERM)
+        return driver.wait() == 0
+    if out == 'disable':
+        return bool(client.enable(False).success)
+    return bool(client.call('/nfo_sinus_bus/stop_all' if out == 'stop_all' else out).success)
+
+
+@needs('states')
+@pytest.mark.parametrize('out', _WAYS)
+def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
+    bench: Bench, out: str
+) -> None:
+    drive = bench.simulator(*_REFUSING)
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0')
+    client = bench.client().connected()
+    client.call_async('tune_full', Trigger)
+    drive.wait_for(lambda state: state['inv_st'] == 28, timeout=PATIENCE)
+    success = _succeeds(client, driver, out)
+    tuning = drive.state()['inv_st'] == 28
+    # a machine that is slow enough sees the end of the tuning first
+    assert success != tuning, driver.text
+    if out == 'deactivate':
+        assert client.state() == ('inactive' if success else 'active')
+        drive.wait_for(lambda state: state['inv_st'] != 28, timeout=PATIENCE)
+        wait_until(
+            lambda: client.change_state(Transition.TRANSITION_DEACTIVATE)
+            or client.state() == 'inactive',
+            'it can be deactivated when the tuning is over',
+        )
+        assert client.change_state(Transition.TRANSITION_CLEANUP)
+
+
+def test_no_enable_survives_a_stop_that_was_asked_for_after_it(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK, paced=False)
+    bench.driver()
+    client = bench.client().connected()
+    with client.setpoints(20.0, period=0.01):
+        for _ in range(20):
+            enables = [client.call_async('enable', SetBool, data=True)]
+            drive.wait_for(lambda state: state['mode'] == 3, timeout=PATIENCE)
+            enables.append(client.call_async('enable', SetBool, data=True))
+            stop = client.call_async('stop', Trigger)
+            wait_until(stop.done, 'stop answers')
+            assert stop.result().success, stop.result().message
+            wait_until(lambda calls=enables: all(call.done() for call in calls), 'enable answers')
+            client.wait_for('status', lambda status: not status.enabled, 'it is not enabled')
+            stood = drive.state()['time']
+            state = drive.wait_for(
+                lambda state, at=stood: state['turning'] or state['time'] > at + 0.3,
+                timeout=PATIENCE,
+            )
+            assert not state['turning'] or state['scmd'] == 0
+
+
+def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK)
+    first = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        first.signal(signal.SIGKILL)
+        first.wait()
+    for late in (0.0, 0.05, 0.15):
+        assert drive.state()['turning']
+        asked = len(bench.frames())
+        if late:
+            drive.inject('delay', 3, late)
+        second = bench.driver()
+        wait_until(lambda before=asked: len(bench.frames()) > before, 'the first request')
+        second.signal(signal.SIGTERM)
+        status = second.wait()
+        state = drive.state()
+        assert state['scmd'] == 0 or status != 0, second.text
+        assert status == 0, second.text
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+        _run_by_another(bench)
+
+
+def _run_by_another(bench: Bench) -> None:
+    """Let a driver run the motor, and die."""
+    driver = bench.driver()
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGKILL)
+        driver.wait()
+
+
+@needs('states')
+def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator(*_QUICK, '--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {drives: [good, silent]}}\n'
+        'good: {ros__parameters: {address: 1, setpoint_timeout: 0.0}}\n'
+        'silent: {ros__parameters: {address: 2}}\n'
+    )
+    bench.driver('--params-file', str(parameters))
+    good, silent = bench.client('/good').connected(), bench.client('/silent').connected()
+    with good.run_at(20.0):
+        drive.inject('silence', 3600.0, address=2)
+        calls = []
+        for _ in range(60):
+            calls.append(silent.call_async('enable', SetBool, data=False))
+            time.sleep(0.02)
+        asked = len(bench.frames())
+        assert good.call('stop').success
+        wait_until(lambda: all(call.done() for call in calls), 'everybody is answered')
+        assert not any(call.result().success for call in calls)
+    requests = [frame for frame in bench.frames()[asked:] if frame['direction'] == 'request']
+    asked_of = [understand(bytes.fromhex(frame['hex']), bench.way.protocol) for frame in requests]
+    place = load_model(bench.way.model)['fieldbus.scmd'].place(bench.way.bus).address
+    stop = asked_of.index(Request(1, place, 1, (Scmd.STOP,)))
+    waits = [request for request in asked_of[:stop] if request and request.unit == 2]
+    # each of them keeps the line for a time-out: one on its way, one while the call came in
+    assert len(waits) <= 2, asked_of[: stop + 1]
+    assert drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE, address=1)

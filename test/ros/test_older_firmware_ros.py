@@ -1,0 +1,93 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A drive of the v5.0 dialect of Classic takes settings under bus control alone [C100]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import wait_until
+from parameter_bench import refused
+from parameter_bench import set_one
+import pytest
+from ways import WAYS
+
+from nfo_sinus_driver.node.domain import own_domain
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+_STOP = 1
+_QUICK = ('--set', 'control.accel=0.3', '--set', 'control.retard=0.3', '--boot-time', '0.5')
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with own_domain() as domain, Bench(domain, tmp_path, WAYS['classic_v5']) as bench:
+        yield bench
+
+
+def _untouched(drive: Simulated) -> None:
+    """Control was given back, nothing turned, and the drive has nothing to complain of."""
+    state = drive.wait_for(lambda state: state['mode'] == _STOP, timeout=PATIENCE)
+    assert not (state['driven'] or state['turning'] or state['scmd'] or state['setpoint'])
+    assert (state['fault'], state['sio_err'], state['mode_ext_writes']) == (0, 0, 0)
+
+
+def test_settings_are_written_and_control_is_given_back(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK, paced=False)
+    bench.driver('-p', 'drive_timeout:=4.0', '-p', 'freque.f_fix2:=21.5')
+    client: Client = bench.client().connected()
+    state = drive.state()
+    assert state['parameters']['serial.sio_tot'] == 4.0
+    assert state['parameters']['serial.auto_stop'] is True
+    wait_until(lambda: client.parameter('freque.f_fix2') == 21.5, 'what was given to the node')
+    _untouched(drive)
+    assert set_one(client, 'freque.f_fix1', 12.5).successful
+    assert drive.state()['parameters']['freque.f_fix1'] == 12.5
+    assert client.set_parameters(drive_timeout=5.0).successful
+    assert drive.state()['parameters']['serial.sio_tot'] == 5.0
+    _untouched(drive)
+    writes = sum(drive.state()['command_writes'].values())
+    assert set_one(client, 'freque.f_fix1', 12.5).successful
+    assert sum(drive.state()['command_writes'].values()) == writes, 'it has it already'
+
+
+def test_settings_are_written_while_the_motor_turns_by_the_bus(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK, paced=False)
+    bench.driver()
+    client: Client = bench.client().connected()
+    with client.run_at(10.0):
+        assert set_one(client, 'freque.f_fix1', 12.5).successful
+        assert drive.state()['driven']
+        assert client.latest('status').enabled
+    assert drive.state()['parameters']['freque.f_fix1'] == 12.5
+
+
+def test_whoever_else_has_control_keeps_it(bench: Bench) -> None:
+    drive = bench.simulator(*_QUICK, '--no-run-input', paced=False)
+    bench.driver()
+    client: Client = bench.client().connected()
+    drive.inject('keypad', 'ext')
+    refused(set_one(client, 'freque.f_fix1', 12.5), 'freque.f_fix1', 'press STOP at the drive')
+    drive.inject('run', True)
+    drive.wait_for(lambda state: state['driven'], timeout=PATIENCE)
+    refused(set_one(client, 'freque.f_fix1', 12.5), 'freque.f_fix1', 'the motor runs')
+    state = drive.state()
+    assert state['driven']
+    assert (state['source'], state['fault']) == ('ext', 0)
+    assert not state['writes']

@@ -1,0 +1,28 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated drive that makes it hardest for the driver, where the manuals leave it open."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.simulator.variant import Variant
+
+_HARDEST = {
+    'sinus_g2': Variant(run_command_in_fault='keeps', refuses_in_fault='all'),
+}
+
+
+def hardest(model: str = 'sinus_g2') -> Variant | None:
+    """Return it for a drive family; ``None`` where it is as drives of this family are anyway."""
+    return _HARDEST.get(model)

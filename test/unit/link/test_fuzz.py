@@ -1,0 +1,103 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A short fuzz campaign in every run; ``make fuzz`` is the long one."""
+
+from __future__ import annotations
+
+from fuzz import campaign
+from fuzz import decoders
+from fuzz import judges
+from fuzz.campaign import CASE
+from fuzz.campaign import CASES
+from fuzz.campaign import Part
+import pytest
+
+from nfo_sinus_driver.link import classic
+from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link import rtu
+
+#: Fixed, so that every run goes through the same.
+SEED = 11
+FRAMES = 22_000
+
+
+def test_no_decoder_lets_anything_but_typed_errors_out_or_takes_what_is_damaged() -> None:
+    findings = campaign.run(Part(SEED, 0, FRAMES // CASE))
+    assert not findings, f'--seed {SEED} --only {findings[0].frame}\n{findings[0].what}'
+
+
+# --- what the judges would notice: each decoder with one mistake ----------------------------------
+
+
+def _find(decoder: str) -> list[campaign.Finding]:
+    count = len(CASES)
+    first = list(CASES).index(decoder)
+    return [
+        finding
+        for case in range(first, 20 * count, count)
+        for finding in campaign.run(Part(SEED, case, case + 1))
+    ]
+
+
+def test_a_check_sum_that_nobody_checks_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rtu, 'crc', lambda data: judges.seal_rtu(data)[-2:])
+    assert not _find('rtu')
+    monkeypatch.setattr(rtu, 'crc', lambda data: AnyBytes())
+    assert 'from a damaged frame' in _find('rtu')[0].what
+    monkeypatch.setattr(modbus_ascii, 'lrc', lambda data: AnyBytes())
+    findings = _find('ascii')
+    assert 'from a damaged frame' in findings[0].what
+    # and can be gone through again
+    case = findings[0].frame // CASE
+    assert campaign.run(Part(SEED, case, case + 1)) == findings[:1]
+
+
+class AnyBytes:
+    """Equal to everything."""
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def test_a_wrong_block_check_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(classic, 'check_sum', lambda body: AnyBytes())
+    assert 'not among the bytes' in _find('classic')[0].what
+
+
+def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def understand(request: modbus_pdu.Request[object], message: bytes) -> object:
+        return request.decode(message) if message.startswith(request.answer_head) else None
+
+    monkeypatch.setattr(decoders.modbus_pdu, 'understand', understand)
+    assert _find('pdu')
+
+
+def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    feed = classic.Reader.feed
+    monkeypatch.setattr(classic.Reader, 'feed', lambda self, data: feed(self, data)[:1])
+    assert 'was not found' in _find('classic')[0].what
+
+
+def test_memory_that_grows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept: list[object] = []
+
+    def case(random: object, frames: int) -> None:
+        kept.extend([] for _ in range(frames))
+
+    monkeypatch.setitem(CASES, 'pdu', case)
+    assert 'memory has grown' in campaign.run(Part(SEED, 0, 20 * len(CASES)))[0].what
