@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from bench import PATIENCE
 from bench import Bench
 from bench import wait_until
 import pytest
@@ -105,4 +106,4 @@ def test_a_stop_for_all_where_it_may_be(bench: Bench, watched: bool) -> None:
     else:
         assert 'a stop for all was broadcast' in answer.message
         # it is MODE = Stop, which takes control, too
-        simulator.wait_for(lambda state: state['mode'] == Mode.STOP, address=1)
+        simulator.wait_for(lambda state: state['mode'] == Mode.STOP, timeout=PATIENCE, address=1)

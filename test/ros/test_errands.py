@@ -20,6 +20,7 @@ from __future__ import annotations
 import signal
 
 from action_msgs.msg import GoalStatus
+from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import seconds
@@ -179,7 +180,7 @@ def test_the_action_is_cancelled(bench: Bench) -> None:
     simulator, client = start(bench)
     tuner = Tuner(client)
     handle = tuner.begin(Tune.Goal.FULL)
-    simulator.wait_for(lambda state: state['inv_st'] == _TUNING)
+    simulator.wait_for(lambda state: state['inv_st'] == _TUNING, timeout=PATIENCE)
     tuner.cancel(handle)
     status, result = tuner.result(handle)
     assert status == GoalStatus.STATUS_CANCELED
@@ -206,7 +207,7 @@ def test_ctrl_c_ends_a_tuning(bench: Bench) -> None:
     driver = bench.driver()
     client = bench.client().connected()
     future = client.call_async('tune_full', Trigger)
-    simulator.wait_for(lambda state: state['inv_st'] == _TUNING)
+    simulator.wait_for(lambda state: state['inv_st'] == _TUNING, timeout=PATIENCE)
     driver.signal(signal.SIGINT)
     assert driver.wait() == 0
     state = simulator.state()

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from action_msgs.msg import GoalStatus
+from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import seconds
@@ -118,7 +119,7 @@ def test_the_action_is_cancelled(rig: Rig) -> None:
         pytest.skip('it does not tune')
     tuner = Tuner(rig.client)
     handle = tuner.begin(Tune.Goal.FULL)
-    rig.drive.wait_for(lambda state: state['inv_st'] == _TUNING)
+    rig.drive.wait_for(lambda state: state['inv_st'] == _TUNING, timeout=PATIENCE)
     tuner.cancel(handle)
     status, result = tuner.result(handle)
     assert status == GoalStatus.STATUS_CANCELED

@@ -20,6 +20,7 @@ from collections.abc import Iterator
 import itertools
 import math
 
+from bench import PATIENCE
 from bench import TOPICS
 from bench import Bench
 from bench import Client
@@ -193,7 +194,7 @@ def test_diagnostics_of_a_ride_name_its_fault_and_cry_over_no_stop_that_goes_wel
 
     with client.run_at(20.0):
         assert client.call('stop').success
-    drive.wait_for(lambda state: not state['turning'])
+    drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
     with client.run_at(20.0):
         drive.inject('fault', 8)
         # at once, and with the second that follows

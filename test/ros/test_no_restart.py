@@ -202,7 +202,9 @@ def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
     client.publish(20.0)
     assert client.enable().success
     began = drive.state()['time']
-    state = drive.wait_for(lambda state: state['turning'] or state['time'] > began + A_WHILE)
+    state = drive.wait_for(
+        lambda state: state['turning'] or state['time'] > began + A_WHILE, timeout=PATIENCE
+    )
     assert not state['turning']
     status = client.latest('status')
     assert status.enabled
@@ -212,7 +214,7 @@ def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
 def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> None:
     drive = bench.simulator(*_QUICK)
     drive.inject('keypad', 'ext')
-    running = drive.wait_for(lambda state: state['driven'])
+    running = drive.wait_for(lambda state: state['driven'], timeout=PATIENCE)
     driver = bench.driver()
     client = bench.client().connected()
     assert client.call('stop').message.startswith('the bus has no control of this drive')

@@ -285,7 +285,6 @@ def test_a_stop_goes_before_all_that_is_being_set_on_a_silent_drive(
         started = time.monotonic()
         stop = client.call_async('stop', Trigger)
         wait_until(lambda: _STOP in wire.writes(), 'a request to stop')
-        assert time.monotonic() - started < 1.0
         wait_until(stop.done, 'the stop answers')
         assert time.monotonic() - started < _SOON
     wait_until(setting.done, 'an answer')
