@@ -31,6 +31,13 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')
 
 
+def _hardest(bench: Bench) -> tuple[str, ...]:
+    """Have a G2 keep its run command through a fault and take nothing meanwhile [C98]."""
+    if bench.way.model != 'sinus_g2':
+        return _QUICK
+    return (*_QUICK, '--run-command-in-fault', 'keeps', '--refuses-in-fault', 'all')
+
+
 def _stays_still(drive: Simulated) -> None:
     """Watch the simulated motor for a while of its own time."""
     # what still coasts may be caught and ramped down first
@@ -138,7 +145,7 @@ def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
     ids=lambda event: event.__name__.strip('_'),
 )
 def test_nothing_turns_again_until_enable(bench: Bench, event) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*_hardest(bench))
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -149,7 +156,7 @@ def test_nothing_turns_again_until_enable(bench: Bench, event) -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL], ids=lambda n: n.name)
 def test_a_restarted_driver_lets_nothing_turn(bench: Bench, number: int) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*_hardest(bench))
     driver: Process = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -165,7 +172,7 @@ def test_a_restarted_driver_lets_nothing_turn(bench: Bench, number: int) -> None
 
 
 def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK, '--no-run-input')
+    drive = bench.simulator(*_hardest(bench), '--no-run-input')
     bench.driver()
     client = bench.client().connected()
     with client.setpoints(20.0):
@@ -178,7 +185,7 @@ def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None
 
 
 def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*_hardest(bench))
     bench.driver()
     client = bench.client().connected()
     client.publish(20.0)
@@ -192,7 +199,7 @@ def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
 
 
 def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*_hardest(bench))
     drive.inject('keypad', 'ext')
     running = drive.wait_for(lambda state: state['driven'])
     driver = bench.driver()
