@@ -16,11 +16,16 @@
 
 # Only these plugins: a machine's own (launch_testing, coverage) have no say in our tests.
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD = 1
-PYTEST = -m pytest -p xdist -p timeout -p hypothesispytest
+# They steal work from each other: the long tests would come last and alone.
+PYTEST = -m pytest -p xdist -p timeout -p hypothesispytest --dist worksteal
 
 # Unit tests see nothing of ROS, even in a shell where it is sourced.
 WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PATH \
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
+
+# The frames of the simulator come from pymodbus, and those of the driver are compared with it.
+USES_PYMODBUS = $(shell grep -lE 'pymodbus|virtual_wire|simulator\.(line|modbus|simulator)' \
+	test/unit/link/test_*.py test/unit/simulator/test_*.py)
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench parameters build clean
@@ -52,15 +57,16 @@ types: setup ## mypy, on all that is not ROS
 	@.venv/bin/mypy
 
 # More workers than processors: these tests wait more than they work.
-unit: setup ## tests without ROS, with the current and with the oldest pymodbus
+unit: setup ## tests without ROS, with the current and with the oldest pymodbus (FULL=1: all there is)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 4 --dist worksteal test/unit
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 test/unit
 	@echo '== unit again, what uses pymodbus: the current one'
-	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 4 test/unit/link test/unit/simulator
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 6 $(if $(FULL), \
+		test/unit/link test/unit/simulator, $(USES_PYMODBUS))
 
 ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
-	@tools/run python $(PYTEST) -n 3 $(if $(WAY),--way $(WAY)) test/ros
+	@tools/run python $(PYTEST) -n 4 $(if $(WAY),--way $(WAY)) test/ros
 
 mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
 	@tools/run python test/mutants/run.py

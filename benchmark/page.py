@@ -30,8 +30,16 @@ from measurements import Measurement
 
 _ROOT = Path(__file__).resolve().parents[1]
 PAGE = _ROOT / 'docs' / 'performance.md'
-_BEGIN = '<!-- benchmark: from here to the end mark written by benchmark/run.py --write -->'
-_END = '<!-- benchmark: end -->'
+#: Where a table begins and ends.
+Marks = tuple[str, str]
+SPEED: Marks = (
+    '<!-- benchmark: from here to the end mark written by benchmark/run.py --write -->',
+    '<!-- benchmark: end -->',
+)
+NOISE: Marks = (
+    '<!-- noise: from here to the end mark written by benchmark/noise.py --write -->',
+    '<!-- noise: end -->',
+)
 
 #: Title and figure of each column, and how many decimals.
 _CYCLES = (
@@ -122,17 +130,18 @@ def circumstances(command: str, runs: int, loads: Sequence[float]) -> str:
     )
 
 
-def write(text: str) -> None:
+def write(text: str, marks: Marks = SPEED) -> None:
     """
-    Put what was measured on the page.
+    Put what was measured on the page, between two marks.
 
     :raises ValueError: the page has no place for it.
     """
-    before, begin, rest = PAGE.read_text().partition(_BEGIN)
-    _, end, after = rest.partition(_END)
+    first, last = marks
+    before, begin, rest = PAGE.read_text().partition(first)
+    _, end, after = rest.partition(last)
     if not begin or not end:
-        raise ValueError(f'{PAGE.name} has lost its marks: {_BEGIN} and {_END}')
-    PAGE.write_text(f'{before}{_BEGIN}\n\n{text}\n\n{_END}{after}')
+        raise ValueError(f'{PAGE.name} has lost its marks: {first} and {last}')
+    PAGE.write_text(f'{before}{begin}\n\n{text}\n\n{end}{after}')
 
 
 def _of(runs: int) -> str:

@@ -139,6 +139,10 @@ class Rig(contextlib.ExitStack):
         """Return all that the line has carried."""
         return trace_file.frames_of(self._trace)
 
+    def requests(self) -> list[float]:
+        """Return when each request began on the line, be it as noisy as it may."""
+        return trace_file.requests_of(self._trace)
+
     def wait_for(self, condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
         """
         Wait for what a process should bring about.

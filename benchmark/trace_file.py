@@ -77,10 +77,18 @@ class Line:
 
 def frames_of(path: Path, start: float = 0.0, end: float = float('inf')) -> list[Frame]:
     """Return the frames whose first byte came between two moments."""
-    # the last line may not be whole yet
-    lines = path.read_text().split('\n')[:-1]
-    frames = [_frame(json.loads(line)) for line in lines]
+    frames = [_frame(entry) for entry in _entries(path)]
     return [frame for frame in frames if start <= frame.first < end]
+
+
+def requests_of(path: Path) -> list[float]:
+    """Return when the first byte of each request came, of those that were lost, too."""
+    return [entry['first'] for entry in _entries(path) if entry['direction'] == 'request']
+
+
+def _entries(path: Path) -> list[dict]:
+    # the last line may not be whole yet
+    return [json.loads(line) for line in path.read_text().split('\n')[:-1]]
 
 
 def _frame(entry: dict) -> Frame:

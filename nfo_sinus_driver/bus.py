@@ -410,7 +410,7 @@ class Bus:
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
-        self.silences.note(unit, started, now, error)
+        self.silences.note(unit, now, error)
         self._turns.took(now - started)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)

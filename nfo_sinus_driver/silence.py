@@ -16,60 +16,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
 
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
-#: One lost answer is noise, however long it was waited for.
-_FEWEST = 2
-
-
-@dataclass
-class _Unit:
-    """
-    What was heard of one unit.
-
-    :ivar heard_at: when its last valid frame came, s; a refusal is one, too.
-    :ivar asked_at: when the first request was sent that it has not answered since; infinity while
-        there is none, for a unit that is not asked is not silent.
-    :ivar unanswered: how many it has not.
-    """
-
-    heard_at: float = -math.inf
-    asked_at: float = math.inf
-    unanswered: int = 0
-
 
 class Silences:
-    """How long each unit has said nothing although it was asked; all times are of one clock."""
+    """
+    How long each unit has said nothing although it was asked; all times are of one clock, s.
+
+    Silence begins when the first answer has failed to come, however long it was waited for: a unit
+    that nobody asks is not silent, and one lost answer is no silence yet. Any valid frame ends it.
+    """
 
     def __init__(self) -> None:
-        self._units: dict[int, _Unit] = {}
+        self._heard_at: dict[int, float] = {}
+        self._since: dict[int, float] = {}
 
-    def note(self, unit: int, started: float, now: float, error: LinkError | None) -> None:
-        """Take note of how a transaction ended that was on the line from ``started`` to ``now``."""
-        heard = self._of(unit)
+    def note(self, unit: int, now: float, error: LinkError | None) -> None:
+        """Take note of how a request to a unit ended; a refusal is an answer, too."""
         if error is None or isinstance(error, Refused):
-            self._units[unit] = _Unit(now)
+            self._heard_at[unit] = now
+            self._since.pop(unit, None)
         elif not isinstance(error, PortError):
-            heard.asked_at = min(heard.asked_at, started)
-            heard.unanswered += 1
+            self._since.setdefault(unit, now)
 
     def is_silent(self, unit: int) -> bool:
         """Tell whether a unit has not answered the last request to it."""
-        return self._of(unit).unanswered > 0
+        return unit in self._since
 
     def heard_at(self, unit: int) -> float:
-        """Return when the last valid frame of a unit came, s."""
-        return self._of(unit).heard_at
+        """Return when the last valid frame of a unit came."""
+        return self._heard_at.get(unit, -math.inf)
 
     def lasts(self, unit: int, now: float) -> float:
-        """Return how long a unit has answered nothing, s; 0 until it was asked twice."""
-        heard = self._of(unit)
-        return now - heard.asked_at if heard.unanswered >= _FEWEST else 0.0
-
-    def _of(self, unit: int) -> _Unit:
-        return self._units.setdefault(unit, _Unit())
+        """Return for how long a unit has been silent; 0 if it answers."""
+        return now - self._since.get(unit, now)

@@ -456,7 +456,7 @@ class Motion:
 
         :raises DriveError: somebody has; who enables meanwhile may not know of it.
         """
-        if self.stopping:
+        if self.stopping or self._releasing:
             raise DriveError('a stop is on its way and not confirmed yet: wait for it, then enable')
 
     async def _settle(self) -> None:

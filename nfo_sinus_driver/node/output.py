@@ -19,6 +19,7 @@ from __future__ import annotations
 import os
 import threading
 
+_INPUT = 0
 _STREAMS = (1, 2)
 _CHUNK = 65536
 _LAST_WORDS = 1.0
@@ -26,9 +27,16 @@ _LAST_WORDS = 1.0
 
 def open_closed_streams() -> None:
     """Let what whoever started us has closed go nowhere, before another file gets its number."""
-    while (number := os.open(os.devnull, os.O_RDWR)) <= max(_STREAMS):
-        continue
-    os.close(number)
+    standard = (_INPUT, *_STREAMS)
+    with open(os.devnull, 'r+b', buffering=0) as nowhere:
+        # each gets the lowest number that is free, and the last is none of the standard ones
+        first = nowhere.fileno()
+        others = [os.dup(first) for _ in standard]
+    if first in standard:
+        os.dup2(others[-1], first)
+    for number in others:
+        if number not in standard:
+            os.close(number)
 
 
 class Output:
@@ -50,10 +58,9 @@ class Output:
         What is said from now on goes nowhere: the process has yet to end, ROS has yet more to log
         then, and the reader may still not read.
         """
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        for descriptor in _STREAMS:
-            os.dup2(nowhere, descriptor)
-        os.close(nowhere)
+        with open(os.devnull, 'wb', buffering=0) as nowhere:
+            for descriptor in _STREAMS:
+                os.dup2(nowhere.fileno(), descriptor)
         for thread in self._threads:
             thread.join(_LAST_WORDS)
 

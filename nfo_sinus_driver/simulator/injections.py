@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
 from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 
 #: Stands for an argument that must be given.
@@ -200,6 +201,16 @@ def _answers(what: str, help_text: str, *more: Argument) -> Verb:
     return Verb(help_text, act, (times, *more), to_drive=False)
 
 
+def _noise_rate(target: Target, given: dict[str, Any]) -> None:
+    target.line.faults.set_rate(
+        given['what'], given['share'], given['seed'], given['seconds']
+    )
+
+
+def _burst(target: Target, given: dict[str, Any]) -> None:
+    target.line.faults.set_bursts(given['seconds'], given['period'], target.now)
+
+
 _SECONDS = Argument('seconds', float, 'for how many seconds')
 
 VERBS: Mapping[str, Verb] = {
@@ -281,6 +292,26 @@ VERBS: Mapping[str, Verb] = {
     ),
     'drop': _answers('drop', 'lose the next answers; the requests are carried out'),
     'double': _answers('double', 'send the next answers twice'),
+    'noise-rate': Verb(
+        'spoil a share of all answers by chance, until heal',
+        _noise_rate,
+        (
+            Argument('what', str, ', '.join(ANSWER_FAULTS), choices=ANSWER_FAULTS),
+            Argument('share', float, 'of all answers, such as 0.03; 0 ends it'),
+            Argument('seed', int, 'a number, for the same answers in every run', None),
+            Argument('seconds', float, 'how late they come, for delay', 0.5),
+        ),
+        to_drive=False,
+    ),
+    'burst': Verb(
+        'let the line carry nothing for a while again and again, until heal',
+        _burst,
+        (
+            Argument('seconds', float, 'how long; 0 ends it'),
+            Argument('period', float, 'from one to the next (s)', 5.0),
+        ),
+        to_drive=False,
+    ),
     'heal': Verb(
         'end all faults of the line', lambda target, _: target.line.faults.heal(), to_drive=False
     ),

@@ -156,7 +156,7 @@ class Line:
 
     def _handle(self, arrived: Arrived) -> None:
         request = self.protocol.unwrap(arrived.data)
-        dead = arrived.last < self.faults.dead_until
+        dead = self.faults.dead(arrived.last)
         if self._trace is not None:
             rubbish = request is None or not request.whole
             note = 'lost' if dead else 'rubbish' if rubbish else ''
@@ -226,7 +226,7 @@ class Line:
         if not answer.sent:
             answer.began = stamp
         # the adapter hears itself on a dead line, too
-        dead = now < self.faults.dead_until and not answer.is_echo
+        dead = self.faults.dead(now) and not answer.is_echo
         if not dead:
             self.port.send(data[answer.sent : delivery.until])
         answer.sent = delivery.until

@@ -35,6 +35,28 @@ class _Pending:
 
 
 @dataclass(frozen=True)
+class _Rate:
+    """What happens to a share of all answers, by chance."""
+
+    what: str
+    share: float
+    seconds: float
+    chance: random.Random
+
+
+@dataclass(frozen=True)
+class _Bursts:
+    """Noise that drowns everything, again and again (s)."""
+
+    seconds: float
+    period: float
+    since: float
+
+    def struck(self, now: float) -> bool:
+        return (now - self.since) % self.period >= self.period - self.seconds
+
+
+@dataclass(frozen=True)
 class Reply:
     """An answer as it goes on the line: what, how much later than usual, what is wrong with it."""
 
@@ -45,7 +67,7 @@ class Reply:
 
 class LineFaults:
     """
-    The faults that wait for the next answers.
+    The faults that wait for the next answers, and those that come by chance or by the clock.
 
     :param bits: data bits of a character.
 
@@ -55,6 +77,8 @@ class LineFaults:
     def __init__(self, bits: int = 8, seed: int = 0) -> None:
         self._bits = bits
         self.dead_until = float('-inf')
+        self._bursts: _Bursts | None = None
+        self._rates: dict[str, _Rate] = {}
         self._pending: list[_Pending] = []
         self._random = random.Random(seed)
 
@@ -69,9 +93,42 @@ class LineFaults:
         """
         self._pending.append(_Pending(what, address, times, seconds))
 
+    def set_rate(
+        self, what: str, share: float, seed: int | None = None, seconds: float = 0.0
+    ) -> None:
+        """
+        Spoil answers by chance from now on, each on its own.
+
+        :param what: one of :data:`ANSWER_FAULTS`; one after the other, they add up.
+        :param share: of all answers, 0 to 1; 0 ends it.
+        :param seed: makes the same answers of a run suffer in every run; for ``None`` the line's.
+        :param seconds: how late the answers come, for ``delay``.
+        :raises ValueError: no share.
+        """
+        if not 0.0 <= share <= 1.0:
+            raise ValueError(f'a share of {share:g}: it is 0 to 1')
+        chance = self._random if seed is None else random.Random(seed)
+        self._rates[what] = _Rate(what, share, seconds, chance)
+
+    def set_bursts(self, seconds: float, period: float, now: float) -> None:
+        """
+        Let the line carry nothing for so long in every period, either way; first after one of them.
+
+        :raises ValueError: a burst that is longer than its period, or times below 0.
+        """
+        if not 0.0 <= seconds <= period:
+            raise ValueError(f'bursts of {seconds:g} s every {period:g} s: they would never end')
+        self._bursts = _Bursts(seconds, period, now) if seconds else None
+
+    def dead(self, now: float) -> bool:
+        """Whether the line carries nothing now."""
+        return now < self.dead_until or (self._bursts is not None and self._bursts.struck(now))
+
     def heal(self) -> None:
         """Forget them all."""
         self._pending.clear()
+        self._rates.clear()
+        self._bursts = None
         self.dead_until = float('-inf')
 
     def alter(self, address: int, frame: bytes, instead: Reply | None = None) -> list[Reply]:
@@ -88,9 +145,14 @@ class LineFaults:
                 ]
                 fault.left -= 1
         self._pending = [fault for fault in self._pending if fault.left > 0]
+        for rate in self._rates.values():
+            if rate.chance.random() < rate.share:
+                replies = [
+                    new for reply in replies for new in self._spoiled(rate, reply, instead)
+                ]
         return replies
 
-    def _spoiled(self, fault: _Pending, reply: Reply, instead: Reply | None) -> list[Reply]:
+    def _spoiled(self, fault: _Pending | _Rate, reply: Reply, instead: Reply | None) -> list[Reply]:
         if fault.what in _NOTES and instead is not None:
             delay = reply.delay + instead.delay
             return [replace(instead, delay=delay, note=_noted(reply, _NOTES[fault.what]))]

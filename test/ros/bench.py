@@ -85,7 +85,9 @@ def wait_until(
             return result
         for process in _watched:
             process.has_not_crashed(what)
-        assert time.monotonic() < deadline, f'not within {timeout:g} s: {what}'
+        assert time.monotonic() < deadline, (
+            f'not within {timeout:g} s: {what}; {"; ".join(map(_last_words, _watched))}'
+        )
         time.sleep(period)
 
 
@@ -158,6 +160,10 @@ class Process:
             self._process.kill()
             self._process.wait()
             raise
+
+
+def _last_words(driver: Process) -> str:
+    return f'the driver says at last:\n{driver.text[-2000:]}'
 
 
 #: The drivers at work: what a test waits for will not come when one of them has ended by itself.

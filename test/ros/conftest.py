@@ -23,6 +23,7 @@ from pathlib import Path
 from bench import Bench
 import pytest
 from ways import DEFAULT
+from ways import EACH_KIND
 from ways import WAYS
 from ways import Way
 from ways import why_not
@@ -49,6 +50,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line('markers', 'needs(*features): of the way in, see ways.py')
     config.addinivalue_line('markers', 'every_way: whichever way was asked for')
+    config.addinivalue_line('markers', 'each_kind: over a way of each kind, see ways.py')
+    config.addinivalue_line('markers', 'shared: of every_way, each case over some ways in turn')
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -56,21 +59,56 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if 'way' in metafunc.fixturenames:
         # the option is not there where the folder above is given
         asked = metafunc.config.getoption('--way', DEFAULT)
-        every = asked == _ALL or metafunc.definition.get_closest_marker('every_way')
-        ways = WAYS if every else [asked]
+        marked = metafunc.definition.get_closest_marker
+        if asked == _ALL or marked('every_way'):
+            ways = [*WAYS]
+        else:
+            ways = [*EACH_KIND] if marked('each_kind') else [asked]
         metafunc.parametrize('way', ways, indirect=True, scope='module')
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip a test that its way has nothing for."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip a test that its way has nothing for, and share out those that are shared."""
+    shared: dict[str, list[pytest.Item]] = {}
     for item in items:
         callspec = getattr(item, 'callspec', None)
         if callspec is None or 'way' not in callspec.params:
             continue
-        for marker in item.iter_markers('needs'):
-            reason = why_not(WAYS[callspec.params['way']], marker.args)
-            if reason:
-                item.add_marker(pytest.mark.skip(reason=reason))
+        missing = [
+            reason
+            for marker in item.iter_markers('needs')
+            if (reason := why_not(WAYS[callspec.params['way']], marker.args))
+        ]
+        for reason in missing:
+            item.add_marker(pytest.mark.skip(reason=reason))
+        if not missing and item.get_closest_marker('shared'):
+            shared.setdefault(item.nodeid.split('[')[0], []).append(item)
+    if config.getoption('--way', DEFAULT) == _ALL:
+        return
+    left_out = [item for tests in shared.values() for item in _left_out(tests)]
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in left_out]
+
+
+def _left_out(tests: list[pytest.Item]) -> list[pytest.Item]:
+    """Return which cases of a test to leave out: each has some ways left, each way some cases."""
+    ways = list(dict.fromkeys(_way_of(test) for test in tests))
+    cases = list(dict.fromkeys(_case_of(test) for test in tests))
+    turns = min(len(ways), len(cases))
+    return [
+        test
+        for test in tests
+        if (ways.index(_way_of(test)) - cases.index(_case_of(test))) % turns
+    ]
+
+
+def _way_of(test: pytest.Item) -> str:
+    return test.callspec.params['way']
+
+
+def _case_of(test: pytest.Item) -> str:
+    """Return the name of a test without that of its way."""
+    return test.nodeid.replace(_way_of(test), '', 1)
 
 
 @pytest.fixture(scope='module')

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import math
 import os
 from pathlib import Path
@@ -34,8 +35,10 @@ from bench import holds_for
 from bench import wait_until
 import pytest
 from ways import SILENCE
+from ways import Way
 from ways import needs
 
+from nfo_sinus_driver.node.domain import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
@@ -238,6 +241,15 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
 # --- settings -----------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope='module')
+def untouched(
+    tmp_path_factory: pytest.TempPathFactory, way: Way
+) -> Iterator[tuple[Bench, Simulated]]:
+    """One drive for all drivers that do not start."""
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+        yield bench, bench.simulator()
+
+
 @pytest.mark.parametrize(
     ('arguments', 'parts'),
     [
@@ -298,9 +310,9 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
     ids=lambda value: ' '.join(value[1::2]) if value[0] in ('-p', '-r') else '',
 )
 def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
-    bench: Bench, arguments: list[str], parts: list[str]
+    untouched: tuple[Bench, Simulated], arguments: list[str], parts: list[str]
 ) -> None:
-    drive = bench.simulator()
+    bench, drive = untouched
     driver = bench.driver(*arguments)
     assert driver.wait() == _CANNOT_START
     lines = [line for line in driver.text.splitlines() if 'cannot start' in line]

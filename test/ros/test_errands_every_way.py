@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The errands through ROS, over every way into a drive; what a drive has not, the answer says."""
+"""The errands through ROS, over a way of each kind; what a drive has not, the answer says."""
 
 from __future__ import annotations
 
@@ -31,11 +31,13 @@ import pytest
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
 from tuner import Tuner
-from ways import WAYS
 from ways import Way
 
 from nfo_sinus_driver.node.domain import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
+
+#: test/unit/drive has the same over every way.
+pytestmark = pytest.mark.each_kind
 
 _KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TUNING = 28
@@ -57,9 +59,8 @@ class Rig:
         return self.way.model == 'sinus_g2'
 
 
-@pytest.fixture(scope='module', params=WAYS.values(), ids=WAYS)
-def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    way: Way = request.param
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
     with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
         yield Rig(bench)
 

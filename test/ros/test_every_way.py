@@ -164,6 +164,7 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
     assert rig.drive.state()['scmd'] == 0
 
 
+@pytest.mark.shared
 @pytest.mark.parametrize('frequency', [_SPEED, -_SPEED])
 def test_a_quick_stop_lets_go_where_there_is_one(rig: Rig, frequency: float) -> None:
     with rig.client.run_at(frequency):
@@ -273,6 +274,7 @@ def test_nothing_turns_again_until_enable(rig: Rig, event) -> None:
 # --- the way out --------------------------------------------------------------------------------
 
 
+@pytest.mark.shared
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
 def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: int) -> None:
     """And a whole ride, on a line that takes its time, has broken no law."""
@@ -293,7 +295,8 @@ def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: i
 @needs('parameters')
 def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     drive = _simulator(bench)
-    driver = bench.driver(*_MODEST, '-p', 'drive_timeout:=1.5')
+    # so long that no busy machine is silent for it
+    driver = bench.driver(*_MODEST, '-p', 'drive_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(_SPEED):
         driver.signal(signal.SIGKILL)

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import signal
 
 from bench import A_WHILE
@@ -25,10 +26,18 @@ from bench import Client
 from bench import Process
 from bench import wait_until
 import pytest
+from ways import Way
 
+from nfo_sinus_driver.node.domain import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')
+
+#: The computer has more to do than this one driver.
+_MODEST = ('-p', 'poll_rate:=20.0')
+
+#: One drive and its driver for all events: each test leaves it stopped.
+Rig = tuple[Bench, Simulated, Client]
 
 
 def _hardest(bench: Bench) -> tuple[str, ...]:
@@ -36,6 +45,14 @@ def _hardest(bench: Bench) -> tuple[str, ...]:
     if bench.way.model != 'sinus_g2':
         return _QUICK
     return (*_QUICK, '--run-command-in-fault', 'keeps', '--refuses-in-fault', 'all')
+
+
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+        drive = bench.simulator(*_hardest(bench))
+        bench.driver(*_MODEST)
+        yield bench, drive, bench.client().connected()
 
 
 def _stays_still(drive: Simulated) -> None:
@@ -144,14 +161,15 @@ def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
     ],
     ids=lambda event: event.__name__.strip('_'),
 )
-def test_nothing_turns_again_until_enable(bench: Bench, event) -> None:
-    drive = bench.simulator(*_hardest(bench))
-    bench.driver()
-    client = bench.client().connected()
+def test_nothing_turns_again_until_enable(rig: Rig, event) -> None:
+    bench, drive, client = rig
+    client.connected()
     with client.run_at(20.0):
         event(bench, drive, client)
         _stays_still(drive)
         _turns_after_enable(drive, client)
+        assert client.call('stop').success
+        _stays_still(drive)
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL], ids=lambda n: n.name)

@@ -174,6 +174,8 @@ WAYS = {
     )
 }
 DEFAULT = 'modbus_rtu'
+#: One of each family of protocols and drives, where the others are the same to a test.
+EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii')
 
 
 def needs(*features: str) -> pytest.MarkDecorator:

@@ -71,6 +71,8 @@ class Command:
     at: float
     #: The line was whole and the drive known when it was given, and has been since.
     undisturbed: bool
+    #: A stop was on its way when it was given.
+    overruled: bool
 
 
 class History:
@@ -118,10 +120,13 @@ class History:
     def command(self, name: str, future: Future[Any]) -> None:
         """Take note of a command that was given."""
         undisturbed = self._steady
-        self._commands.append(Command(name, future, self.now, undisturbed))
+        overruled = any(one.name in STOPS and not one.future.done() for one in self._commands)
+        self._commands.append(Command(name, future, self.now, undisturbed, overruled))
         if name == 'enable':
-            if self.enabled_at is None:
+            if self.enabled_at is None and not overruled:
                 self.enabled_at = self.now
+            self._ours = True
+        elif name == 'tune':
             self._ours = True
         elif name in STOPS:
             if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
@@ -220,6 +225,11 @@ class History:
         if self._optimal:
             return self.by_bus and bool(runner._running)
         return self.by_bus and runner.state == 'OPERATION_ENABLED'
+
+    @property
+    def tuning(self) -> bool:
+        """The drive measures its motor, which has current."""
+        return not self._optimal and self._far.runner.tuning is not None
 
     @property
     def standing(self) -> bool:

@@ -43,11 +43,16 @@ from support import trace_laws
 
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.simulator.variant import ALL
+from nfo_sinus_driver.simulator.variant import NOTHING
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
 #: No command keeps anybody waiting longer, s.
 LONGEST_COMMAND = 12.0
+
+#: For so many transactions a motor may have current that an acknowledgement has let go.
+POWERED = 2
 
 #: Registers of one word or two [M0 §7], [M1].
 MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
@@ -84,6 +89,8 @@ class Laws(History):
         self._compared = Compared({}, {}, [])
         self._last: Snapshot | None = None
         self._last_told: dict[str, Any] = {}
+        #: How many frames there had been when an acknowledgement let the motor go.
+        self._turned_from: int | None = None
 
     def killed(self) -> None:
         super().killed()
@@ -99,6 +106,7 @@ class Laws(History):
         self._watch_line()
         self._watch_conditions()
         self._judge_running()
+        self._judge_acknowledged()
         self._judge_commands()
         self._judge_status()
         self._judge_silence()
@@ -120,13 +128,39 @@ class Laws(History):
         if not self.watched or self._method == 'monitor':
             return
         self._foreign = self._foreign and standing
-        if not self._optimal and self._method == 'mode_scmd' and self._far.faults:
-            # it refuses every command, so that it may go on until it was seen to
+        refuses = self._far.runner.variant.refuses_in_fault != NOTHING
+        if refuses and self._method == 'mode_scmd' and self._far.faults:
+            # it refuses the stop, so that it may go on until it was seen to
             self._no_run_from = max(self._no_run_from, self.now + self.noticed)
         if (standing or running) and self.enabled_at is None:
             self._judge_standing()
         if self._follows and self.turning and self.enabled_at is not None:
             self._judge_setpoint(self.enabled_at)
+
+    def _judge_acknowledged(self) -> None:
+        """
+        No motor turns by an acknowledgement [C98].
+
+        But on a drive that refuses every command while a fault is active, until it has heard the
+        stop that follows at once.
+        """
+        acknowledging = [command for command in self._commands if command.name == 'acknowledge']
+        begun = min((command.at for command in acknowledging), default=math.inf)
+        by_us = begun < self.now and self.disturbed_at < begun and self.enabled_at is None
+        by_itself = self._far.self_restart.waiting or self._ended_by_fault is not None
+        if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
+            self._turned_from = None
+            return
+        frames = len(self._rig.link.frames)
+        if self._turned_from is None:
+            self._turned_from = frames
+        if self._whole_since is None or self._whole_since > begun:
+            return
+        if self._far.runner.variant.refuses_in_fault != ALL:
+            if self.turning:
+                raise Broken('an acknowledgement turns the motor')
+        elif frames > self._turned_from + POWERED:
+            raise Broken(f'an acknowledgement turns the motor for {POWERED} transactions')
 
     def _judge_standing(self) -> None:
         """A run command of a past ride is taken back; one of another master when it is seen."""
@@ -196,11 +230,15 @@ class Laws(History):
             untouched = self.disturbed_at + NOTICED_IDLE < command.at and self.enabled_at is None
             if error is None and untouched and self.running:
                 raise Broken(f'{command.name} is answered although it runs')
-            local = not self.by_bus or bool(self._far.faults)
+            if error is None and self.tuning:
+                raise Broken(f'{command.name} is answered although it tunes')
+            local = not self.by_bus or bool(self._far.faults) or self.tuning
             if error is not None and untouched and command.undisturbed and not local:
                 raise Broken(f'{command.name} failed for no reason: {error}')
 
     def _judge_enabled(self, command: Command, error: BaseException | None) -> None:
+        if error is None and command.overruled:
+            raise Broken('an enable that came while a stop was on its way is not refused')
         if error is None:
             return
         ours = self.enabled_at is not None and self.enabled_at <= command.at
@@ -259,7 +297,8 @@ class Laws(History):
             'code': far.inv_st,
             'fault': bool(far.faults),
             'by bus': self.by_bus,
-            'running': self.running,
+            # nobody says what a tuning shows of it
+            'running': None if self.tuning else self.running,
             'limit': far.motor.limited,
             'frequency': round(far.motor.frequency, 1),
         }
@@ -347,6 +386,9 @@ def _has(seen: Any, name: str) -> bool:
 
 
 def _agree(told: Any, value: Any) -> bool:
+    """Tell whether what is told is true; of what nobody knows, ``None``, all is."""
+    if value is None:
+        return True
     if isinstance(value, float):
         return bool(abs(told - value) < 0.3)
     return bool(told == value)

@@ -44,12 +44,20 @@ from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
-from support.variants import hardest
 
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.refusal import Refused as Refusal
 from nfo_sinus_driver.simulator.self_restart import TRIES
+from nfo_sinus_driver.simulator.variant import ALL
+from nfo_sinus_driver.simulator.variant import DROPS
+from nfo_sinus_driver.simulator.variant import KEEPS
+from nfo_sinus_driver.simulator.variant import NOTHING
+from nfo_sinus_driver.simulator.variant import REFUSED
+from nfo_sinus_driver.simulator.variant import SCMD
+from nfo_sinus_driver.simulator.variant import TAKEN
+from nfo_sinus_driver.simulator.variant import Variant
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
 WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
@@ -105,6 +113,9 @@ class AnyOrder(RuleBasedStateMachine):
         delay=st.sampled_from((0, 0, 1)),
         drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
         restart_after=st.sampled_from((None, None, 0, 1, 2)),
+        keeps=st.booleans(),
+        refuses=st.sampled_from((ALL, ALL, SCMD, NOTHING)),
+        tunes_on=st.booleans(),
     )
     def begin(
         self,
@@ -114,8 +125,17 @@ class AnyOrder(RuleBasedStateMachine):
         delay: int = 0,
         drive_timeout: float = 0.0,
         restart_after: int | None = None,
+        keeps: bool = True,
+        refuses: str = ALL,
+        tunes_on: bool = True,
     ) -> None:
-        """Begin; a G2 ends its faults by itself after some seconds, if there are any."""
+        """
+        Begin; a G2 ends its faults by itself after some seconds, if there are any.
+
+        :param keeps: the drive keeps its run command through a fault.
+        :param refuses: what it refuses while one is active.
+        :param tunes_on: it refuses to stop while it tunes.
+        """
         optimal = self.model == 'sinus_optimal'
         if optimal and control_mode not in ('Freque', 'Speed'):
             control_mode = 'Freque'
@@ -129,7 +149,12 @@ class AnyOrder(RuleBasedStateMachine):
         if restart_after is not None and not optimal:
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
-        far = SimulatedDrive(self.model, settings=parameters, variant=hardest(self.model))
+        variant = Variant(
+            run_command_in_fault=KEEPS if keeps else DROPS,
+            refuses_in_fault=refuses,
+            stop_in_tuning=REFUSED if tunes_on else TAKEN,
+        )
+        far = SimulatedDrive(self.model, settings=parameters, variant=variant)
         self.rig = Rig(
             far,
             DriveSettings(
@@ -333,6 +358,35 @@ class AnyOrder(RuleBasedStateMachine):
         if self.laws.watched:
             self.activate()
 
+    @_driven
+    @precondition(lambda self: self.model == 'sinus_g2' and self.method == 'mode_scmd')
+    @rule(
+        procedure=st.sampled_from(Procedure),
+        after=st.sampled_from((0.02, 0.4, 1.0)),
+        give=st.sampled_from(('', 'stop', 'stop', 'quick_stop', 'deactivate', 'enable')),
+        wait=WAITS,
+    )
+    def tune(
+        self, procedure: Procedure, after: float = 0.4, give: str = 'stop', wait: float = 1.0
+    ) -> None:
+        """Tune a motor that stands; do something else meanwhile."""
+        if not self.laws.pending('tune'):
+            self.laws.command('tune', self.rig.drive.tune(procedure))
+        self.let(after)
+        if give:
+            self._give(give, wait)
+
+    @_driven
+    @rule(code=FAULTS, between=st.sampled_from((0.0, 0.1, 0.4)), wait=WAITS)
+    def fault_in_a_ride_acknowledged(
+        self, code: int, between: float = 0.4, wait: float = 1.0
+    ) -> None:
+        """Acknowledge a fault that has ended a ride, with the run command standing perhaps."""
+        self.ride()
+        self.fault(code, wait=between)
+        if self.laws.watched:
+            self._give('acknowledge', wait)
+
     @precondition(lambda self: self.reference == 'fieldbus')
     @rule(value=SETPOINTS, wait=WAITS)
     def set_once(self, value: float = 20.0, wait: float = 0.1) -> None:
@@ -423,7 +477,7 @@ class AnyOrder(RuleBasedStateMachine):
         for key, raw in writes:
             try:
                 self.rig.far.write_raw(key, raw)
-            except Refused:
+            except Refusal:
                 return
 
     @rule(wait=WAITS)
@@ -647,6 +701,7 @@ def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> N
 
 
 @pytest.mark.skipif(HISTORIES > 0, reason='a campaign')
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize('machine', MACHINES)
 def test_any_order(machine: type[AnyOrder]) -> None:
     run_state_machine_as_test(machine, settings=NORMAL)

@@ -24,6 +24,7 @@ from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
+from test_any_order import AnyOrder
 from test_any_order import G2DriveControl
 from test_any_order import G2ModeScmd
 from virtual_rig import MakeVirtual
@@ -189,3 +190,21 @@ def test_why_it_stops_is_told_although_the_line_is_lost_at_once(
     assert not rig.far.motor.driven
     # it is told once
     assert sum('refused' in text for _, _, text in rig.notes.events) == 1
+
+
+@pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])
+def test_an_enable_that_comes_with_a_quick_stop_is_refused(machine: type[AnyOrder]) -> None:
+    state = machine()
+    state.begin()
+    try:
+        state.ride()
+        # what comes with it, and what comes while it is on its way
+        quick_stop, enable = state.rig.drive.quick_stop(), state.rig.drive.enable()
+        state.rig.pass_time(0.004)
+        later = state.rig.drive.enable()
+        assert 'released' in state.rig.answer(quick_stop)
+        for refused in (enable, later):
+            assert 'a stop is on its way' in state.rig.answer(refused)
+        assert not state.rig.drive.armed
+    finally:
+        state.rig.close()

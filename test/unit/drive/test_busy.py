@@ -203,3 +203,16 @@ def test_one_that_is_busy_when_it_is_there_again_is_no_other_model(
     rig.before = lambda register, words: None
     rig.pass_time(5.0)
     assert rig.drive.snapshot.connected
+
+
+def test_a_status_that_is_refused_for_ever_is_a_loss_too(make_virtual: MakeVirtual) -> None:
+    # nobody could watch the motor
+    rig = make_virtual()
+    rig.ride()
+    rig.be_busy(rig.register('fieldbus.inv_st'), 10)
+    rig.pass_time(2.0)
+    assert rig.drive.armed
+    rig.be_busy(rig.register('fieldbus.inv_st'), 10_000)
+    rig.pass_time(5.0)
+    assert rig.said('lost: the drive is busy')
+    assert not rig.drive.armed

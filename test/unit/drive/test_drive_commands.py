@@ -28,6 +28,7 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Mode
@@ -557,6 +558,15 @@ def test_drive_timeout_may_be_left_as_it_is(make_rig: MakeRig) -> None:
     assert timeouts(rig) == (70, 0)
     assert rig.drive.set_drive_timeout(0.0).result(PATIENCE) == ''
     assert not rig.far.writes
+
+
+def test_time_out_of_the_drive_that_strikes_before_it_is_lost_is_told(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual({'serial.sio_tot': 1.2, 'serial.auto_stop': True})
+    rig.connect()
+    assert rig.said('SioTot 1.2 s) is less than lost_after + 0.5 s', Severity.WARNING)
+    assert rig.said('set drive_timeout to at least 1.5', Severity.WARNING)
 
 
 def test_drive_timeout_that_is_refused(make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,6 +22,7 @@ from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
 import pytest
+from support.examples import examples
 
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic import Classic
@@ -140,7 +141,7 @@ def test_no_byte_is_lost_and_a_message_after_silence_is_found(chunks):
 
 
 @given(st.binary(max_size=30), st.sampled_from([4.21, 4.38]))
-@settings(max_examples=500)
+@settings(max_examples=examples(500))
 def test_whatever_comes_the_answer_is_one_of_the_three(data, sw_ver):
     drive = SimulatedDrive(settings={'fieldbus.sw_ver': sw_ver})
     protocol = Classic()

@@ -245,3 +245,19 @@ def test_several_clients_at_once(served):
 def test_a_control_path_that_is_too_long(folder):
     with pytest.raises(ControlError, match='too long'):
         Simulator(control=str(folder / ('x' * 120)))
+
+
+def test_noise_by_chance_and_bursts_belong_to_the_line_and_heal(served):
+    simulator, client = served
+    client.inject('noise-rate', 'drop', 1.0)
+    client.inject('burst', 1.0, 1.0)
+    faults = simulator.lines[0].faults
+    assert faults.alter(1, READ_MODE) == []
+    assert faults.dead(time.monotonic())
+    client.inject('heal')
+    assert len(faults.alter(1, READ_MODE)) == 1
+    assert not faults.dead(time.monotonic())
+    with pytest.raises(ControlError, match='0 to 1'):
+        client.inject('noise-rate', 'drop', 2)
+    with pytest.raises(ControlError, match='choose one of'):
+        client.inject('noise-rate', 'nonsense', 0.1)

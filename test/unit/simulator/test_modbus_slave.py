@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
 import pytest
+from support.examples import examples
 
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator import pymodbus_compat
@@ -79,7 +80,7 @@ def test_answer(request_, answer):
 
 
 @given(st.binary(max_size=40))
-@settings(max_examples=500)
+@settings(max_examples=examples(500))
 def test_any_pdu_is_answered(pdu):
     answer = modbus.answer(SimulatedDrive(), pdu)
     assert 2 <= len(answer) <= 253
@@ -92,7 +93,7 @@ def test_any_pdu_is_answered(pdu):
     st.integers(0, 3),
     st.lists(st.integers(0, 0xFFFF), max_size=3),
 )
-@settings(max_examples=500)
+@settings(max_examples=examples(500))
 def test_requests_that_are_nearly_right_are_answered(function, register, count, words):
     data = bytes([function]) + register.to_bytes(2, 'big')
     if function == 6:

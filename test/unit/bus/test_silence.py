@@ -1,0 +1,68 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How long who said nothing, without a line and without a clock."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.silence import Silences
+
+
+def test_who_is_not_asked_is_not_silent() -> None:
+    silences = Silences()
+    silences.note(1, 5.0, None)
+    assert silences.lasts(1, 1000.0) == silences.lasts(2, 1000.0) == 0.0
+    assert not silences.is_silent(1)
+    assert silences.heard_at(1) == 5.0
+    assert silences.heard_at(2) == -math.inf
+
+
+@pytest.mark.parametrize('error', [NoAnswer(), DamagedAnswer(), LinkError()])
+def test_silence_lasts_from_the_first_answer_that_is_missing(error: LinkError) -> None:
+    silences = Silences()
+    silences.note(1, 5.0, None)
+    silences.note(2, 5.0, None)
+    for now in (10.0, 10.2, 10.4):
+        silences.note(1, now, error)
+    assert silences.is_silent(1)
+    assert silences.lasts(1, 11.0) == 1.0
+    assert silences.heard_at(1) == 5.0
+    assert not silences.is_silent(2)
+
+
+@pytest.mark.parametrize('answer', [None, Refused(Refused.BUSY)])
+def test_any_valid_frame_ends_it_a_refusal_too(answer: LinkError | None) -> None:
+    silences = Silences()
+    silences.note(1, 10.0, NoAnswer())
+    silences.note(1, 10.9, answer)
+    assert not silences.is_silent(1)
+    assert silences.lasts(1, 11.0) == 0.0
+    assert silences.heard_at(1) == 10.9
+    silences.note(1, 12.0, NoAnswer())
+    assert silences.lasts(1, 12.5) == 0.5
+
+
+def test_a_port_that_is_gone_says_nothing_of_who_is_behind_it() -> None:
+    silences = Silences()
+    silences.note(1, 10.0, PortError())
+    assert not silences.is_silent(1)

@@ -1,0 +1,189 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver of one drive over a real Modbus RTU link, in virtual time, on a line with noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+import heapq
+import itertools
+import random
+from typing import Any
+from unittest import mock
+
+from any_order_rig import Clock
+from any_order_rig import Notes
+from any_order_rig import Rig
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.simulator import drive as simulated
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
+
+_TURNAROUND = 0.002
+#: The driver gave the motor up, whether or not it could tell the drive.
+_ENDS = ('lost: ', 'stopped: ', 'stopping: ')
+
+
+class Line:
+    """
+    A serial port with the simulated drive behind it; whole frames come in one piece.
+
+    :ivar damage: how likely an answer is damaged.
+    :ivar bursts: from when to when nothing gets through, either way.
+    :ivar sent: when each request began.
+    :ivar meet: called with each frame that arrives whole; returns the answer in place of the
+        drive's, or ``None``.
+    """
+
+    def __init__(self, rig: NoiseRig, settings: LineSettings, seed: int) -> None:
+        self._rig = rig
+        self._settings = settings
+        self._random = random.Random(seed)
+        self._protocol = ModbusRtu()
+        #: Frames by the moment of their last byte; those to the drive, and those from it.
+        self._coming: list[tuple[float, int, bool, bytes]] = []
+        self._order = itertools.count()
+        self.damage = 0.0
+        self.bursts: list[tuple[float, float]] = []
+        self.sent: list[float] = []
+        self.meet: Callable[[bytes], bytes | None] = lambda frame: None
+
+    def open(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self._coming.clear()
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(self._rig.clock.now)
+        self._put(self._rig.clock.now, data, to_drive=True)
+
+    def read(self, until: float) -> bytes:
+        clock = self._rig.clock
+        while self._coming and self._coming[0][0] <= max(until, clock.now):
+            at, _, to_drive, frame = heapq.heappop(self._coming)
+            # the drive catches up when it hears something, or when the bus has nothing to do
+            clock.now = max(at, clock.now)
+            if not to_drive:
+                return frame
+            self._carry_out(frame)
+        clock.now = max(until, clock.now)
+        return b''
+
+    def _put(self, begin: float, frame: bytes, *, to_drive: bool) -> None:
+        end = begin + len(frame) * self._settings.char_time
+        if not any(first < end and begin < last for first, last in self.bursts):
+            heapq.heappush(self._coming, (end, next(self._order), to_drive, frame))
+
+    def _carry_out(self, frame: bytes) -> None:
+        far = self._rig.far
+        far.advance_to(self._rig.clock.now)
+        request = self._protocol.unwrap(frame)
+        if request is None or not far.listening or request.address != far.address:
+            return
+        far.heard()
+        answer = self.meet(frame) or self._protocol.answer(far, request)
+        if self._random.random() < self.damage:
+            place = self._random.randrange(len(answer))
+            spoiled = answer[place] ^ 1 << self._random.randrange(8)
+            answer = answer[:place] + bytes((spoiled,)) + answer[place + 1 :]
+        self._put(self._rig.clock.now + _TURNAROUND, answer, to_drive=False)
+
+
+class TimedNotes(Notes):
+    """
+    Keeps when what was told.
+
+    :ivar published: when each status of a connected drive was told, and what it was.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__(clock)
+        self.published: list[tuple[float, Snapshot]] = []
+        self.telemetry: list[Telemetry] = []
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        super().on_snapshot(snapshot)
+        if snapshot.connected:
+            self.published.append((self._clock.now, snapshot))
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        self.telemetry.append(telemetry)
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        pass
+
+
+class NoiseRig(Rig):
+    """The driver, the line and the drive; the answer time-out is that of the factory."""
+
+    notes: TimedNotes
+
+    def __init__(self, baud: int = 57600, seed: int = 0, **settings: Any) -> None:
+        self._line_settings = LineSettings(baud_rate=baud)
+        self._seed = seed
+        # the motor need not be exact here, and the time is long
+        self._coarse = mock.patch.object(simulated, '_STEP', 0.05)
+        self._coarse.start()
+        far = SimulatedDrive(settings={'control.accel': 0.5, 'control.retard': 0.5})
+        super().__init__(far, DriveSettings(**settings))
+
+    def begin(self) -> None:
+        """Start a driver."""
+        self.notes = TimedNotes(self.clock)
+        self.line = Line(self, self._line_settings, self._seed)
+        self.bus = Bus(RtuLink(self.line, self._line_settings))
+        self.drive = Drive(self.bus, self.settings, self.notes)
+
+    def close(self) -> None:
+        super().close()
+        self._coarse.stop()
+
+    def ride(self, frequency: float = 20.0) -> None:
+        """Connect, enable and turn, with a program that keeps on sending a set-point."""
+        self.answer(self.drive.connect())
+        self.drive.activate()
+        self.enable(frequency)
+
+    def enable(self, frequency: float = 20.0) -> None:
+        """Enable and turn."""
+        assert 'enabled' in self.answer(self.drive.enable())
+        self.send(frequency)
+        self.pass_time(1.0)
+        self.notes.events.clear()
+
+    def register(self, key: str) -> int:
+        """Return where a parameter stands."""
+        return self.drive._registers.address(key).numbers[0]
+
+    @property
+    def ends(self) -> list[str]:
+        """Why the driver gave the motor up since the ride began, each time."""
+        return [text for _, _, text in self.notes.events if text.startswith(_ENDS)]
+
+    def said(self, part: str, severity: Severity | None = None) -> bool:
+        """Whether an event says this."""
+        return any(
+            part in text for _, grave, text in self.notes.events if severity in (None, grave)
+        )

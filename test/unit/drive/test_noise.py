@@ -1,0 +1,173 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Noise is waited out: nothing is stopped by it that answers again within ``lost_after``.
+
+Over a real Modbus RTU link in virtual time, so that what the link believes counts too.
+"""
+
+from __future__ import annotations
+
+from noise_rig import NoiseRig
+import pytest
+
+_MINUTES = 10 * 60.0
+#: How often the status is polled, Hz: enough for some 20 000 requests in all that time.
+_POLL_RATE = 5.0
+
+
+@pytest.mark.parametrize('baud', [57600, 19200])
+@pytest.mark.slow
+def test_three_per_cent_of_damaged_answers_stop_nothing(baud: int) -> None:
+    rig = NoiseRig(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
+    rig.ride()
+    rig.line.damage = 0.03
+    rig.pass_time(_MINUTES)
+    assert not rig.ends
+    assert rig.drive.armed
+    assert not rig.far.faults
+    rig.close()
+
+
+@pytest.mark.parametrize('baud', [57600, 19200])
+@pytest.mark.slow
+def test_ten_per_cent_of_damaged_answers_stop_at_most_once(baud: int) -> None:
+    rig = NoiseRig(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
+    rig.ride()
+    rig.line.damage = 0.1
+    stops = 0
+    end = rig.clock.now + _MINUTES
+    while rig.clock.now < end:
+        rig.pass_time(10.0)
+        if rig.ends:
+            stops += 1
+            rig.line.damage = 0.0
+            rig.pass_time(3.0)
+            rig.enable()
+            rig.line.damage = 0.1
+    assert stops <= 1
+    rig.close()
+
+
+@pytest.mark.parametrize('baud', [57600, 19200])
+@pytest.mark.parametrize('length', [0.3, 0.8, 0.99])
+def test_a_burst_shorter_than_lost_after_stops_nothing(baud: int, length: float) -> None:
+    # the time-out of the drive itself is the shortest there may be
+    rig = NoiseRig(baud, drive_timeout=1.5)
+    rig.ride()
+    for number in range(20):
+        # at another moment of the round each time
+        begin = rig.clock.now + 0.1 + 0.0077 * number
+        rig.line.bursts = [(begin, begin + length)]
+        rig.pass_time(2.0)
+        assert not rig.ends
+        assert rig.drive.armed
+        assert not rig.far.faults
+    rig.close()
+
+
+@pytest.mark.parametrize('length', [0.05, 0.1, 0.2, 0.4, 0.7, 1.0])
+@pytest.mark.parametrize('baud', [57600, 19200])
+def test_after_a_burst_the_first_request_goes_out_and_the_first_status_comes_at_once(
+    baud: int, length: float
+) -> None:
+    rig = NoiseRig(baud, drive_timeout=2.0)
+    rig.ride()
+    for number in range(12):
+        begin = rig.clock.now + 0.1 + 0.0117 * number
+        end = begin + length
+        rig.line.bursts = [(begin, end)]
+        rig.pass_time(length + 2.0)
+        asked = min(at for at in rig.line.sent if at >= end)
+        told = min(at for at, _ in rig.notes.published if at >= asked)
+        assert asked - end <= 0.25
+        assert told - asked <= 0.2
+        assert not rig.ends
+    rig.close()
+
+
+def test_a_drive_that_is_lost_is_asked_again_before_its_own_time_out_strikes() -> None:
+    rig = NoiseRig(drive_timeout=2.5)
+    rig.ride()
+    for number in range(10):
+        begin = rig.clock.now + 0.1 + 0.003 * number
+        rig.line.bursts = [(begin, begin + 2.2)]
+        rig.pass_time(5.0)
+        assert rig.ends and rig.ends[0].startswith('lost: ')
+        assert not rig.far.faults
+        rig.enable()
+    rig.close()
+
+
+def test_without_an_answer_it_is_lost_after_the_time_set() -> None:
+    for lost_after in (0.5, 1.0, 3.0):
+        rig = NoiseRig(lost_after=lost_after)
+        rig.ride()
+        begin = rig.clock.now
+        rig.line.bursts = [(begin, begin + 10.0)]
+        rig.pass_time(lost_after + 1.0)
+        (lost_at,) = [at for at, _, text in rig.notes.events if text.startswith('lost: ')]
+        # from the first answer that is missing to the end of the request that is under way then
+        assert lost_after + 0.2 <= lost_at - begin <= lost_after + 0.45
+        assert not rig.drive.armed
+        rig.close()
+
+
+def test_one_damaged_answer_in_each_round_is_no_loss() -> None:
+    # 81 of 84 requests were answered, and the drive was "lost"
+    rig = NoiseRig(setpoint_timeout=0.0)
+    rig.ride()
+    speed = rig.register('status.spd_act')
+
+    asked = [0]
+
+    def spoil(frame: bytes) -> bytes | None:
+        if frame[1] == 3 and int.from_bytes(frame[2:4], 'big') == speed:
+            asked[0] += 1
+            if asked[0] % 2:
+                return b'\x01\x03\x02\x00\x00\xff\xff'
+        return None
+
+    rig.line.meet = spoil
+    before = len(rig.notes.published)
+    rig.pass_time(10.0)
+    assert asked[0] > 20
+    assert not rig.ends
+    # and each round was told, with the speed
+    told = [snapshot for _, snapshot in rig.notes.published[before:]]
+    assert len(told) >= asked[0] // 2
+    assert all(snapshot.speed == snapshot.speed for snapshot in told)
+    rig.close()
+
+
+@pytest.mark.parametrize('poll_rate', [0.2, 0.5, 2.0])
+def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(poll_rate: float) -> None:
+    rig = NoiseRig(poll_rate=poll_rate, telemetry_rate=0.0)
+    rig.answer(rig.drive.connect())
+    rig.drive.activate()
+    rig.pass_time(0.3)
+    rig.notes.events.clear()
+    for number in range(8):
+        # some of them take a poll, others none
+        begin = rig.clock.now + 0.11 * number
+        rig.line.bursts = [(begin, begin + 0.7)]
+        rig.pass_time(7.0)
+    assert not rig.ends
+    # silence is another thing, and counts from the first request without an answer
+    begin = rig.clock.now
+    rig.line.bursts = [(begin, begin + 60.0)]
+    rig.pass_time(1 / poll_rate + 1.5)
+    assert len(rig.ends) == 1
+    rig.close()
