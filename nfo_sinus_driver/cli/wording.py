@@ -24,6 +24,7 @@ _WORDS = (
     ('~/fault_ack', 'nfo-sinus ack'),
     ('~/enable', 'nfo-sinus run'),
     ('expected_control_mode in the driver', 'give another --control-mode'),
+    ('more than lost_after', 'more than a silence after which it is lost'),
     ('set drive_timeout', 'give --drive-timeout'),
     ('drive_timeout', '--drive-timeout'),
     ('set model to auto or sinus_g2', 'give --model sinus_g2'),

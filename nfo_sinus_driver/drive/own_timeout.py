@@ -111,7 +111,7 @@ class OwnTimeout:
             return (
                 f'the time-out of the drive itself (SioTot {inverter.sio_tot:g} s) is less than '
                 f'lost_after + {DRIVE_TIMEOUT_MARGIN:g} s: noise that this driver waits out may '
-                f'stop the motor; set drive_timeout to at least {least:g}'
+                f'stop the motor; set drive_timeout, at least {least:g} s'
             )
         else:
             return ''

@@ -136,9 +136,10 @@ class DriveSettings:
         least = self.lost_after + DRIVE_TIMEOUT_MARGIN
         if 0 < self.drive_timeout < least - 1e-9:
             raise ValueError(
-                f'drive_timeout {self.drive_timeout:g} s: with lost_after {self.lost_after:g} s it '
-                f'must be at least {math.ceil(least * 10 - 1e-6) / 10:g} s, so that noise which '
-                'the driver waits out does not stop the motor; or set lost_after to less'
+                f'drive_timeout {self.drive_timeout:g} s: at least '
+                f'{math.ceil(least * 10 - 1e-6) / 10:g} s, half a second more than lost_after '
+                f'({self.lost_after:g} s), so that noise which the driver waits out does not stop '
+                'the motor'
             )
         tenths = self.drive_timeout * 10
         if abs(tenths - round(tenths)) > 1e-3:

@@ -122,14 +122,14 @@ def test_a_reference_of_its_own(bench: Bench) -> None:
 
 def test_the_set_point_stays_fresh(bench: Bench) -> None:
     # the driver gives one up after 2.5 s, and so does a drive of its own accord
-    arguments = ('--for', 4, '--drive-timeout', 1)
+    arguments = ('--for', 4, '--drive-timeout', 1.5)
     with bench.riding(*arguments) as process:
         out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
     assert 'no set-point' not in err and 'time-out' not in err
     lines = [line for line in out.splitlines() if 'Bus Run' in line]
     assert '10.0 Hz' in lines[-1] and '1 s left' in lines[-1]
-    assert bench.value('serial.sio_tot') == 1.0 and bench.value('serial.auto_stop') is True
+    assert bench.value('serial.sio_tot') == 1.5 and bench.value('serial.auto_stop') is True
     assert bench.state()['fault'] == 0
 
 
@@ -526,7 +526,7 @@ def test_no_run_input(make_bench: MakeBench) -> None:
         (('fast',), 'invalid'),
         ((10, '--reference', 'terminal'), 'leave the set-point out'),
         ((10, '--for', 0), 'more than 0 s'),
-        ((10, '--drive-timeout', 0.5), 'at least 1 s'),
+        ((10, '--drive-timeout', 0.5), 'at least 1.5 s'),
         (('--method', 'drive_control', '--reference', 'fix1'), 'must be fieldbus or terminal'),
     ],
 )

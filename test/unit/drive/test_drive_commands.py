@@ -566,7 +566,7 @@ def test_time_out_of_the_drive_that_strikes_before_it_is_lost_is_told(
     rig = make_virtual({'serial.sio_tot': 1.2, 'serial.auto_stop': True})
     rig.connect()
     assert rig.said('SioTot 1.2 s) is less than lost_after + 0.5 s', Severity.WARNING)
-    assert rig.said('set drive_timeout to at least 1.5', Severity.WARNING)
+    assert rig.said('set drive_timeout, at least 1.5 s', Severity.WARNING)
 
 
 def test_drive_timeout_that_is_refused(make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -703,8 +703,8 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
         ({'shutdown_timeout': -1.0}, 'allowed are 0 to 600 s'),
         ({'lost_after': 0.1}, 'allowed are 0.2 to 60 s'),
         ({'lost_after': 61.0}, 'allowed are 0.2 to 60 s'),
-        ({'drive_timeout': 1.4}, 'with lost_after 1 s it must be at least 1.5 s'),
-        ({'drive_timeout': 1.2, 'lost_after': 0.75}, 'must be at least 1.3 s'),
+        ({'drive_timeout': 1.4}, 'at least 1.5 s, half a second more than lost_after'),
+        ({'drive_timeout': 1.2, 'lost_after': 0.75}, 'at least 1.3 s, half a second more'),
         ({'drive_timeout': 25.1}, 'allowed are 0 to 25 s'),
         ({'drive_timeout': 2.55}, 'between two steps of the drive, 2.5 and 2.6'),
     ],
