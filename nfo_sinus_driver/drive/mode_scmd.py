@@ -177,7 +177,9 @@ class ModeScmd:
         key = 'fieldbus.inv_st_with_ack'
         ours = await self.in_control(_ACK)
         if ours and await self.remove(control_mode) is Removal.NOTHING:
-            await self._registers.acknowledge_and_write(key, *self._soonest)
+            # refused while the cause of the fault lasts: the status will tell
+            with contextlib.suppress(Refused):
+                await self._registers.acknowledge_and_write(key, *self._soonest)
         else:
             await self._registers.acknowledge(key, _ACK)
 

@@ -102,6 +102,14 @@ class Wire:
         self._read = 0
 
     def writes(self) -> list[Write]:
+        """Return what arrived since the last call, without what went along with settings."""
+        return [
+            write
+            for write in self.every_write()
+            if (write.register, write.words) not in self._aside
+        ]
+
+    def every_write(self) -> list[Write]:
         """Return what arrived since the last call."""
         with self._trace.open('rb') as stream:
             stream.seek(self._read)
@@ -111,11 +119,7 @@ class Wire:
         self._read += len(text)
         frames = (json.loads(line) for line in text.splitlines() if b'"request"' in line)
         writes = (self._written(bytes.fromhex(frame['hex'])) for frame in frames)
-        return [
-            write
-            for write in writes
-            if write is not None and (write.register, write.words) not in self._aside
-        ]
+        return [write for write in writes if write is not None]
 
 
 def _modbus(data: bytes) -> Write | None:

@@ -284,3 +284,16 @@ def test_fault_that_somebody_else_acknowledges_restarts_nothing(
     rig.wait_until_still()
     rig.next_snapshots(5)
     assert not rig.far.motor.driven
+
+
+def test_a_fault_whose_cause_lasts_is_named_by_a_drive_that_refuses_everything(
+    make_rig: MakeRig,
+) -> None:
+    rig = make_rig()
+    rig.turn()
+    with rig.simulator.lock:
+        rig.far.trip(OVERHEATED, cause_present=True)
+    wait_until(lambda: not rig.drive.armed)
+    rig.acknowledged = 1
+    assert '3 Temp Hi still stands' in rig.refused(rig.drive.acknowledge())
+    assert rig.far.ack_reads == 1
