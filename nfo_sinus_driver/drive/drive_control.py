@@ -183,9 +183,11 @@ class DriveControl:
                 await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
         except Refused:
             if await self.remove(control_mode) is Removal.NOTHING:
-                await registers.acknowledge_and_write(
-                    'fieldbus.inv_st_with_ack', _WORD, self._ready
-                )
+                # refused while the cause of the fault lasts: the status will tell
+                with contextlib.suppress(Refused):
+                    await registers.acknowledge_and_write(
+                        'fieldbus.inv_st_with_ack', _WORD, self._ready
+                    )
             else:
                 await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
         return why

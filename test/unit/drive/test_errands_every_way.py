@@ -169,6 +169,22 @@ def test_a_drive_that_takes_no_word_while_a_fault_stands(
 
 
 @pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
+    method: str, strict_faults: None
+) -> None:
+    rig = Rig(WAYS['classic_v2'], method)
+    rig.start()
+    try:
+        rig.drive.enable().result(PATIENCE)
+        with rig.simulator.lock:
+            rig.far.trip(5, cause_present=True)
+        wait_until(lambda: not rig.drive.armed)
+        assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+    finally:
+        rig.stop()
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
 @pytest.mark.parametrize('name', ['modbus_rtu', 'classic_v2', 'classic_v5'])
 def test_the_reason_of_a_serial_fault_is_told(name: str, method: str) -> None:
     if (name, method) == ('classic_v5', 'drive_control'):
