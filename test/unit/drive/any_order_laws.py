@@ -146,7 +146,9 @@ class Laws(History):
         """
         acknowledging = [command for command in self._commands if command.name == 'acknowledge']
         begun = min((command.at for command in acknowledging), default=math.inf)
-        by_us = begun < self.now and self.disturbed_at < begun and self.enabled_at is None
+        # one that ran before had no fault to acknowledge
+        started = self._running_since is not None and self._running_since > begun
+        by_us = started and self.disturbed_at < begun and self.enabled_at is None
         by_itself = self._far.self_restart.waiting or self._ended_by_fault is not None
         if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
             self._turned_from = None
