@@ -79,8 +79,9 @@ class Withdrawal:
         self._done = done
         #: What takes the run command back, while there may be one that nobody wants any more.
         self._task: Task | None = None
-        #: What became of the last attempt; ``None`` before the first has ended.
+        #: What became of the last attempt, and when; ``None`` before the first has ended.
         self._outcome: _Outcome | None = None
+        self._tried_at = 0.0
         self._unconfirmed = ''
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
@@ -112,8 +113,10 @@ class Withdrawal:
         Take the run command back, again and again until the drive says that it stops.
 
         Where that is going on already nothing has to be added: nobody is let start the motor
-        meanwhile.
+        meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
         """
+        if self.held_by_fault and time.monotonic() > self._tried_at + _RETRY_PERIOD:
+            self.begin_anew()
         if self._task is None:
             self._outcome = None
             self._unconfirmed = 'no answer yet'
@@ -210,6 +213,7 @@ class Withdrawal:
         except Exception as error:
             # even a mistake of ours must not end the trying
             self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, str(error) or repr(error)
+        self._tried_at = time.monotonic()
         return self._outcome
 
     async def _try_once(self) -> _Outcome:
