@@ -37,10 +37,10 @@ class Silences:
 
     def note(self, unit: int, now: float, error: LinkError | None) -> None:
         """Take note of how a request to a unit ended; a refusal is an answer, too."""
-        if error is None or isinstance(error, Refused):
+        if error is None or error.heard or isinstance(error, Refused):
             self._heard_at[unit] = now
             self._since.pop(unit, None)
-        elif not isinstance(error, PortError):
+        if error is not None and not isinstance(error, (PortError, Refused)):
             self._since.setdefault(unit, now)
 
     def is_silent(self, unit: int) -> bool:

@@ -25,6 +25,8 @@ class LinkError(Exception):
     """
 
     maybe_done = False
+    #: The unit answered a question before, for the sake of this one: it is there.
+    heard = False
 
 
 class PortError(LinkError):

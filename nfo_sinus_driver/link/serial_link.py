@@ -163,12 +163,14 @@ class SerialLink(ModbusLink):
         """Return the answer to a request, and when its last byte came."""
         self._await_silence(request)
         # a write answer names what was written, and nobody believes it without reading back
-        if not isinstance(request, Write):
-            self._make_certain(request)
+        probed = not isinstance(request, Write) and self._make_certain(request)
         try:
             answer = self._transact(request)
         except Refused:
             self._confirm(request)
+            raise
+        except LinkError as error:
+            error.heard = probed
             raise
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
@@ -190,16 +192,17 @@ class SerialLink(ModbusLink):
         """Expect an answer to a request, one more than has come."""
         self._doubts.add(request.unit, answer_kinds(request))
 
-    def _make_certain(self, request: Request[Any]) -> None:
+    def _make_certain(self, request: Request[Any]) -> bool:
         """
         Have the unit answer something else, if its answer to this could be confused with another.
 
+        :returns: whether it was asked, and answered.
         :raises NotReady: that cannot be told from others either.
         """
         questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
         question = self._doubts.first_certain(request.unit, questions)
         if question is request:
-            return
+            return False
         try:
             self._probe(question)
         except LinkError as error:
@@ -207,6 +210,7 @@ class SerialLink(ModbusLink):
             error.maybe_done = False
             raise
         self._await_silence(request)
+        return True
 
     def _probes(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
         return probes(unit, self._safe.get(unit, ()))
