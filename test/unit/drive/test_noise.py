@@ -20,31 +20,55 @@ Over a real Modbus RTU link in virtual time, so that what the link believes coun
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from collections.abc import Iterator
+
 from noise_rig import NoiseRig
 import pytest
+
+MakeNoise = Callable[..., NoiseRig]
 
 _MINUTES = 10 * 60.0
 #: How often the status is polled, Hz: enough for some 20 000 requests in all that time.
 _POLL_RATE = 5.0
 
 
+@pytest.fixture
+def make_noise() -> Iterator[MakeNoise]:
+    """Makes a rig, as often as it is asked for; the one before ends."""
+    rigs: list[NoiseRig] = []
+
+    def end() -> None:
+        while rigs:
+            rigs.pop().close()
+
+    def make(*arguments: int, **settings: float) -> NoiseRig:
+        end()
+        rigs.append(NoiseRig(*arguments, **settings))
+        return rigs[-1]
+
+    yield make
+    end()
+
+
 @pytest.mark.parametrize('baud', [57600, 19200])
 @pytest.mark.slow
-def test_three_per_cent_of_damaged_answers_stop_nothing(baud: int) -> None:
-    rig = NoiseRig(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
+def test_three_per_cent_of_damaged_answers_stop_nothing(make_noise: MakeNoise, baud: int) -> None:
+    rig = make_noise(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
     rig.ride()
     rig.line.damage = 0.03
     rig.pass_time(_MINUTES)
     assert not rig.ends
     assert rig.drive.armed
     assert not rig.far.faults
-    rig.close()
 
 
 @pytest.mark.parametrize('baud', [57600, 19200])
 @pytest.mark.slow
-def test_ten_per_cent_of_damaged_answers_stop_at_most_once(baud: int) -> None:
-    rig = NoiseRig(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
+def test_ten_per_cent_of_damaged_answers_stop_at_most_once(
+    make_noise: MakeNoise, baud: int
+) -> None:
+    rig = make_noise(baud, seed=baud, poll_rate=_POLL_RATE, telemetry_rate=0.0, drive_timeout=1.5)
     rig.ride()
     rig.line.damage = 0.1
     stops = 0
@@ -58,14 +82,15 @@ def test_ten_per_cent_of_damaged_answers_stop_at_most_once(baud: int) -> None:
             rig.enable()
             rig.line.damage = 0.1
     assert stops <= 1
-    rig.close()
 
 
 @pytest.mark.parametrize('baud', [57600, 19200])
 @pytest.mark.parametrize('length', [0.3, 0.8, 0.99])
-def test_a_burst_shorter_than_lost_after_stops_nothing(baud: int, length: float) -> None:
+def test_a_burst_shorter_than_lost_after_stops_nothing(
+    make_noise: MakeNoise, baud: int, length: float
+) -> None:
     # the time-out of the drive itself is the shortest there may be
-    rig = NoiseRig(baud, drive_timeout=1.5)
+    rig = make_noise(baud, drive_timeout=1.5)
     rig.ride()
     for number in range(20):
         # at another moment of the round each time
@@ -75,15 +100,14 @@ def test_a_burst_shorter_than_lost_after_stops_nothing(baud: int, length: float)
         assert not rig.ends
         assert rig.drive.armed
         assert not rig.far.faults
-    rig.close()
 
 
 @pytest.mark.parametrize('length', [0.05, 0.1, 0.2, 0.4, 0.7, 1.0])
 @pytest.mark.parametrize('baud', [57600, 19200])
 def test_after_a_burst_the_first_request_goes_out_and_the_first_status_comes_at_once(
-    baud: int, length: float
+    make_noise: MakeNoise, baud: int, length: float
 ) -> None:
-    rig = NoiseRig(baud, drive_timeout=2.0)
+    rig = make_noise(baud, drive_timeout=2.0)
     rig.ride()
     for number in range(12):
         begin = rig.clock.now + 0.1 + 0.0117 * number
@@ -95,11 +119,12 @@ def test_after_a_burst_the_first_request_goes_out_and_the_first_status_comes_at_
         assert asked - end <= 0.25
         assert told - asked <= 0.2
         assert not rig.ends
-    rig.close()
 
 
-def test_a_drive_that_is_lost_is_asked_again_before_its_own_time_out_strikes() -> None:
-    rig = NoiseRig(drive_timeout=2.5)
+def test_a_drive_that_is_lost_is_asked_again_before_its_own_time_out_strikes(
+    make_noise: MakeNoise
+) -> None:
+    rig = make_noise(drive_timeout=2.5)
     rig.ride()
     for number in range(10):
         begin = rig.clock.now + 0.1 + 0.003 * number
@@ -108,12 +133,11 @@ def test_a_drive_that_is_lost_is_asked_again_before_its_own_time_out_strikes() -
         assert rig.ends and rig.ends[0].startswith('lost: ')
         assert not rig.far.faults
         rig.enable()
-    rig.close()
 
 
-def test_without_an_answer_it_is_lost_after_the_time_set() -> None:
+def test_without_an_answer_it_is_lost_after_the_time_set(make_noise: MakeNoise) -> None:
     for lost_after in (0.5, 1.0, 3.0):
-        rig = NoiseRig(lost_after=lost_after)
+        rig = make_noise(lost_after=lost_after)
         rig.ride()
         begin = rig.clock.now
         rig.line.bursts = [(begin, begin + 10.0)]
@@ -122,12 +146,11 @@ def test_without_an_answer_it_is_lost_after_the_time_set() -> None:
         # from the first answer that is missing to the end of the request that is under way then
         assert lost_after + 0.2 <= lost_at - begin <= lost_after + 0.45
         assert not rig.drive.armed
-        rig.close()
 
 
-def test_one_damaged_answer_in_each_round_is_no_loss() -> None:
+def test_one_damaged_answer_in_each_round_is_no_loss(make_noise: MakeNoise) -> None:
     # 81 of 84 requests were answered, and the drive was "lost"
-    rig = NoiseRig(setpoint_timeout=0.0)
+    rig = make_noise(setpoint_timeout=0.0)
     rig.ride()
     frequency, speed = rig.register('status.frq_act'), rig.register('status.spd_act')
     asked: list[int] = []
@@ -152,12 +175,13 @@ def test_one_damaged_answer_in_each_round_is_no_loss() -> None:
     told = [snapshot for _, snapshot in rig.notes.published[before:]]
     assert len(told) >= spoiled[0] - 1
     assert all(snapshot.speed == snapshot.speed for snapshot in told)
-    rig.close()
 
 
 @pytest.mark.parametrize('poll_rate', [0.2, 0.5, 2.0])
-def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(poll_rate: float) -> None:
-    rig = NoiseRig(poll_rate=poll_rate, telemetry_rate=0.0)
+def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(
+    make_noise: MakeNoise, poll_rate: float
+) -> None:
+    rig = make_noise(poll_rate=poll_rate, telemetry_rate=0.0)
     rig.answer(rig.drive.connect())
     rig.drive.activate()
     rig.pass_time(0.3)
@@ -173,4 +197,3 @@ def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(poll_rate: float) -> 
     rig.line.bursts = [(begin, begin + 60.0)]
     rig.pass_time(1 / poll_rate + 1.5)
     assert len(rig.ends) == 1
-    rig.close()

@@ -22,6 +22,7 @@ driver makes of what the drive does, whoever brought it there.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 
 from drive_rig import PATIENCE
 from drive_rig import MakeRig
@@ -209,8 +210,10 @@ def stops_before_the_direction(rig: Rig) -> None:
 
 
 def stops_quickly_before_the_direction(rig: Rig) -> None:
-    answer = when_switched_on(rig, rig.drive.quick_stop)
+    stops: list[Future[str]] = []
+    answer = when_switched_on(rig, lambda: stops.append(rig.drive.quick_stop()))
     assert answer == 'it was stopped while it was being enabled'
+    stops[0].result(PATIENCE)
 
 
 def is_enabled_after_its_self_test(rig: Rig) -> None:

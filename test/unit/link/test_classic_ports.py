@@ -234,12 +234,11 @@ def test_nobody_there(hasty: ClassicLink) -> None:
 
 @pytest.mark.parametrize('late', [1.5, 3.0])
 def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
-    timers: list[threading.Timer] = []
-
     def hold_back(data: bytes) -> None:
+        # whatever it is asked meanwhile is answered behind this
         drive.answer = drive.send
-        timers.append(threading.Timer(late * SHORT, drive.send, (data,)))
-        timers[0].start()
+        time.sleep(late * SHORT)
+        drive.send(data)
 
     drive.answer = hold_back
     with pytest.raises(NoAnswer):
@@ -254,7 +253,6 @@ def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
         except LinkError as error:
             assert not isinstance(error, (PortError, Refused))
     assert words == (7,)
-    timers[0].join()
 
 
 def test_answer_of_another(drive: PtyDrive, hasty: ClassicLink) -> None:
