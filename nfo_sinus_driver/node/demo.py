@@ -35,6 +35,7 @@ import tempfile
 import threading
 import time
 
+from nfo_sinus_msgs.msg import InvSt
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
@@ -97,8 +98,8 @@ def ride(rider: Rider, bench: Bench) -> None:
     rider.wait_for('a released motor', near(0.0))
     rider.watch_for(_COASTS_FOR, 'a released motor', near(0.0))
     rider.trigger('fault_ack')
-    # what still coasts is caught and ramped down
-    rider.wait_for('standby', lambda: rider.inv_st and rider.inv_st.code == _BUS_STANDBY)
+    # nobody has control then, so nothing turns
+    rider.wait_for('no fault', lambda: rider.inv_st and rider.inv_st.kind == InvSt.STATUS)
     rider.say('set-points keep coming, and nothing turns until it is enabled again')
     rider.watch_for(_STANDS_FOR, 'standstill', near(0.0))
 

@@ -39,6 +39,7 @@ from support.classic_ends import OTHER_ON_CLASSIC
 from support.classic_ends import on_classic
 from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
+from support.variants import hardest
 from ways import UNFRAMED
 from ways import Way
 
@@ -232,7 +233,9 @@ class Stubborn(contextlib.ExitStack):
         super().__init__()
         #: What can be set the way that the bench goes.
         self.names = tuple(settings(bench.way))
-        self.simulator = Simulator(**bench.line, trace=str(bench.trace))
+        self.simulator = Simulator(
+            **bench.line, trace=str(bench.trace), variant=hardest(bench.way.model)
+        )
         self.drive: SimulatedDrive = self.simulator.drives[1]
 
     def __enter__(self) -> Stubborn:

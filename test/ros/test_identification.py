@@ -87,11 +87,12 @@ def test_it_is_asked_once_for_each_connection(bench: Bench) -> None:
     client.wait_for('status', lambda status: not status.connected, 'it is lost')
     client.wait_for('status', lambda status: status.connected, 'it is back')
     wait_until(lambda: driver.text.count(f'serial {_SERIAL}') == 2, 'it is named again')
-    assert _asked(bench) == 2 * [_DEVICE, _SLAVE_ID]
+    # while it was silent it may have been asked the same to find out whether it is there
+    before = _asked(bench)
     assert client.change_state(Transition.TRANSITION_DEACTIVATE)
     assert client.change_state(Transition.TRANSITION_CLEANUP)
     assert client.change_state(Transition.TRANSITION_CONFIGURE)
-    assert _asked(bench) == 3 * [_DEVICE, _SLAVE_ID]
+    assert _asked(bench) == [*before, _DEVICE, _SLAVE_ID]
 
 
 @pytest.mark.parametrize('treated', ['refused', 'silent'])
