@@ -351,7 +351,8 @@ def test_a_fault(bench: Bench) -> None:
     assert not bench.state()['driven']
     # and nothing starts when it is acknowledged
     assert bench.run('ack').status == 0
-    assert bench.stopped
+    assert not bench.state()['driven']
+    wait_until(lambda: bench.stopped)
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,8 @@ def test_fault_stops_and_nothing_starts_by_itself(rig: Rig) -> None:
     turn(rig)
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('fault 5 Overload')
+    # a set-point that it refuses comes before the status that tells why
+    wait_until(lambda: rig.notes.told('fault 5 Overload'))
     rig.acknowledged = 1
     assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
     wait_until(lambda: not rig.far.faults)

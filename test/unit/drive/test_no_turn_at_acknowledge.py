@@ -38,7 +38,7 @@ from nfo_sinus_driver.simulator.variant import SCMD as SCMD_ONLY
 from nfo_sinus_driver.simulator.variant import Variant
 
 #: How many acknowledgements each kind of drive goes through; a campaign has a thousand.
-ACKNOWLEDGEMENTS = int(os.environ.get('ACKNOWLEDGEMENTS', '40'))
+ACKNOWLEDGEMENTS = int(os.environ.get('ACKNOWLEDGEMENTS', '20'))
 KINDS = (
     Variant(run_command_in_fault=KEEPS, refuses_in_fault=NOTHING),
     Variant(run_command_in_fault=KEEPS, refuses_in_fault=SCMD_ONLY),
