@@ -75,6 +75,8 @@ campaign: setup ## many histories of commands, faults and line losses in any ord
 	@seed=$(or $(SEED),$$(od -An -N3 -tu4 /dev/urandom | tr -d ' ')); echo "seed $$seed"; \
 	SEED=$$seed HISTORIES=$(or $(HISTORIES),3000) tools/run python $(PYTEST) \
 		-n auto --dist worksteal test/unit/drive/test_any_order.py -k campaign
+	@ACKNOWLEDGEMENTS=$(or $(ACKNOWLEDGEMENTS),1000) tools/run python $(PYTEST) -n auto \
+		test/unit/drive/test_no_turn_at_acknowledge.py -k no_turn
 
 fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=frame)
 	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \

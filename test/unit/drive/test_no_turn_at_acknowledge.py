@@ -118,7 +118,7 @@ def fall_still(rig: VirtualRig) -> None:
         rig.pass_time(0.5)
 
 
-@pytest.mark.timeout(1200)
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_turn_at_an_acknowledgement(make_virtual: MakeVirtual, kind: Variant) -> None:
     rig = make_virtual(variant=kind)
