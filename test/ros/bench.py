@@ -65,6 +65,11 @@ PATIENCE = 40.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
 
+#: How often a drive is polled where a test does not want it as fast as the line allows, Hz.
+POLL_RATE = 25.0
+#: For a test that does.
+FULL_RATE = ('-p', 'poll_rate:=0.0')
+
 TOPICS = {
     'status': (DriveStatus, 10),
     'inv_st': (InvSt, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)),
@@ -202,8 +207,14 @@ class Bench(contextlib.ExitStack):
         return self.enter_context(Simulated(self.line['control']))
 
     def driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
-        """Start a driver on the line; ``-p name:=value`` arguments may follow."""
+        """
+        Start a driver on the line; ``-p name:=value`` arguments may follow.
+
+        It polls at a modest rate unless they say otherwise: tests share the processors.
+        """
         given = {'port': self.port, **self.way.driver}
+        if not any('poll_rate' in argument for argument in arguments):
+            given['poll_rate'] = POLL_RATE
         settings = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
         return self.bare_driver(*settings, *arguments, through=through)
 

@@ -45,7 +45,7 @@ pytestmark = pytest.mark.every_way
 _SPEED = 8.0
 _QUICK = ('--set', 'control.accel=0.3', '--set', 'control.retard=0.3', '--boot-time', '0.5')
 #: The computer has more to do than this one driver.
-_MODEST = ('-p', 'poll_rate:=50')
+_MODEST = ('-p', 'poll_rate:=25')
 
 _NAMES = {line.split(',')[2] for line in setting_names.SETTINGS.splitlines() if line}
 

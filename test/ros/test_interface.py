@@ -20,6 +20,7 @@ from collections.abc import Iterator
 import itertools
 import math
 
+from bench import FULL_RATE
 from bench import PATIENCE
 from bench import TOPICS
 from bench import Bench
@@ -68,7 +69,7 @@ def idle(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Bench]:
     """A drive at rest and its driver, for the tests that leave both as they are."""
     with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('idle'), way) as bench:
         bench.simulator()
-        bench.driver()
+        bench.driver(*FULL_RATE)
         bench.client().connected()
         yield bench
 
@@ -81,7 +82,7 @@ def _stamps_increase(client: Client, topic: str) -> bool:
 
 def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
     drive = bench.simulator(*_QUICK)
-    bench.driver('-p', 'frame_id:=drive', '-p', 'telemetry_rate:=10.0')
+    bench.driver(*FULL_RATE, '-p', 'frame_id:=drive', '-p', 'telemetry_rate:=10.0')
     client = bench.client().connected()
     with client.run_at(25.0):
         reached = 'setpoint_reached' not in bench.way.untold
@@ -136,7 +137,7 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
 
 def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench) -> None:
     bench.simulator('--address', '7')
-    driver = bench.driver()
+    driver = bench.driver(*FULL_RATE)
     client = bench.client()
     wait_until(lambda: len(client.messages['statistics']) > 1, 'statistics')
     client.wait_for('status', lambda status: not status.connected, 'a status all the same')
@@ -162,7 +163,7 @@ def _diagnosis(client: Client, name: str) -> DiagnosticStatus | None:
 
 def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
     drive = bench.simulator()
-    bench.driver()
+    bench.driver(*FULL_RATE)
     client = bench.client().connected()
 
     def level(level: bytes) -> DiagnosticStatus | None:
@@ -185,7 +186,7 @@ def test_diagnostics_of_a_ride_name_its_fault_and_cry_over_no_stop_that_goes_wel
     bench: Bench,
 ) -> None:
     drive = bench.simulator()
-    bench.driver()
+    bench.driver(*FULL_RATE)
     client = bench.client().connected()
 
     def said() -> list[str]:
@@ -260,7 +261,7 @@ def test_a_setting_that_makes_no_sense_is_refused_with_the_reason(
 
 def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: Bench) -> None:
     drive = bench.simulator(*_QUICK)
-    bench.driver()
+    bench.driver(*FULL_RATE)
     client = bench.client().connected()
     assert client.set_parameters(setpoint_max=10, telemetry_rate=20).successful
     assert client.parameter('setpoint_max') == 10.0
@@ -282,20 +283,20 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
 @needs('parameters')
 def test_what_the_drive_has_already_is_not_written(bench: Bench) -> None:
     drive = bench.simulator('--set', 'serial.sio_tot=2', '--set', 'serial.auto_stop=ON')
-    bench.driver('-p', 'drive_timeout:=2.0')
+    bench.driver(*FULL_RATE, '-p', 'drive_timeout:=2.0')
     bench.client().connected()
     assert not drive.state()['writes']
 
 
 def test_an_integer_on_the_command_line_is_taken_for_a_double(bench: Bench) -> None:
     bench.simulator()
-    bench.driver('-p', 'setpoint_timeout:=3')
+    bench.driver(*FULL_RATE, '-p', 'setpoint_timeout:=3')
     assert bench.client().connected().parameter('setpoint_timeout') == 3.0
 
 
 def test_lifecycle_by_hand(bench: Bench) -> None:
     bench.simulator()
-    bench.driver('-p', 'autostart:=false')
+    bench.driver(*FULL_RATE, '-p', 'autostart:=false')
     client = bench.client()
     client.wait_for('status', lambda status: not status.connected, 'the node is there')
     assert client.state() == 'unconfigured'
@@ -320,7 +321,7 @@ def test_lifecycle_by_hand(bench: Bench) -> None:
 @needs('modbus', 'states')
 def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.accel=0.5', '--set', 'control.retard=30')
-    driver = bench.driver('-p', 'shutdown_timeout:=0.1')
+    driver = bench.driver(*FULL_RATE, '-p', 'shutdown_timeout:=0.1')
     client = bench.client().connected()
     with client.run_at(20.0):
         result = client.set_parameters(control_method='drive_control')
@@ -342,7 +343,7 @@ def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> No
 
 def test_monitor_writes_nothing(bench: Bench) -> None:
     drive = bench.simulator()
-    driver = bench.driver('-p', 'control_method:=monitor', '-p', 'drive_timeout:=2.0')
+    driver = bench.driver(*FULL_RATE, '-p', 'control_method:=monitor', '-p', 'drive_timeout:=2.0')
     client = bench.client().connected()
     with client.setpoints(20.0):
         for service in ('stop', 'quick_stop', 'fault_ack'):
@@ -365,7 +366,7 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
         'left: {ros__parameters: {address: 1}}\n'
         'right: {ros__parameters: {address: 2}}\n'
     )
-    bench.driver('--params-file', str(parameters))
+    bench.driver(*FULL_RATE, '--params-file', str(parameters))
     left = bench.client('/left').connected()
     right = bench.client('/right').connected()
     with left.run_at(15.0), right.run_at(-15.0):

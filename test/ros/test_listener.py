@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bench import FULL_RATE
 from bench import Bench
 from bench import wait_until
 import pytest
@@ -42,7 +43,7 @@ def node(domain: int) -> Iterator[Node]:
 
 def test_a_remapped_topic_in_a_namespace_belongs_to_the_drive_node(bench: Bench) -> None:
     drive = bench.simulator()
-    bench.driver('-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
+    bench.driver(*FULL_RATE, '-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
     client = bench.client('/plant/nfo_sinus').connected()
 
     def owners() -> list[tuple[str, str]]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import signal
 
+from bench import FULL_RATE
 from bench import Bench
 from lifecycle_msgs.msg import Transition
 from support.trace_laws import violations
@@ -45,7 +46,7 @@ def _requests(bench: Bench) -> list[Request]:
 def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
     way = bench.way
     drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
-    driver = bench.driver('-p', 'drive_timeout:=3.0')
+    driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(20.0):
         client.wait_for('telemetry', lambda message: message.frequency > 15, 'telemetry')

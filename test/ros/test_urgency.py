@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import time
 
+from bench import FULL_RATE
 from bench import Bench
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
@@ -68,7 +69,7 @@ def test_a_stop_overtakes_a_hanging_configure_and_a_slow_parameter(bench: Bench)
         'silent: {ros__parameters: {address: 2, autostart: false}}\n'
     )
     drive.inject('silence', 3600.0, address=2)
-    bench.driver('--params-file', str(parameters))
+    bench.driver(*FULL_RATE, '--params-file', str(parameters))
     good = bench.client('/good').connected()
     silent = bench.client('/silent')
     assert silent.state() == 'unconfigured'
@@ -108,7 +109,7 @@ def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: 
         'one: {ros__parameters: {address: 1, telemetry_rate: 50.0}}\n'
         'two: {ros__parameters: {address: 2, telemetry_rate: 50.0}}\n'
     )
-    bench.driver('--params-file', str(parameters))
+    bench.driver(*FULL_RATE, '--params-file', str(parameters))
     one = bench.client('/one').connected()
     two = bench.client('/two').connected()
     with one.run_at(10.0), two.run_at(10.0):
