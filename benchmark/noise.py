@@ -152,7 +152,7 @@ def main() -> None:
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     cases = _QUICK if options.quick else CASES
     rows = []
-    for baud_rate in _BAUD_RATES:
+    for baud_rate in options.baud or _BAUD_RATES:
         for case in cases:
             lasting = case.verb[:3] == ('noise-rate', 'damage', _LASTING)
             seconds = 60 * options.minutes if lasting else options.seconds
@@ -203,6 +203,7 @@ def _parser() -> argparse.ArgumentParser:
         default=10.0,
         help=f'how long {100 * _LASTING:g} %% of damaged answers last (default: 10)',
     )
+    add('--baud', type=int, nargs='+', help='bit rates (default: both)')
     add('--quick', action='store_true', help='few cases for a moment, to see that it works')
     add('--write', action='store_true', help=f'put the table into docs/{page.PAGE.name}')
     add('--domain', type=int, default=90, metavar='ID', help='ROS domain (default: 90)')

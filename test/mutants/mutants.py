@@ -39,6 +39,8 @@ _SIGNALS = 'nfo_sinus_driver/signals.py'
 _WITHDRAWAL = 'nfo_sinus_driver/drive/withdrawal.py'
 _CONTROL = 'nfo_sinus_driver/drive/drive_control.py'
 _ANY_ORDER = 'test/unit/drive/test_any_order.py'
+_STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
+_NO_TURN = ('test/unit/drive/test_no_turn_at_acknowledge.py',)
 _G2_SCMD = (_ANY_ORDER, '-k', 'G2ModeScmd')
 _G2_CONTROL = (_ANY_ORDER, '-k', 'G2DriveControl')
 _OPTIMAL_SCMD = (_ANY_ORDER, '-k', 'OptimalModeScmd')
@@ -222,7 +224,7 @@ MUTANTS = (
         3,
         'deactivate does not stop the motor',
         _NODE,
-        "        self._stop_for('deactivated', self._drive.deactivate)\n",
+        '        self._stop_for(what, self._drive.deactivate)\n',
         '',
         (_WAYS_OUT, '-k', 'deactivate'),
     ),
@@ -304,9 +306,9 @@ MUTANTS = (
         'control is given back by MODE = Ext',
         _METHOD,
         "            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)\n\n"
-        '    async def acknowledge',
+        '    async def remove',
         "            await self._registers.write('fieldbus.mode', Mode.EXT, Priority.SERVICE)\n\n"
-        '    async def acknowledge',
+        '    async def remove',
         (_TRACE,),
     ),
     Mutant(
@@ -321,8 +323,8 @@ MUTANTS = (
         8,
         'a late answer is believed',
         'nfo_sinus_driver/link/serial_link.py',
-        '        if not isinstance(request, Write):',
-        '        if False:',
+        '        probed = not isinstance(request, Write) and self._make_certain(request)',
+        '        probed = False',
         (_RTU_LINK,),
     ),
     Mutant(
@@ -424,8 +426,8 @@ MUTANTS = (
         2,
         'in any order: a lost line does not disarm',
         _WATCH,
-        '            if self._motion is not None and self._motion.lost():',
-        '            if False:',
+        '        if self._motion is not None and self._motion.lost():',
+        '        if False:',
         _G2_SCMD,
     ),
     Mutant(
@@ -473,16 +475,16 @@ MUTANTS = (
         'in any order: what ends a ride leaves the run command standing',
         _MOTION,
         '        self.disarm()\n        self._withdrawal.begin()\n'
-        '        seen = self._inverter.seen\n        if seen',
-        '        self.disarm()\n        seen = self._inverter.seen\n        if seen',
+        '        self._tell_stopped(reason)',
+        '        self.disarm()\n        self._tell_stopped(reason)',
         _G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: a stop that a fault holds is forgotten',
         _WITHDRAWAL,
-        '        return not refusal and not seen',
-        '        return self.held_by_fault or not refusal and not seen',
+        '            return _Outcome.BLOCKED_BY_FAULT\n',
+        '            return _Outcome.CONFIRMED\n',
         _G2_SCMD,
     ),
     Mutant(
@@ -581,5 +583,53 @@ MUTANTS = (
         '            await self._change(~_RUN, Control(0), Priority.STOP)\n'
         "            await self._registers.write('fieldbus.scmd', 0, Priority.STOP)\n",
         _G2_CONTROL,
+    ),
+    Mutant(
+        3,
+        'a tuning that refuses the stop is taken for a motor that stands',
+        _WITHDRAWAL,
+        '        if seen.tuning:\n',
+        '        if False:\n',
+        _STOP_CONFIRMED,
+    ),
+    Mutant(
+        2,
+        'an enable waits for a stop and then runs',
+        _MOTION,
+        '        if self.stopping or self._releasing:\n            raise',
+        '        if False:\n            raise',
+        _STOP_CONFIRMED,
+    ),
+    Mutant(
+        3,
+        'a stop that was lost is not repeated at once',
+        _WITHDRAWAL,
+        '        elif self._outcome is not _Outcome.UNHEARD or self._is_lost:\n',
+        '        else:\n',
+        _STOP_CONFIRMED,
+    ),
+    Mutant(
+        2,
+        'a fault is acknowledged with the run command still there',
+        _METHOD,
+        '        if ours and await self.remove(control_mode) is Removal.NOTHING:\n',
+        '        if False:\n',
+        _NO_TURN,
+    ),
+    Mutant(
+        2,
+        'nothing follows the acknowledgement of a drive that refuses everything',
+        _METHOD,
+        '                await self._registers.acknowledge_and_write(key, *self._soonest)\n',
+        '                await self._registers.acknowledge(key, _ACK)\n',
+        _NO_TURN,
+    ),
+    Mutant(
+        3,
+        'an exit does not count a drive that is just being connected to',
+        _MAIN,
+        '            if self._may_be_there(node) and not',
+        '            if node.drive.identity is not None and not',
+        ('test/ros/test_no_false_success.py', '-k', 'before_the_first_answer'),
     ),
 )
