@@ -223,8 +223,12 @@ class Bus:
     async def join(self, task: Task, timeout: float) -> bool:
         """Wait for the end of another task (to be awaited); false when the time is over."""
         if not task.future.done():
-            task.joiners.append(self.current)
-            await self.sleep(timeout)
+            me = self.current
+            task.joiners.append(me)
+            try:
+                await self.sleep(timeout)
+            finally:
+                task.joiners.remove(me)
         return task.future.done()
 
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
@@ -334,7 +338,7 @@ class Bus:
             return
         if awaited is None:
             self._tasks.discard(task)
-            for joiner in task.joiners:
+            for joiner in tuple(task.joiners):
                 self.wake(joiner)
             return
         self._tasks.add(task)

@@ -182,7 +182,7 @@ class DriveControl:
             for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
                 await self._change(~(_RUN | Control.RESET_MALFUNCTION), add, Priority.SERVICE)
         except Refused:
-            if await self.remove(control_mode) is Removal.NOTHING:
+            if await self.remove(control_mode) is not Removal.COMMAND:
                 # refused while the cause of the fault lasts: the status will tell
                 with contextlib.suppress(Refused):
                     await registers.acknowledge_and_write(

@@ -176,7 +176,7 @@ class ModeScmd:
     async def _acknowledge_by_reading(self, control_mode: str) -> None:
         key = 'fieldbus.inv_st_with_ack'
         ours = await self.in_control(_ACK)
-        if ours and await self.remove(control_mode) is Removal.NOTHING:
+        if ours and await self.remove(control_mode) is not Removal.COMMAND:
             # refused while the cause of the fault lasts: the status will tell
             with contextlib.suppress(Refused):
                 await self._registers.acknowledge_and_write(key, *self._soonest)

@@ -241,7 +241,9 @@ class Motion:
         try:
             why = await self._method.acknowledge(seen.code, inverter.control_mode)
         finally:
-            # even if no answer came, the drive may be free to run now
+            # even if no answer came, the drive may be free to run now; and who has enabled it
+            # meanwhile did so before this stop
+            self.disarm()
             if ours:
                 self._withdrawal.begin_anew()
         try:

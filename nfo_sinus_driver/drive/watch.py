@@ -261,18 +261,26 @@ class Watch:
         self._told_fault = code
 
     async def _measure(self, key: str) -> float:
-        """Read a measured value; NaN if the drive refuses it, for it answers all the same."""
+        """Read a measured value; NaN if it is not to be had from a drive that answers."""
         try:
             return await self._insist(lambda: self._inverter.measure(key, Priority.POLL))
+        except PortError:
+            raise
         except Refused:
+            return NAN
+        except LinkError:
+            if self._silent_for_long:
+                raise
             return NAN
 
     async def _insist(self, read: Callable[[], Awaitable[_T]]) -> _T:
         """
         Repeat a read at once until the drive answers; what was read before it stays good.
 
-        :raises LinkError: the drive has been silent for too long, or refuses; or the port is gone.
+        :raises LinkError: the drive has been silent for too long, or has answered everything but
+            this; it refuses; or the port is gone.
         """
+        failing_since = math.inf
         while True:
             try:
                 answer = await read()
@@ -280,7 +288,10 @@ class Watch:
                 raise
             except LinkError:
                 self._inverter.answering = False
-                if self._silent_for_long:
+                now = time.monotonic()
+                failing_since = min(failing_since, now)
+                in_vain = now - failing_since >= self._inverter.settings.lost_after
+                if self._silent_for_long or in_vain:
                     raise
                 self._bus.recorder.retry()
             else:

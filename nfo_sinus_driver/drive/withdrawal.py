@@ -51,12 +51,18 @@ class _Outcome(enum.Enum):
     """What became of one attempt to stop."""
 
     CONFIRMED = enum.auto()
-    #: Nobody knows whether the drive has heard it: it is repeated at once.
+    #: Nobody knows whether the drive has heard it: it is repeated at once, for a while.
     UNHEARD = enum.auto()
+    #: The drive was too busy for it, and may take it the next moment.
+    BUSY = enum.auto()
     #: It was heard, or it is known that it was not sent.
     UNCONFIRMED = enum.auto()
     #: A fault keeps the motor still, and the drive from taking the stop until it is over.
     BLOCKED_BY_FAULT = enum.auto()
+
+
+class _Busy(Exception):
+    """The drive was too busy for the stop."""
 
 
 class Withdrawal:
@@ -149,6 +155,8 @@ class Withdrawal:
                 raise DriveError(
                     f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
                 )
+        if task is not None and task.future.exception() is not None:
+            raise DriveError('the stop is NOT confirmed: the driver is ending')
 
     async def _keep_trying(self) -> None:
         complain_at = self._due
@@ -195,7 +203,12 @@ class Withdrawal:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
         if not self._inverter.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
-        elif self._outcome is not _Outcome.UNHEARD or self._is_lost:
+        elif self._is_lost or time.monotonic() >= self._due:
+            # what helps neither at once nor in a while must not keep the line from all others
+            await self._bus.sleep(_RETRY_PERIOD)
+        elif self._outcome is _Outcome.BUSY:
+            await self._bus.sleep(LOOK_PERIOD)
+        elif self._outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 
     @property
@@ -210,6 +223,8 @@ class Withdrawal:
             self._outcome = await self._try_once()
         except (NoAnswer, DamagedAnswer) as error:
             self._outcome, self._unconfirmed = _Outcome.UNHEARD, str(error)
+        except _Busy as error:
+            self._outcome, self._unconfirmed = _Outcome.BUSY, str(error)
         except Exception as error:
             # even a mistake of ours must not end the trying
             self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, str(error) or repr(error)
@@ -227,6 +242,8 @@ class Withdrawal:
         try:
             await self._method.stop(control_mode)
         except Refused as error:
+            if error.code == Refused.BUSY:
+                raise _Busy(str(error)) from error
             refusal = str(error)
         except DamagedAnswer:
             # among late answers a refusal is not believed, until something else was answered

@@ -200,10 +200,12 @@ def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
     except FutureTimeoutError:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
-    except DriveError as error:
+    except Exception as error:
         if not node.drive.heard:
             return True
-        log.error(str(error))
+        # whatever it is, the other drives have to be waited for, too
+        why = str(error) if isinstance(error, DriveError) else f'error in the driver: {error!r}'
+        log.error(why)
         return False
     if answer:
         log.info(answer)

@@ -177,6 +177,46 @@ def test_one_damaged_answer_in_each_round_is_no_loss(make_noise: MakeNoise) -> N
     assert all(snapshot.speed == snapshot.speed for snapshot in told)
 
 
+@pytest.mark.parametrize('key', ['status.frq_act', 'fieldbus.inv_st'])
+def test_one_read_that_never_comes_whole_leaves_no_motor_unwatched(
+    make_noise: MakeNoise, key: str
+) -> None:
+    rig = make_noise()
+    rig.ride()
+    register = rig.register(key)
+    spoilt = b'\x01\x03\x02\x00\x00\xff\xff'
+    rig.line.meet = lambda frame: (
+        spoilt if frame[1] == 3 and int.from_bytes(frame[2:4], 'big') == register else None
+    )
+    # all else is answered, so it is never silent
+    rig.pass_time(0.3)
+    rig.send(0.0)
+    rig.pass_time(5.0)
+    assert abs(rig.far.motor.frequency) < 0.2
+    rig.send(20.0)
+    rig.far.trip(3)
+    rig.pass_time(5.0)
+    assert not rig.drive.armed
+
+
+def test_a_stop_that_is_never_answered_leaves_the_line_to_others_too(make_noise: MakeNoise) -> None:
+    rig = make_noise()
+    rig.ride()
+    register = rig.register('fieldbus.scmd')
+    rig.line.meet = lambda frame: (
+        b'\x00\x11' if frame[1] == 6 and int.from_bytes(frame[2:4], 'big') == register else None
+    )
+    stop = rig.drive.stop()
+    rig.pass_time(3.0)
+    assert stop.exception() is not None
+    polls = len(rig.notes.published)
+    rig.pass_time(5.0)
+    assert len(rig.notes.published) >= polls + 5
+    rig.line.meet = lambda frame: None
+    rig.pass_time(1.0)
+    assert not rig.drive.stop_unconfirmed
+
+
 @pytest.mark.parametrize('poll_rate', [0.2, 0.5, 2.0])
 def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(
     make_noise: MakeNoise, poll_rate: float

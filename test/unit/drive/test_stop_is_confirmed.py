@@ -177,6 +177,51 @@ def test_a_lost_stop_is_repeated_at_once(make_virtual: MakeVirtual) -> None:
     assert not rig.said('CANNOT STOP')
 
 
+def test_a_stop_that_ends_with_the_driver_is_no_success(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.connect()
+
+    def lose(register: int, words: Words | None) -> None:
+        if (register, words) == (SCMD, (RUN,)):
+            rig.link.state = 'deaf'
+
+    rig.before = lose
+    rig.drive.enable()
+    while not rig.far.motor.driven:
+        rig.pass_time(0.01)
+    # what was seen last is a drive that stands by
+    rig.link.state = 'silent'
+    stop = rig.drive.stop()
+    rig.pass_time(0.2)
+    rig.bus.close()
+    assert rig.far.motor.driven
+    assert isinstance(stop.exception(), DriveError)
+
+
+def test_a_stop_that_the_drive_is_too_busy_for_is_written_again_soon(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.ride()
+    rig.be_busy(SCMD, 3, writes=True)
+    asked_at = rig.clock.now
+    stop = rig.drive.stop()
+    while rig.far.runner.scmd != Scmd.STOP:
+        rig.pass_time(0.005)
+    assert rig.clock.now - asked_at < 0.15
+    assert answered(rig, stop)
+
+
+def test_callers_who_were_answered_are_forgotten(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.ride()
+    rig.link.state = 'silent'
+    rig.pass_time(3.0)
+    for _ in range(5):
+        assert not answered(rig, rig.drive.stop())
+    assert not rig.drive._motion._withdrawal._task.joiners
+
+
 def test_many_callers_share_one_stop(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     rig.ride()
