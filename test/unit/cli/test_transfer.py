@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
 import json
 import os
 from pathlib import Path
@@ -25,9 +27,11 @@ import signal
 
 from cli_bench import Bench
 from cli_bench import Done
+from cli_bench import wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.cli import loading
 from nfo_sinus_driver.cli.parameter_file import parse_file
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -404,9 +408,35 @@ def test_a_fault_half_way(nfo: Nfo, bench: Bench, some: Path) -> None:
     assert 'motor.p_nom: 2.2 kW, was 1.5 kW' in done.err
 
 
+@pytest.fixture
+def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """What sends one signal, the first time it is asked to, and waits until it was noted."""
+    noted: list[Callable[[], bool]] = []
+    original = loading._signals_noted
+    sent: list[int] = []
+
+    @contextlib.contextmanager
+    def seen() -> Iterator[Callable[[], bool]]:
+        with original() as came:
+            noted.append(came)
+            yield came
+
+    def send(number: int) -> None:
+        if not sent:
+            sent.append(number)
+            os.kill(os.getpid(), number)
+            # the main thread may be late to note it: without this more would be written
+            wait_until(noted[-1])
+
+    monkeypatch.setattr(loading, '_signals_noted', seen)
+    return send
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_half_way(nfo: Nfo, bench: Bench, some: Path, number: int) -> None:
-    bench.on_write('control.accel', lambda: os.kill(os.getpid(), number))
+def test_interrupted_half_way(
+    nfo: Nfo, bench: Bench, some: Path, interrupt: Callable[[int], None], number: int
+) -> None:
+    bench.on_write('control.accel', lambda: interrupt(number))
     done = nfo('load', some, '--put-back')
     assert done.status == 1
     # what was on its way when the signal came was finished, and then put back
@@ -417,8 +447,10 @@ def test_interrupted_half_way(nfo: Nfo, bench: Bench, some: Path, number: int) -
     assert bench.drive().writes['freque.f_fix2'] == 0
 
 
-def test_interrupted_at_the_very_end_it_is_done(nfo: Nfo, bench: Bench, some: Path) -> None:
-    bench.on_write('freque.f_fix2', lambda: os.kill(os.getpid(), signal.SIGINT))
+def test_interrupted_at_the_very_end_it_is_done(
+    nfo: Nfo, bench: Bench, some: Path, interrupt: Callable[[int], None]
+) -> None:
+    bench.on_write('freque.f_fix2', lambda: interrupt(signal.SIGINT))
     assert nfo('load', some).status == 0
     assert has(bench, SOME)
 
