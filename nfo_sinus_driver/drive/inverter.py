@@ -36,9 +36,13 @@ from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
+#: The parameter that a status begins with.
+STATUS_WORD = 'fieldbus.drive_status'
 #: Firmware from which on [M0] describes the Classic protocol [C3].
 _FIRST_OF_V2_03 = 4.28
 #: As long as RunDly of the G2 can be, s.
@@ -129,19 +133,24 @@ class Inverter:
         *,
         once: bool = False,
         alarming: Callable[[InverterStatus], bool] = lambda _: False,
+        told: Reply | None = None,
     ) -> InverterStatus:
         """
         Read the status, without acknowledging anything.
 
         :param once: do not repeat a request when nobody answers.
+        :param told: the status word, where the drive has just told it with something else.
         :param alarming: tells of half a status whether it may have to stop the motor; if it does
             and has not before, the rest is read at the head of the bus.
         :raises LinkError: the drive does not answer.
         """
-        if not self.has('fieldbus.drive_status'):
+        if not self.has(STATUS_WORD):
             return await self._look_at_code(priority, once)
         before = self.seen
-        word, at = await self._read_word(priority, once)
+        if told is None:
+            word, at = await self._read_word(priority, once)
+        else:
+            word, at = self.status_word(told.words), told.arrived
         seen = InverterStatus(at, word, NO_CODE, self.model)
         alarmed = before is not None and word != before.word and alarming(seen)
         priority = Priority.STOP if alarmed else priority
@@ -165,10 +174,12 @@ class Inverter:
         return self._saw(seen)
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
-        assert isinstance(word, int)
-        # the upper half is described nowhere [C24]
-        return word & 0xFFFF, at
+        reply = await self._registers.read_reply(STATUS_WORD, priority, once=once)
+        return self.status_word(reply.words), reply.arrived
+
+    def status_word(self, words: Words) -> int:
+        """Return what counts of a status word: the upper half is described nowhere [C24]."""
+        return int(self._registers.number(STATUS_WORD, words)) & 0xFFFF
 
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""

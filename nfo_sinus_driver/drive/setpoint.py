@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import enum
 import math
 import time
 
@@ -25,6 +26,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
@@ -33,6 +35,7 @@ from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s.
@@ -43,11 +46,22 @@ _LONGEST_BUSY = 1.0
 _WATCH_PERIOD = 0.25
 
 
+class _Combining(enum.Enum):
+    """Whether the drive takes a set-point and tells its status in one transaction."""
+
+    #: Nobody knows, for none has been answered yet.
+    UNTRIED = enum.auto()
+    TAKEN = enum.auto()
+    #: Not while it stays connected: it has refused the function, or has none.
+    GIVEN_UP = enum.auto()
+
+
 class Setpoint:
     """
     What the motor is to follow while the drive is armed.
 
     :param refused: called when the drive refuses a set-point, with the reason.
+    :param told: called with the status word that a drive told with a set-point.
     """
 
     def __init__(
@@ -57,13 +71,15 @@ class Setpoint:
         registers: Registers,
         inverter: Inverter,
         refused: Callable[[str], None],
+        told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
         self._bus = bus
         self._unit = unit
         self._registers = registers
         self._inverter = inverter
         self._refused = refused
-        self._slot = Slot(self._make, self._done)
+        self._slot = Slot(self._make, self._done, told)
+        self._combining = _Combining.GIVEN_UP
         #: The newest request and when it came in; written by any thread, at once.
         self._request: tuple[float, float] = (NAN, -math.inf)
         self.control_mode = ''
@@ -103,6 +119,11 @@ class Setpoint:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
         at = self._request[1]
         return time.monotonic() - at if at > self._armed_at else NAN
+
+    def connected(self) -> None:
+        """Find out anew whether the drive tells its status with a set-point that it takes."""
+        able = self._registers.writes_and_reads
+        self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
     def arm(self, control_mode: str) -> None:
         """
@@ -174,17 +195,27 @@ class Setpoint:
         words = reference.words(limited)
         if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
             return None
-        return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        if self._combining is _Combining.GIVEN_UP:
+            return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        status = self._registers.address(STATUS_WORD)
+        return self._bus.write_and_read(
+            self._unit, reference.address, words, status, Priority.SETPOINT
+        )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
             assert transfer.words is not None
+            if transfer.source is not None:
+                self._combining = _Combining.TAKEN
             self._busy_since = math.inf
             self._written = transfer.words
             self._written_at = time.monotonic()
             self.commanded = self._value(transfer.words)
+        elif transfer.source is not None and self._gives_up_combining(error):
+            # what is wrong with the set-point itself, if anything is, the drive says now
+            self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.words is not None
             self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
@@ -195,6 +226,24 @@ class Setpoint:
             self._waits_for_answer = True
             self._written = ()
             self._inverter.missed()
+
+    def _gives_up_combining(self, error: LinkError) -> bool:
+        """
+        Tell whether a drive may have refused the transaction, and not the set-point in it.
+
+        One that has never taken any may refuse it in whatever words, or say nothing to a function
+        that it does not know.
+        """
+        untried = self._combining is _Combining.UNTRIED
+        if not isinstance(error, Refused):
+            if untried and isinstance(error, NoAnswer):
+                self._combining = _Combining.GIVEN_UP
+            return False
+        unknown = error.code == Refused.ILLEGAL_FUNCTION
+        if unknown or (untried and error.code != Refused.BUSY):
+            self._combining = _Combining.GIVEN_UP
+            return True
+        return False
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Tell whether a refusal only means that the drive is busy, and not for long yet."""

@@ -31,6 +31,7 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.notices import Notices
@@ -44,6 +45,7 @@ from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -104,6 +106,8 @@ class Watch:
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint = ''
+        #: A status word that came with something else, and has not been judged yet.
+        self._told: Reply | None = None
         self._told_fault = 0
         #: How many requests nobody had answered when it was last looked at.
         self._unanswered = 0
@@ -127,6 +131,25 @@ class Watch:
         self._bus.recorder.forget_cycle(self._inverter.settings.address)
         self._publish(None)
 
+    def told(self, reply: Reply) -> None:
+        """
+        Take a status word that the drive has told with something else, if it told one.
+
+        It is the answer to a look that waits for it; else it begins one at once, if it is news.
+        """
+        inverter, registers = self._inverter, self._registers
+        if self._task is None or not inverter.connected or not reply.words:
+            return
+        place = registers.address(STATUS_WORD)
+        if self._bus.answer(self._task, inverter.settings.address, place, reply):
+            return
+        # what cannot be counts for nothing: the next poll reads it again
+        if not registers.can_be(STATUS_WORD, reply.words):
+            return
+        if inverter.seen and inverter.status_word(reply.words) != inverter.seen.word:
+            self._told = reply
+            self.wake()
+
     def wake(self) -> None:
         """Look at the drive at once."""
         if self._task is not None:
@@ -147,6 +170,7 @@ class Watch:
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = ''
+        self._told = None
 
     async def _poll_for_ever(self) -> None:
         polled_at = -math.inf
@@ -221,10 +245,16 @@ class Watch:
         """Read the status and judge it."""
         inverter = self._inverter
         alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
+
+        async def look() -> InverterStatus:
+            told, self._told = self._told, None
+            if told is not None and inverter.seen and told.arrived <= inverter.seen.at:
+                # somebody else has looked since
+                told = None
+            return await inverter.look(Priority.POLL, once=True, alarming=alarming, told=told)
+
         # both words of a status are of one moment, so they are repeated together
-        seen = await self._insist(
-            lambda: inverter.look(Priority.POLL, once=True, alarming=alarming)
-        )
+        seen = await self._insist(look)
         # one that is busy, or whose answer was damaged, was there
         inverter.was_silent = self._registers.unanswered > self._unanswered
         self._unanswered = self._registers.unanswered
