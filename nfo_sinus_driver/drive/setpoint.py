@@ -38,8 +38,13 @@ from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
-#: An unchanged set-point is written again when the last write is this old, s.
-_REWRITE_PERIOD = 1.0
+#: An unchanged set-point is written again when the last write is this old, s: somebody else may
+#: have changed it meanwhile.
+_REWRITE_PERIOD = 5.0
+#: And this share of the drive's own time-out. Any message keeps that from striking over Classic
+#: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3], and it might be
+#: what commands the drive.
+_KEEP_ALIVE_SHARE = 1 / 3
 #: A drive may be too busy for a set-point so long, s.
 _LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
@@ -161,6 +166,12 @@ class Setpoint:
             self._waits_for_answer = False
             self._bus.request(self._slot)
 
+    @property
+    def _rewrite_period(self) -> float:
+        """After how long an unchanged set-point is written again, s."""
+        timeout = self._inverter.sio_tot
+        return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
+
     def _is_old(self, at: float) -> bool:
         """Tell whether a request waited so long for the line that it has expired meanwhile."""
         timeout = self._inverter.settings.setpoint_timeout
@@ -193,7 +204,7 @@ class Setpoint:
             self._warned = False
             self._tell(Severity.INFO, 'set-points arrive again')
         words = reference.words(limited)
-        if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
+        if words == self._written and time.monotonic() - self._written_at < self._rewrite_period:
             return None
         if self._combining is _Combining.GIVEN_UP:
             return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)

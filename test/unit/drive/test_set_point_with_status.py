@@ -258,3 +258,24 @@ def test_a_poll_that_waits_is_spared_what_the_set_point_told(make_virtual: MakeV
     assert len(told) > 10
     assert len(polls) < len(told) / 4
     assert rig.drive.armed
+
+
+@pytest.mark.parametrize(('timeout', 'period'), [(0.0, 5.0), (3.0, 1.0), (20.0, 5.0)])
+def test_an_unchanged_set_point_is_written_no_more_often_than_needed(
+    make_virtual: MakeVirtual, timeout: float, period: float
+) -> None:
+    rig = make_virtual(drive_timeout=timeout)
+    rig.ride(20.0)
+    begun = len(functions(rig, SETPOINT))
+    rig.pass_time(30.0)
+    assert rig.drive.armed
+    # a program sends it ten times a second
+    assert 30 / period * 0.8 <= len(functions(rig, SETPOINT)) - begun <= 30 / period + 1
+
+
+def test_a_set_point_that_somebody_else_changed_is_written_again(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.ride(20.0)
+    rig.far.write(SETPOINT, (300,))
+    rig.pass_time(6.0)
+    assert abs(rig.far.motor.frequency - 20.0) < 0.2
