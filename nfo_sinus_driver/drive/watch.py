@@ -52,7 +52,7 @@ _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
 #: How often a drive is looked at while its node is not active, s.
-_IDLE_PERIOD = 0.5
+_INACTIVE_PERIOD = 0.5
 #: How often the control mode is read, while no motor that stands may start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
@@ -234,14 +234,26 @@ class Watch:
     @property
     def _period(self) -> float:
         """The time from one poll to the next, s."""
+        settings = self._inverter.settings
+        rate = settings.poll_rate
+        if settings.idle_poll_rate and self._is_idle:
+            rate = settings.idle_poll_rate
+        period = 1 / rate if rate else 0.0
         if not self.active:
-            period = _IDLE_PERIOD
-        else:
-            rate = self._inverter.settings.poll_rate
-            period = 1 / rate if rate else 0.0
+            period = _INACTIVE_PERIOD
         if self._inverter.sio_tot:
             period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
         return period
+
+    @property
+    def _is_idle(self) -> bool:
+        """The motor stands, and nobody has begun anything that may change that."""
+        motion, seen = self._motion, self._inverter.seen
+        commanded = motion is not None and (motion.ours or motion.stopping)
+        if commanded or seen is None or seen.driven:
+            return False
+        # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
+        return not any(abs(value) > 0 for value in (self._inverter.frequency, self._inverter.speed))
 
     @property
     def _heard_at(self) -> float:

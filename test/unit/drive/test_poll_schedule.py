@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections import Counter
+import dataclasses
 import itertools
 
 from any_order_rig import Notes
@@ -271,3 +272,60 @@ def test_a_changed_inverter_status_that_the_word_does_not_show_is_told_soon(
     before = rig.drive.snapshot.status
     assert before is not None
     assert before.code == rig.far.inv_st
+
+
+def polls(rig: VirtualRig, seconds: float) -> int:
+    """How many snapshots come meanwhile."""
+    kept = keep(rig)
+    rig.pass_time(seconds)
+    return len(kept.told)
+
+
+def test_a_drive_that_stands_is_polled_at_the_idle_rate(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual(poll_rate=20.0, idle_poll_rate=2.0, telemetry_rate=0.0)
+    rig.connect()
+    assert 19 <= polls(rig, 10.0) <= 21
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    begun = rig.clock.now
+    kept = keep(rig)
+    rig.pass_time(1.0)
+    assert kept.told[0][0] - begun < 0.05
+    assert 18 <= len(kept.told) <= 22
+    assert 180 <= polls(rig, 10.0) <= 202
+    rig.answer(rig.drive.stop())
+    rig.pass_time(1.0)
+    assert 19 <= polls(rig, 10.0) <= 21
+
+
+def test_a_motor_that_ramps_or_that_somebody_else_runs_is_not_idle(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual({'control.retard': 20.0}, poll_rate=20.0, idle_poll_rate=1.0)
+    rig.ride(40.0)
+    rig.send(None)
+    rig.answer(rig.drive.stop())
+    assert rig.far.motor.driven
+    assert polls(rig, 2.0) > 30
+    rig.pass_time(30.0)
+    assert polls(rig, 5.0) < 7
+    rig.far.press_start()
+    rig.pass_time(1.2)
+    assert polls(rig, 2.0) > 30
+
+
+def test_the_idle_rate_keeps_the_time_out_of_the_drive_from_striking(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual(poll_rate=20.0, idle_poll_rate=0.1, drive_timeout=1.5)
+    rig.connect()
+    rig.pass_time(10.0)
+    assert polls(rig, 10.0) >= 20
+
+
+def test_a_change_of_the_idle_rate_counts_at_once(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual(poll_rate=20.0, idle_poll_rate=0.0, telemetry_rate=0.0)
+    rig.connect()
+    assert polls(rig, 2.0) >= 38
+    rig.drive.settings = dataclasses.replace(rig.drive.settings, idle_poll_rate=2.0)
+    rig.pass_time(0.5)
+    assert polls(rig, 5.0) <= 11
