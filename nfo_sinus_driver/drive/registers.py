@@ -68,14 +68,17 @@ class Registers:
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, Words] = {}
+        self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = Protocol(bus.space)
         bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
-        place = self.model[key].place(self.protocol)
-        return Address(place.addresses, place.words)
+        if key not in self._addresses:
+            place = self.model[key].place(self.protocol)
+            self._addresses[key] = Address(place.addresses, place.words)
+        return self._addresses[key]
 
     @property
     def writes_and_reads(self) -> bool:
