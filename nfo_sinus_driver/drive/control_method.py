@@ -53,7 +53,7 @@ class ControlMethod(Protocol):
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
 
-    async def take_control(self) -> None:
+    async def take_control(self, control_mode: str) -> None:
         """
         Put the drive under bus control with no run command standing.
 

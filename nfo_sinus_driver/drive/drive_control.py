@@ -76,7 +76,7 @@ class DriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & Status.CTRL_FROM_NET)
 
-    async def take_control(self) -> None:
+    async def take_control(self, control_mode: str) -> None:
         """
         Request control with bit 0 low, so that a run command is an edge later [C35].
 
@@ -223,7 +223,7 @@ class OptimalDriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & words_optimal.Status.CONTROL_FROM_BUS)
 
-    async def take_control(self) -> None:
+    async def take_control(self, control_mode: str) -> None:
         """
         Take control with neither Enable nor Switch on.
 

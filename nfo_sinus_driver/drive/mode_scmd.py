@@ -61,19 +61,25 @@ class ModeScmd:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
         return await self._registers.read('fieldbus.mode', priority) == Mode.BUS
 
-    async def take_control(self) -> None:
+    async def take_control(self, control_mode: str) -> None:
         """
         Put the drive under bus control with no run command standing.
+
+        No manual says that a drive forgets the run command of an earlier session when control is
+        taken: so no set-point shall stand with it, and the stop is the very next frame.
 
         :raises DriveError: it is tuning.
         """
         mode = await self._registers.read('fieldbus.mode', Priority.SERVICE)
         if mode == Mode.INHIBIT:
             raise DriveError('the drive lets nobody take control now (MODE is Inhibit: tuning?)')
-        if mode == Mode.BUS:
-            await self._registers.write(self._command, Scmd.STOP, Priority.SERVICE)
-        else:
+        if mode != Mode.BUS:
+            for reference in self._references(control_mode):
+                # firmware of the v5.0 dialect refuses it until the bus has control [C100]
+                with contextlib.suppress(Refused):
+                    await reference.write_zero(Priority.SERVICE, once=False)
             await self._registers.write('fieldbus.mode', Mode.BUS, Priority.SERVICE)
+        await self._registers.write(self._command, Scmd.STOP, Priority.STOP)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """
@@ -198,13 +204,6 @@ class ModeSmode(ModeScmd):
     coasts = False
     _command = 'fieldbus.smode'
     _soonest = ('fieldbus.smode', Smode.STOP)
-
-    async def take_control(self) -> None:
-        """Put the drive under bus control with no run command standing."""
-        if await self.in_control(Priority.SERVICE):
-            await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
-        else:
-            await self._registers.write('fieldbus.mode', OptimalMode.BUS, Priority.SERVICE)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """

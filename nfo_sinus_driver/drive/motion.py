@@ -404,11 +404,11 @@ class Motion:
                 f'the drive is in control mode {control_mode}, expected is {expected}: '
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
-        await self._method.take_control()
+        await self._method.take_control(control_mode)
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
-        await prepare()
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await prepare()
         await self._method.run(self._await_start)
         await self._await_start(lambda now: now.runs)
         self._note_change()

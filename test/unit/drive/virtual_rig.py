@@ -51,7 +51,8 @@ class VirtualRig(any_order_rig.Rig):
     ) -> None:
         parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
         settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
-        far = SimulatedDrive(settings=parameters, variant=variant or hardest())
+        model = settings.setdefault('model', 'sinus_g2')
+        far = SimulatedDrive(model, settings=parameters, variant=variant or hardest(model))
         super().__init__(far, DriveSettings(**settings))
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         read, write = self.link.read, self.link.write
