@@ -173,13 +173,21 @@ class Bus:
             return read_in_steps(unit, address, priority)
         return Transfer(unit, address, priority)
 
-    def write(self, unit: int, address: Address, words: Words, priority: Priority) -> Transfer:
+    def write(
+        self,
+        unit: int,
+        address: Address,
+        words: Words,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> Transfer:
         """
         Write one parameter (to be awaited).
 
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        return Transfer(unit, address, priority, words)
+        return Transfer(unit, address, priority, words, require_wanted=require_wanted)
 
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words, priority: Priority
@@ -372,10 +380,12 @@ class Bus:
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
+            transfer.require_wanted()
             reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self._resume, task, transfer))
-        except LinkError as error:
+        except Exception as error:
+            # the line failed, or nobody wants it any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)

@@ -65,9 +65,12 @@ class Transfer:
     One transaction that a coroutine awaits.
 
     A read, or a write if ``words`` is given, or whatever ``send`` does.
+
+    :param require_wanted: called by the worker at the moment of sending; what it raises goes to the
+        coroutine, and nothing is sent.
     """
 
-    __slots__ = ('address', 'priority', 'send', 'unit', 'words')
+    __slots__ = ('address', 'priority', 'require_wanted', 'send', 'unit', 'words')
 
     def __init__(
         self,
@@ -76,12 +79,14 @@ class Transfer:
         priority: Priority,
         words: Words | None = None,
         send: Callable[[], Reply] | None = None,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         self.unit = unit
         self.address = address
         self.priority = priority
         self.words = words
         self.send = send
+        self.require_wanted = require_wanted
 
     def __await__(self) -> Generator[Transfer, Reply, Reply]:
         return (yield self)

@@ -73,8 +73,8 @@ class Motion:
         self._refusal: tuple[float, str] | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
-        #: A quick stop is on its way, which the drive has not confirmed yet.
-        self._releasing = False
+        #: How many quick stops are on their way, which the drive has not confirmed yet.
+        self._releasing = 0
 
     def _note_change(self) -> None:
         self._changed_at = time.monotonic()
@@ -186,7 +186,7 @@ class Motion:
             return f'{await self.stop()} (this drive has no quick stop)'
         ours = self.concerned
         self.disarm()
-        self._releasing = True
+        self._releasing += 1
         try:
             ours = ours or await self._method.in_control(Priority.STOP)
             ours = ours or (await self._inverter.look(Priority.STOP)).tuning
@@ -208,7 +208,7 @@ class Motion:
                 'trying a stop'
             ) from error
         finally:
-            self._releasing = False
+            self._releasing -= 1
         if not ours:
             return self._no_control(self._inverter.seen)
         self._withdrawal.begin()
