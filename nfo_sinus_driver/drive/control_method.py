@@ -53,7 +53,7 @@ class ControlMethod(Protocol):
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
 
-    async def take_control(self, control_mode: str) -> None:
+    async def take_control(self) -> None:
         """
         Put the drive under bus control with no run command standing.
 
@@ -107,5 +107,6 @@ class ControlMethod(Protocol):
 
         :param code: the inverter status code that is shown.
         :returns: what more the drive said of it; ``''`` if nothing.
+        :raises DriveError: it cannot be, without taking control from keypad or terminals.
         :raises LinkError: the drive does not answer; what it did is not known.
         """

@@ -207,7 +207,7 @@ class Errands:
             )
         loan.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
-        await motion.method.take_control(control_mode)
+        await motion.take_control(control_mode)
         deadline = time.monotonic() + withdrawal.PATIENCE
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:

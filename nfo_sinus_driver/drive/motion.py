@@ -165,6 +165,20 @@ class Motion:
             return f'stopping ({self._inverter.describe()})'
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
+    async def take_control(self, control_mode: str) -> None:
+        """
+        Put the drive under bus control, with no run command standing.
+
+        The set-point of an earlier session is removed before, where the drive lets us: one that has
+        kept its run command, too, would turn the motor at once.
+
+        :raises DriveError: it lets nobody take control.
+        """
+        if not self._inverter.settings_need_control:
+            with contextlib.suppress(DriveError, Refused):
+                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await self._method.take_control()
+
     async def take_back(self) -> None:
         """
         Take back what was commanded on loan; control is kept.
@@ -404,7 +418,7 @@ class Motion:
                 f'the drive is in control mode {control_mode}, expected is {expected}: '
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
-        await self._method.take_control(control_mode)
+        await self.take_control(control_mode)
         await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
