@@ -75,6 +75,7 @@ class Bag:
         return self.messages[f'/nfo_sinus/{topic}']
 
 
+@pytest.mark.timeout(3 * _DEMO_TIME)
 def test_the_demo_is_recorded_and_drawn(tmp_path: Path) -> None:
     began = time.time()
     # a folder that is not there yet, for the demo makes it
