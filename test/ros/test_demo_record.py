@@ -31,6 +31,7 @@ from typing import Any
 from bench import Bench
 import matplotlib.image
 from mcap.reader import make_reader
+import pytest
 from rosbags.highlevel import AnyReader
 from ways import needs
 import yaml
