@@ -53,6 +53,9 @@ FOUND = 5.0
 #: How much longer everything may take while answers are spoiled by chance, s.
 NOISY = 2.0
 
+#: A stop that a fault keeps a drive from taking is not repeated within this, s.
+REFUSED = 0.3
+
 #: By these the bus has control.
 BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
 #: Bit 0 of the control word [M0 table 14].
@@ -110,6 +113,8 @@ class History:
         self._ended_by_fault: float | None = None
         self._acknowledged = 0
         self._stop_due: int | None = None
+        #: When a stop was last written, taken or refused.
+        self._stop_tried_at = -math.inf
 
     # --- what the test tells ----------------------------------------------------------------------
 
@@ -129,7 +134,8 @@ class History:
         elif name == 'tune':
             self._ours = True
         elif name in STOPS:
-            if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
+            ours = self._steady and self.standing and not self._foreign
+            if name != 'quick_stop' and ours and not self._refused_just_now:
                 self._stop_due = len(self._rig.link.frames)
             self.lose(CARRIED_OUT)
         elif name == 'acknowledge':
@@ -138,6 +144,11 @@ class History:
             self.active = False
         if name == 'disconnect':
             self.watched = False
+
+    @property
+    def _refused_just_now(self) -> bool:
+        """A fault has just kept the drive from taking a stop: none is due again so soon."""
+        return bool(self._far.faults) and self.now - self._stop_tried_at < REFUSED
 
     def connected(self) -> None:
         """Take note that the driver looks after the drive from now on, or tries to."""
