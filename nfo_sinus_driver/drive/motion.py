@@ -283,8 +283,10 @@ class Motion:
 
         :raises DriveError: the drive does not confirm that it stops.
         """
-        # a run command may be on its way, whoever has control at this moment
-        ours = self.ours or self.stopping
+        # a run command may be on its way, whoever has control at this moment; and where the bus has
+        # it, one may stand that an acknowledgement has not come to remove yet
+        seen = self._inverter.seen
+        ours = self.ours or self.stopping or (seen is not None and seen.from_bus)
         stopped = await self.stop() if ours else ''
         if not await self._method.in_control(Priority.SERVICE):
             return stopped or 'control is not ours'

@@ -212,3 +212,19 @@ def test_an_enable_that_comes_with_a_quick_stop_is_refused(machine: type[AnyOrde
         assert not state.rig.drive.armed
     finally:
         state.rig.close()
+
+
+def test_a_clean_up_while_a_fault_is_being_acknowledged_stops_first() -> None:
+    state = G2DriveControl()
+    state.begin(keeps=True, refuses='scmd')
+    try:
+        # the acknowledgement has disarmed, and waits until the reaction to the fault is over
+        state.fault_in_a_ride_acknowledged(between=0.0, code=5, wait=0.02)
+        frames = len(state.rig.link.frames)
+        state.rig.drive.disconnect(1.0)
+        state.rig.pass_time(0.05)
+        sent = [bytes.fromhex(frame['hex']) for frame in state.rig.link.frames[frames:]]
+        # the transaction that was on the line, and then the run bits
+        assert [frame[1] for frame in sent[:2]].count(16) == 1, sent
+    finally:
+        state.rig.close()
