@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
+import itertools
 import math
 from typing import Any
 
@@ -58,6 +59,8 @@ REFUSED = 0.3
 
 #: By these the bus has control.
 BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
+#: The function that reads, and where InvSt stands [M0 §7], [M1].
+READ, INV_ST = 3, 0x02A5
 #: Bit 0 of the control word [M0 table 14].
 SWITCH_ON = 1 << 0
 
@@ -72,6 +75,8 @@ class Command:
     name: str
     future: Future[Any]
     at: float
+    #: How many frames had been sent by then.
+    frames: int
     #: The line was whole and the drive known when it was given, and has been since.
     undisturbed: bool
     #: A stop was on its way when it was given.
@@ -125,8 +130,10 @@ class History:
     def command(self, name: str, future: Future[Any]) -> None:
         """Take note of a command that was given."""
         undisturbed = self._steady
-        overruled = any(one.name in STOPS and not one.future.done() for one in self._commands)
-        self._commands.append(Command(name, future, self.now, undisturbed, overruled))
+        stops = [one for one in self._commands if one.name in STOPS and not one.future.done()]
+        overruled = any(not self._may_be_confirmed(one) for one in stops)
+        frames = len(self._rig.link.frames)
+        self._commands.append(Command(name, future, self.now, frames, undisturbed, overruled))
         if name == 'enable':
             if self.enabled_at is None and not overruled:
                 self.enabled_at = self.now
@@ -144,6 +151,12 @@ class History:
             self.active = False
         if name == 'disconnect':
             self.watched = False
+
+    def _may_be_confirmed(self, stop: Command) -> bool:
+        """Tell whether the status was read since a stop was written that has no answer yet."""
+        sent = [bytes.fromhex(frame['hex']) for frame in self._rig.link.frames[stop.frames :]]
+        after = itertools.dropwhile(lambda frame: frame[1] == READ, sent)
+        return any(int.from_bytes(frame[2:4], 'big') == INV_ST for frame in after)
 
     @property
     def _refused_just_now(self) -> bool:
