@@ -120,6 +120,8 @@ class History:
         self._stop_due: int | None = None
         #: When a stop was last written, taken or refused.
         self._stop_tried_at = -math.inf
+        #: When the drive was last seen to tune.
+        self._tuned_at = -math.inf
 
     # --- what the test tells ----------------------------------------------------------------------
 

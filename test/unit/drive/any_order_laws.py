@@ -213,6 +213,8 @@ class Laws(History):
     def _judge_commands(self) -> None:
         if self._commands:
             self._commanded_at = self.now
+        if self.tuning:
+            self._tuned_at = self.now
         for command in tuple(self._commands):
             if command.future.done():
                 self._commands.remove(command)
@@ -236,7 +238,9 @@ class Laws(History):
                 raise Broken(f'{command.name} is answered although it runs')
             if error is None and self.tuning:
                 raise Broken(f'{command.name} is answered although it tunes')
-            local = not self.by_bus or bool(self._far.faults) or self.tuning
+            # a tuning that has just ended may have refused what came before its end
+            tuned = self._tuned_at >= command.at
+            local = not self.by_bus or bool(self._far.faults) or tuned
             if error is not None and untouched and command.undisturbed and not local:
                 raise Broken(f'{command.name} failed for no reason: {error}')
 
