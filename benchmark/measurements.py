@@ -41,6 +41,9 @@ class Measurement:
     baud_rate: int
     measure: Callable[[Effort], list[Row]]
 
+    def __str__(self) -> str:
+        return f'{self.what}, {self.baud_rate} bit/s'
+
 
 def all_measurements() -> Iterator[Measurement]:
     """Return every measurement in the order of the tables."""

@@ -35,6 +35,8 @@ from trace_file import Line
 PATIENCE = 60.0
 #: The same for each drive on the line, s.
 _PATIENCE_DRIVE = 15.0
+#: How much of the log is told, characters.
+_TOLD = 2000
 #: Where these programs are.
 FOLDER = Path(__file__).parent
 
@@ -125,7 +127,7 @@ class Rig(contextlib.ExitStack):
         def watched() -> Window:
             now = time.monotonic()
             if process.poll() is not None:
-                raise RuntimeError(f'a process has ended:\n{self.log}')
+                raise RuntimeError(f'a process has ended:\n{self.log[-_TOLD:]}')
             return Window(
                 trace_file.frames_of(self._trace, start, now),
                 now - start,
@@ -161,7 +163,7 @@ class Rig(contextlib.ExitStack):
         deadline = time.monotonic() + PATIENCE + _PATIENCE_DRIVE * self.drives
         while not condition():
             if process.poll() is not None or time.monotonic() > deadline:
-                raise RuntimeError(f'it does not start as it should:\n{self.log}')
+                raise RuntimeError(f'it does not do as it should:\n{self.log[-_TOLD:]}')
             time.sleep(0.05)
 
 

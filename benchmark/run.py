@@ -40,7 +40,7 @@ _QUICK = Effort(window=3.0, rounds=3, setpoints=100, stops=10, events=1)
 #: The machine is calm when everybody else takes less than this, cores.
 _CALM = 0.5
 #: How often a measurement is tried; a busy machine can spoil one.
-_ATTEMPTS = 3
+_ATTEMPTS = 2
 
 
 def main() -> None:
@@ -67,7 +67,12 @@ def main() -> None:
     for run in range(1, runs + 1):
         for measurement, results in zip(chosen, measured, strict=True):
             began = time.monotonic()
-            results.append(_measure(measurement, effort, options.calm, loads))
+            try:
+                results.append(_measure(measurement, effort, options.calm, loads))
+            except RuntimeError as error:
+                # the others are not lost with it
+                _say(f'{measurement}: NOT MEASURED: {error}')
+                continue
             took = time.monotonic() - began
             _tell(f'run {run} of {runs}, {took:.0f} s', measurement, results[-1])
     rows: dict[str, list[Row]] = {}
@@ -93,7 +98,8 @@ def _measure(
     failures = 0
     measured: list[list[Row]] = []
     while True:
-        resources.await_calm(_CALM, deadline - time.monotonic())
+        if patience:
+            resources.await_calm(_CALM, deadline - time.monotonic())
         loads.append(os.getloadavg()[0])
         try:
             measured.append(measurement.measure(effort))
@@ -101,7 +107,7 @@ def _measure(
             failures += 1
             if failures == _ATTEMPTS:
                 raise
-            print(f'{measurement.what} failed and is tried again: {error}', file=sys.stderr)
+            _say(f'{measurement}: tried again: {error}')
             continue
         others = max(row.figures['others'] for row in measured[-1])
         if others < 100 * _CALM or time.monotonic() > deadline:
@@ -120,7 +126,11 @@ def _tell(run: str, measurement: Measurement, rows: list[Row]) -> None:
     for row in rows:
         told = ', '.join(f'{name} {value:.3f}' for name, value in row.figures.items())
         where = f'{measurement.what}, {row.baud_rate} bit/s, {row.drives} drives'
-        print(f'{run}: {row.what} ({where}): {told}', file=sys.stderr, flush=True)
+        _say(f'{run}: {row.what} ({where}): {told}')
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:

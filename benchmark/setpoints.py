@@ -40,9 +40,9 @@ _MODEL = load_model('sinus_g2')
 _SETPOINT, _SCMD = (
     _MODEL[key].place(Protocol.MODBUS).address for key in ('status.frq_set', 'fieldbus.scmd')
 )
-#: A drive may wait for its turn of the publisher, s; and the drive's own time-out is set, as on a
-#: real conveyor.
-_SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 2.0}
+#: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real conveyor;
+#: a machine that is busy elsewhere stops no motor.
+_SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 5.0, 'lost_after': 4.0}
 #: One drive that is rarely asked for anything.
 _IDLE = {'poll_rate': 1.0, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
 #: A set-point that is not on the line by then was replaced by a newer one, s.
