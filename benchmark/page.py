@@ -47,7 +47,6 @@ _SPEED: tuple[Column, ...] = (
     *_CPU,
     ('CPU / that with one drive', 'cpu_to_one', 2),
     ("CPU / bare loop's", 'cpu_to_bare', 2),
-    ('CPU where a bare loop takes 4 %', 'cpu_at_four', 1),
 )
 _START: tuple[Column, ...] = (
     ('RSS, MB', 'rss', 1),

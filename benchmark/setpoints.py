@@ -40,8 +40,8 @@ _MODEL = load_model('sinus_g2')
 _SETPOINT, _SCMD = (
     _MODEL[key].place(Protocol.MODBUS).address for key in ('status.frq_set', 'fieldbus.scmd')
 )
-#: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real conveyor;
-#: a machine that is busy elsewhere stops no motor.
+#: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real
+#: conveyor; a machine that is busy elsewhere stops no motor.
 _SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 5.0, 'lost_after': 4.0}
 #: One drive that is rarely asked for anything.
 _IDLE = {'poll_rate': 1.0, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
@@ -81,7 +81,7 @@ def _all_follow(rig: DriverRig) -> bool:
 
 def _unchanged(rig: DriverRig, effort: Effort) -> Row:
     """Measure the cycle while the same set-points come again and again."""
-    window = rig.watch(rig.driver, speed.span(rig, effort))
+    window = speed.watch(rig, rig.driver, effort)
     figures = speed.cycles(window, rig)
     plain = 1e3 * rig.drives * speed.plain_cycle(rig.line)
     figures.update(plain=plain, plain_ratio=figures['time'] / plain)

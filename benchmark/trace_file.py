@@ -120,17 +120,10 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
 
     :param place: the register or the Classic id of the parameter.
 
-    :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio;
-        of how many units.
+    :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio.
     """
-    begins: dict[int, list[int]] = {}
-    for number, frame in enumerate(frames):
-        if frame.is_request:
-            unit, what = _asks(frame, line.protocol)
-            if what == place:
-                begins.setdefault(unit, []).append(number)
     times, limits = [], []
-    for numbers in begins.values():
+    for numbers in _begins(frames, line, place).values():
         for begin, end in pairwise(numbers):
             times.append(frames[end].first - frames[begin].first)
             limits.append(line.limit(frames[begin:end]))
@@ -139,8 +132,23 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
         'p99': 1e3 * percentile(times, 99),
         'limit': 1e3 * statistics.median(limits),
         'ratio': statistics.median(a / b for a, b in zip(times, limits, strict=True)),
-        'units': len(begins),
     }
+
+
+def units_with_cycles(frames: Sequence[Frame], line: Line, place: int) -> int:
+    """Return from how many units a parameter was read twice at least."""
+    return sum(len(numbers) > 1 for numbers in _begins(frames, line, place).values())
+
+
+def _begins(frames: Sequence[Frame], line: Line, place: int) -> dict[int, list[int]]:
+    """Return which frames ask for a parameter, by unit."""
+    begins: dict[int, list[int]] = {}
+    for number, frame in enumerate(frames):
+        if frame.is_request:
+            unit, what = _asks(frame, line.protocol)
+            if what == place:
+                begins.setdefault(unit, []).append(number)
+    return begins
 
 
 def _asks(frame: Frame, protocol: str) -> tuple[int, int | None]:
