@@ -148,9 +148,9 @@ class Bus:
         """The worker works."""
         return self._thread.is_alive()
 
-    def statistics(self) -> Statistics:
-        """Return the counters and times of the line."""
-        return self.recorder.statistics()
+    def statistics(self, unit: int | None = None) -> Statistics:
+        """Return the counters and times of the line, or of one unit on it."""
+        return self.recorder.statistics(unit)
 
     @property
     def port_error(self) -> PortError | None:
@@ -419,7 +419,7 @@ class Bus:
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
-            self.recorder.transaction(now, now - started, error)
+            self.recorder.transaction(unit, now, now - started, error)
 
     def _open_when_due(self) -> None:
         now = time.monotonic()

@@ -200,7 +200,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_yes(errors)
     errors.add_argument('--erase', action='store_true', help='erase it, after it was shown')
-    monitor = verb('monitor', 'show what the drive does, until Ctrl-C', json=True)
+    monitor = verb(
+        'monitor', 'show what the drive does, until Ctrl-C; then how the line was doing', json=True
+    )
     monitor.add_argument(
         '--period',
         type=_seconds,
@@ -209,6 +211,13 @@ def _parser() -> argparse.ArgumentParser:
         help='from one line to the next (default: 0.5)',
     )
     monitor.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+    monitor.add_argument(
+        '--addresses',
+        type=_addresses,
+        default=(),
+        metavar='LIST',
+        help='several drives of the line, such as 1-10,20 (default: that of --address)',
+    )
     verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
     _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))
     stop = verb('stop', 'stop a motor that the bus runs, and give control back', json=True)

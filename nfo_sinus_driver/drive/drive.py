@@ -58,6 +58,7 @@ from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.statistics import Statistics
 
 _T = TypeVar('_T')
 
@@ -182,6 +183,11 @@ class Drive:
     def stop_overdue(self) -> bool:
         """It has had time to confirm it, and no fault keeps it from turning the motor."""
         return self._motion is not None and self._motion.taking_back.overdue
+
+    @property
+    def statistics(self) -> Statistics:
+        """The counters and times of what is said to this drive."""
+        return self._bus.statistics(self._unit)
 
     def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[str]:
         """

@@ -84,11 +84,7 @@ class BusNode(Node):
 
     def _tell(self) -> None:
         statistics = self.line.bus.statistics()
-        silent = [
-            node.get_name()
-            for node in self.line.drives
-            if node.state != 'unconfigured' and not node.drive.snapshot.connected
-        ]
+        silent = [node.get_name() for node in self.line.drives if node.is_silent]
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.line.bus.port_error

@@ -224,9 +224,48 @@ def test_monitor(nfo: Nfo, bench: Bench) -> None:
     lines = done.out.splitlines()
     assert len(lines) == 3
     assert all('31 ' in line and ' Hz ' in line for line in lines)
+    head, line = done.err.splitlines()
+    names = ('used', 'cycle', 'min', 'median', 'p99', 'max')
+    assert [head.index(name) for name in names] == sorted(head.index(name) for name in names)
+    cells = line.split()
+    assert cells[0] == 'line' and cells[2] == '%' and float(cells[3]) > 0.0
+    least, median, p99, most = map(float, cells[4:8])
+    assert 0.0 < least <= median <= p99 <= most
+    assert int(cells[8]) > 20 and cells[9:] == ['0', '0', '0', '0']
     assert bench.writes() == []
     assert bench.drive().ack_reads == 0
     assert bench.drive().motor.driven
+
+
+def test_monitor_of_several_drives_tells_of_each_and_of_the_line(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('monitor', '--addresses', '1,2', '--count', 3, '--period', 0.05)
+    assert done.status == 0
+    assert [line.split()[1] for line in done.out.splitlines()] == ['1', '2'] * 3
+    _, line, first, second = done.err.splitlines()
+    assert (first.split()[:2], second.split()[:2]) == (['drive', '1'], ['drive', '2'])
+    requests = [int(row.split()[-5]) for row in (line, first, second)]
+    assert requests[0] == requests[1] + requests[2] and min(requests) > 20
+    done = nfo('monitor', '--addresses', '1,2', '--count', 2, '--period', 0.05, '--json')
+    told = [json.loads(text) for text in done.out.splitlines()]
+    assert [one['address'] for one in told] == [1, 2] * 2
+    assert told[0]['statistics']['cycle_time'] is None
+    assert told[2]['statistics']['cycle_time'] > 0.0
+    assert told[2]['statistics']['round_trip_median'] > 0.0
+    assert done.err == ''
+
+
+def test_monitor_tells_which_of_several_drives_is_missing(nfo: Nfo, bench: Bench) -> None:
+    bench.simulator.inject('silence', 60, address=2)
+    done = nfo(
+        'monitor', '--addresses', '1,2', '--count', 2, '--period', 0.01,
+        '--response-timeout', 0.3, '--json',
+    )  # fmt: skip
+    assert done.status == 1
+    told = [json.loads(text) for text in done.out.splitlines()]
+    assert [(one['address'], one['connected']) for one in told] == [(1, True), (2, False)] * 2
+    assert told[1]['statistics']['timeouts'] == 3
+    assert told[1]['statistics']['retries'] == 2
+    assert told[1]['statistics']['round_trip_min'] is None
 
 
 def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
@@ -253,14 +292,15 @@ def test_monitor_ends_with_ctrl_c(bench: Bench, through: tuple[str, ...]) -> Non
     assert 'Hz' in process.stdout.readline()
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert said == ''
+    head, line = said.splitlines()
+    assert 'median' in head and line.startswith('line ')
     assert process.returncode == 0
 
 
 def test_monitor_is_one_line_on_a_terminal(bench: Bench) -> None:
     done = bench.on_terminal('monitor', '--count', 3, '--period', 0.05)
     assert done.status == 0
-    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 1
+    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 3
 
 
 # --- the port -------------------------------------------------------------------------------------
