@@ -63,7 +63,7 @@ from nfo_sinus_driver.timers import tighten_timers
 from nfo_sinus_driver.turns import Turns
 from nfo_sinus_driver.turns import Waiting
 
-__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Task', 'Transfer']
+__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Statistics', 'Task', 'Transfer']
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')

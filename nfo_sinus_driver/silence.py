@@ -22,7 +22,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
-
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,
 #: longer than a burst of noise.
 _MISSING_AFTER = 2.0

@@ -196,8 +196,11 @@ class Turns:
             self._told_in_vain.discard(transfer.unit)
         elif transfer.priority is Priority.POLL:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
-        elif transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain:
-            if self._is_missing(transfer.unit):
-                return _MISSING
+        elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
+            return _MISSING
         commands = transfer.priority is Priority.STOP and transfer.words is not None
         return _COMMAND if commands else transfer.priority
+
+    def _is_repeated(self, transfer: Transfer) -> bool:
+        """Tell whether this is a stop for a unit that did not answer the last one."""
+        return transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain

@@ -165,6 +165,13 @@ def _parser() -> argparse.ArgumentParser:
         action='store_true',
         help='try every baud rate and parity; takes long',
     )
+    scan.add_argument(
+        '--params',
+        metavar='FILE',
+        help='write a parameter file for the driver, with all that was found; - is the standard '
+        'output',
+    )
+    scan.add_argument('--force', action='store_true', help='let --params replace a file')
     verb('info', 'show who the drive is and how it is doing', json=True)
     list_ = verb('list', 'show all settings of the drive', json=True)
     list_.add_argument(

@@ -27,6 +27,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import load_model
@@ -58,7 +59,6 @@ from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.statistics import Statistics
 
 _T = TypeVar('_T')
 
@@ -158,6 +158,11 @@ class Drive:
     def armed(self) -> bool:
         """The motor follows set-points."""
         return self._setpoint.armed
+
+    @property
+    def setpoint(self) -> Setpoint:
+        """What it is to follow, for coroutines on the bus."""
+        return self._setpoint
 
     @property
     def last_error(self) -> LogEntry | None:

@@ -16,16 +16,21 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 import json
+from pathlib import Path
 import signal
 
 from cli_bench import BACKGROUND
 from cli_bench import Bench
 from cli_bench import Done
 import pytest
+import yaml
 
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.cli import scan
+from nfo_sinus_driver.cli.trouble import Trouble
 
 Nfo = Callable[..., Done]
 G2 = load_model('sinus_g2')
@@ -206,6 +211,61 @@ def test_scan_finds_nobody(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '3-4', '--all-settings', '--response-timeout', 0.02)
     assert done.status == 1 and done.out == ''
     assert 'nobody answers' in done.err
+
+
+def test_scan_writes_a_parameter_file_for_the_driver(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    file = tmp_path / 'line.yaml'
+    arguments = ('scan', '--addresses', '1-3', '--params', file)
+    done = nfo(*arguments, '--response-timeout', 0.5)
+    assert done.status == 0, done.err
+    assert f'--params-file {file}' in done.err
+    written = yaml.safe_load(file.read_text())
+    assert written == {
+        '/**/nfo_sinus_bus': {
+            'ros__parameters': {
+                'port': bench.simulator.port,
+                'protocol': 'modbus_rtu',
+                'baud_rate': 19200,
+                'char_format': '8E1',
+                'response_timeout': 0.5,
+                'drives': ['drive_1', 'drive_2'],
+            }
+        },
+        '/**/drive_1': {'ros__parameters': {'address': 1, 'model': 'sinus_g2'}},
+        '/**/drive_2': {'ros__parameters': {'address': 2, 'model': 'sinus_g2'}},
+    }
+    assert '# NFO Sinus 1.50/400, firmware 4.38 / 4018, serial NFO1001\n' in file.read_text()
+    # it may have been edited since
+    file.write_text('mine')
+    frames = len(bench.requests())
+    again = nfo(*arguments)
+    assert again.status == 1 and 'exists already' in again.err
+    assert file.read_text() == 'mine' and len(bench.requests()) == frames
+    assert nfo(*arguments, '--force', '--response-timeout', 0.5).status == 0
+    assert 'drive_2' in file.read_text()
+    assert bench.writes() == []
+
+
+def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
+    done = nfo('scan', '--addresses', '1', '--params', '-', '--response-timeout', 0.5)
+    assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
+    assert 'NFO1001' in done.err
+
+
+def test_scan_writes_no_file_of_drives_that_make_no_line(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    file = tmp_path / 'line.yaml'
+    done = nfo('scan', '--addresses', '7', '--params', file, '--response-timeout', 0.02)
+    assert done.status == 1 and not file.exists()
+    found = {1: {'line': '19200 8E1'}, 2: {'line': '9600 8E1'}}
+    options = argparse.Namespace(params=str(file))
+    with pytest.raises(Trouble, match='several') as raised:
+        scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
+    assert '2: 9600 8E1' in str(raised.value)
+    assert not file.exists()
 
 
 def test_scan_by_default_asks_all(nfo: Nfo) -> None:
