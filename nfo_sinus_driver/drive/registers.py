@@ -275,4 +275,4 @@ class Registers:
                     raise
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)
-            self._bus.recorder.retry()
+            self._bus.recorder.retry(self._unit)

@@ -339,6 +339,49 @@ def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
 # --- leaving --------------------------------------------------------------------------------------
 
 
+def poll_of(unit: int) -> Waiting:
+    """A poll of one unit."""
+    return Waiting(cast(Task, 'poll'), Transfer(unit, Address((1,), 1), Priority.POLL))
+
+
+def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
+    missing, other = poll_of(7), poll_of(1)
+    turns = Turns({7}.__contains__, {7}.__contains__)
+    assert not turns.missing_wait
+    turns.add(missing)
+    turns.add(other)
+    assert turns.missing_wait
+    assert turns.take(missing=False) is other
+    assert turns.take(missing=False) is None
+    turns.add(other)
+    assert turns.take() is missing
+    assert not turns.missing_wait
+
+
+def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() -> None:
+    silent: set[int] = {7}
+    turns = Turns(silent.__contains__, silent.__contains__)
+    first, again, other = stop_of(7), stop_of(7), stop_of(2)
+    turns.add(first)
+    assert turns.take(missing=False) is first
+    turns.took(0.2)
+    turns.add(again)
+    turns.add(other)
+    assert turns.take(missing=False) is other
+    turns.took(_READ)
+    assert turns.take(missing=False) is None
+    assert turns.take() is again
+    turns.took(0.2)
+    # it has been back meanwhile: this stop is a first one again
+    silent.clear()
+    turns.add(poll_of(7))
+    assert turns.take(missing=False) is not None
+    turns.took(_READ)
+    silent.add(7)
+    turns.add(again)
+    assert turns.take(missing=False) is again
+
+
 def test_what_a_task_waits_for_can_be_withdrawn() -> None:
     turns = Turns()
     slot = entry(_SLOT)
