@@ -28,7 +28,6 @@ from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
@@ -88,12 +87,7 @@ class Reporter:
     def start(self, drive: Callable[[], Drive]) -> None:
         """Begin with what is told once a second."""
         self._drive = drive
-        self._node.create_timer(
-            _PERIOD,
-            lambda: self._line.outbox.put(self._tell_regularly),
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=self._steady,
-        )
+        self._line.outbox.put_every(_PERIOD, self._tell_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
 
