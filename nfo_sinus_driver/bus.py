@@ -192,6 +192,31 @@ class Bus:
         """
         return Transfer(unit, address, priority, words, require_wanted=require_wanted)
 
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address, priority: Priority
+    ) -> Transfer:
+        """
+        Write one parameter and read another, in one transaction (to be awaited, or for a slot).
+
+        The answer has no words if it was only written: see :meth:`Link.write_and_read`.
+
+        :raises LinkError: as the link does.
+        """
+        return Transfer(unit, address, priority, words, source=source)
+
+    def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
+        """
+        Give a task what it waits to read, because it has just been told with something else.
+
+        :returns: whether it waits for that.
+        """
+        awaited = task.awaited
+        if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
+            return False
+        self._turns.withdraw(task)
+        self._advance(task, reply, None)
+        return True
+
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words, priority: Priority
     ) -> Transfer:
@@ -376,13 +401,14 @@ class Bus:
         if transfer is None:
             return
         try:
-            self._transact(transfer)
+            reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self.request, slot))
         except LinkError as error:
             slot.done(transfer, error)
         else:
             slot.done(transfer, None)
+            slot.told(reply)
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
@@ -414,8 +440,12 @@ class Bus:
                 reply = transfer.send()
             elif transfer.words is None:
                 reply = self._link.read(transfer.unit, transfer.address)
-            else:
+            elif transfer.source is None:
                 reply = self._link.write(transfer.unit, transfer.address, transfer.words)
+            else:
+                reply = self._link.write_and_read(
+                    transfer.unit, transfer.address, transfer.words, transfer.source
+                )
         except NotReady:
             raise
         except LinkError as error:

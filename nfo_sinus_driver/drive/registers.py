@@ -78,6 +78,11 @@ class Registers:
         place = self.model[key].place(self.protocol)
         return Address(place.addresses, place.words)
 
+    @property
+    def writes_and_reads(self) -> bool:
+        """The drive has a function that writes one parameter and reads another, on this line."""
+        return self.protocol is Protocol.MODBUS and self.model.dialect.writes_and_reads
+
     def words(self, key: str, value: Value) -> Words:
         """
         Return the words to write for a value.
@@ -142,12 +147,12 @@ class Registers:
         self, key: str, priority: Priority, *, once: bool = False
     ) -> tuple[Value, float]:
         """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        reply = await self._read(key, priority, once)
+        reply = await self.read_reply(key, priority, once=once)
         return self.value(key, reply.words), reply.arrived
 
     async def read_words(self, key: str, priority: Priority, *, once: bool = False) -> Words:
         """Read a parameter as it stands in the drive."""
-        return (await self._read(key, priority, once)).words
+        return (await self.read_reply(key, priority, once=once)).words
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
@@ -235,8 +240,8 @@ class Registers:
         except ValueError:
             return False
 
-    async def _read(self, key: str, priority: Priority, once: bool) -> Reply:
-        """Read a parameter; what cannot be counts only when it comes again."""
+    async def read_reply(self, key: str, priority: Priority, *, once: bool = False) -> Reply:
+        """Read a parameter as it stands in the drive; what cannot be counts when it comes again."""
         address = self.address(key)
         reply = await self._ask(address, priority, None, once)
         before = self._odd.pop(key, None)
