@@ -66,10 +66,12 @@ class Transfer:
 
     A read, or a write if ``words`` is given, or whatever ``send`` does.
 
+    :param require_wanted: called by the worker at the moment of sending; what it raises goes to the
+        coroutine, and nothing is sent.
     :ivar source: what is read in the same transaction as the write, or ``None``.
     """
 
-    __slots__ = ('address', 'priority', 'send', 'source', 'unit', 'words')
+    __slots__ = ('address', 'priority', 'require_wanted', 'send', 'source', 'unit', 'words')
 
     def __init__(
         self,
@@ -78,6 +80,7 @@ class Transfer:
         priority: Priority,
         words: Words | None = None,
         send: Callable[[], Reply] | None = None,
+        require_wanted: Callable[[], None] = lambda: None,
         source: Address | None = None,
     ) -> None:
         self.unit = unit
@@ -85,6 +88,7 @@ class Transfer:
         self.priority = priority
         self.words = words
         self.send = send
+        self.require_wanted = require_wanted
         self.source = source
 
     def reads(self, unit: int, address: Address) -> bool:

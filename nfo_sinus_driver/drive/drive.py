@@ -27,6 +27,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import load_model
@@ -160,6 +161,11 @@ class Drive:
         return self._setpoint.armed
 
     @property
+    def setpoint(self) -> Setpoint:
+        """What it is to follow, for coroutines on the bus."""
+        return self._setpoint
+
+    @property
     def last_error(self) -> LogEntry | None:
         """The newest entry of the error log that was read in the background."""
         return self._log_watch.newest
@@ -183,6 +189,11 @@ class Drive:
     def stop_overdue(self) -> bool:
         """It has had time to confirm it, and no fault keeps it from turning the motor."""
         return self._motion is not None and self._motion.taking_back.overdue
+
+    @property
+    def statistics(self) -> Statistics:
+        """The counters and times of what is said to this drive."""
+        return self._bus.statistics(self._unit)
 
     def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[str]:
         """

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus
@@ -199,15 +200,23 @@ class Registers:
         return ', '.join(flag_names(flags & ~_BLOCKED))
 
     async def write(
-        self, key: str, value: Value, priority: Priority, *, once: bool = False
+        self,
+        key: str,
+        value: Value,
+        priority: Priority,
+        *,
+        once: bool = False,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         """
         Write a parameter.
 
         :param once: do not repeat the request when nobody answers.
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        await self.write_words(key, self.words(key, value), priority, once=once)
+        words = self.words(key, value)
+        await self._ask(self.address(key), priority, words, once, require_wanted)
 
     async def write_words(
         self, key: str, words: Words, priority: Priority, *, once: bool = False
@@ -249,7 +258,12 @@ class Registers:
         return reply
 
     async def _ask(
-        self, address: Address, priority: Priority, words: Words | None, once: bool
+        self,
+        address: Address,
+        priority: Priority,
+        words: Words | None,
+        once: bool,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
         # what is busy has done nothing; a stop that is sent once is tried on by who wants it
@@ -258,7 +272,7 @@ class Registers:
             try:
                 if words is None:
                     return await self._bus.read(self._unit, address, priority)
-                return await self._bus.write(self._unit, address, words, priority)
+                return await self._bus.write(self._unit, address, words, priority, require_wanted)
             except (NoAnswer, DamagedAnswer) as error:
                 self.unanswered += isinstance(error, NoAnswer)
                 tries -= 1
@@ -269,4 +283,4 @@ class Registers:
                     raise
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)
-            self._bus.recorder.retry()
+            self._bus.recorder.retry(self._unit)

@@ -185,6 +185,7 @@ class Watch:
 
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
+        self._bus.recorder.connected(self._inverter.settings.address)
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = ''
@@ -386,7 +387,7 @@ class Watch:
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
                 if self._silent_for_long or in_vain:
                     raise
-                self._bus.recorder.retry()
+                self._bus.recorder.retry(self._inverter.settings.address)
             else:
                 self._inverter.answering = True
                 self._setpoint.answered()

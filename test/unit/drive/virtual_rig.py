@@ -53,10 +53,9 @@ class VirtualRig(any_order_rig.Rig):
     ) -> None:
         parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
         settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
-        treated = DriveSettings(**settings)
-        model = treated.model
-        far = SimulatedDrive(model=model, settings=parameters, variant=variant or hardest(model))
-        super().__init__(far, treated)
+        model = settings.setdefault('model', 'sinus_g2')
+        far = SimulatedDrive(model, settings=parameters, variant=variant or hardest(model))
+        super().__init__(far, DriveSettings(**settings))
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         self.before_both: Callable[[int, Words], None] = lambda *what: self.before(*what)
         read, write = self.link.read, self.link.write
