@@ -242,7 +242,7 @@ class Inverter:
         """
         words = await self._registers.read_words(key, priority, once=True)
         value = self._registers.number(key, words)
-        if self._registers.can_be(key, words):
+        if not self._registers.is_odd(key):
             return value
         if key not in self._told_impossible:
             self._told_impossible.add(key)

@@ -236,6 +236,10 @@ class Registers:
         """Write words to an address."""
         await self._ask(address, priority, words, once)
 
+    def is_odd(self, key: str) -> bool:
+        """Tell whether what was read last of a parameter cannot be, and was read more than once."""
+        return key in self._odd
+
     def can_be(self, key: str, words: Words) -> bool:
         """Tell whether words mean a value that the manual knows of this parameter."""
         try:
@@ -248,13 +252,14 @@ class Registers:
         address = self.address(key)
         reply = await self._ask(address, priority, None, once)
         before = self._odd.pop(key, None)
-        for _ in range(_READINGS - 1):
-            if reply.words == before or self.can_be(key, reply.words):
+        readings = 1
+        while not self.can_be(key, reply.words):
+            if reply.words == before or readings == _READINGS:
+                self._odd[key] = reply.words
                 break
             before = reply.words
             reply = await self._ask(address, priority, None, once)
-        if not self.can_be(key, reply.words):
-            self._odd[key] = reply.words
+            readings += 1
         return reply
 
     async def _ask(

@@ -91,7 +91,7 @@ class _TellsWords:
         """What of the answer is known beforehand."""
         return bytes((self.unit, self.function, 2 * self.count))
 
-    @property
+    @functools.cached_property
     def answer_length(self) -> int:
         """Bytes of the answer."""
         return 3 + 2 * self.count
