@@ -75,6 +75,9 @@ class BusNode(Node):
         self.line.bus.start()
 
     def _tell(self) -> None:
+        if not self.line.bus.alive:
+            # the driver is ending, and has closed the port
+            return
         statistics = self.line.bus.statistics()
         silent = [
             node.get_name()

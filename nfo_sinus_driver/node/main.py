@@ -138,7 +138,8 @@ class DriverProcess:
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
         # all are told before the first is waited for, and nobody can enable any of them again
-        stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
+        with self._bus_node.line.at_once():
+            stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
         unconfirmed = [
             node
