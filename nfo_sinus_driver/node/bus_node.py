@@ -32,6 +32,7 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.line import RELIABLE
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.setpoints import SetpointsForAll
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 
@@ -63,6 +64,7 @@ class BusNode(Node):
         link = open_link(values['protocol'], self._port, settings)
         self.line = Line(Bus(link), Outbox(), values['retries'])
         self._all_drives = AllDrives(self, self.line)
+        self._setpoints_for_all = SetpointsForAll(self, self.line)
         self._told_port: str | None = ''
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
@@ -79,11 +81,7 @@ class BusNode(Node):
             # the driver is ending, and has closed the port
             return
         statistics = self.line.bus.statistics()
-        silent = [
-            node.get_name()
-            for node in self.line.drives
-            if node.state != 'unconfigured' and not node.drive.snapshot.connected
-        ]
+        silent = [node.get_name() for node in self.line.drives if node.is_silent]
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.line.bus.port_error

@@ -137,6 +137,11 @@ class DriveNode(LifecycleNodeMixin, Node):
         label: str = self._state_machine.current_state[1]
         return label
 
+    @property
+    def is_silent(self) -> bool:
+        """Its drive does not respond, although somebody has configured the node."""
+        return self.state != 'unconfigured' and not self._drive.snapshot.connected
+
     def why_not_active(self) -> str:
         """Return why the node is not active, and what to do."""
         if self.state == 'finalized':
