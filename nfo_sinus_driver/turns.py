@@ -21,7 +21,6 @@ What waits for the line, and which of it goes next. No thread, no clock and noth
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterator
 from typing import Literal
@@ -99,8 +98,9 @@ class Turns:
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
-        self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
+        #: In order; the values say nothing.
+        self._queues: dict[_Rank, dict[Slot | Waiting, None]] = {
+            rank: {} for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
@@ -114,7 +114,7 @@ class Turns:
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
-        self._queues[self._rank(entry)].append(entry)
+        self._queues[self._rank(entry)][entry] = None
 
     @property
     def missing_wait(self) -> bool:
@@ -131,7 +131,7 @@ class Turns:
             for entry in self._queues[rank]:
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
                 if unit is None or unit != self._unheard:
-                    self._queues[rank].remove(entry)
+                    del self._queues[rank][entry]
                     self._given = rank
                     self._told_to_stop = unit if rank in _STOPS else None
                     return entry
@@ -159,12 +159,17 @@ class Turns:
                 most = _MOST_OWED if self._queues[rank] else _MOST_SAVED
                 self._owed[rank] = min(owed, most)
 
+    def remove(self, entry: Waiting) -> None:
+        """Take out what need not be sent any more."""
+        for queue in self._queues.values():
+            queue.pop(entry, None)
+
     def withdraw(self, task: Task) -> None:
         """Take out all that a task waits to send."""
         for queue in self._queues.values():
             for entry in tuple(queue):
                 if isinstance(entry, Waiting) and entry.task is task:
-                    queue.remove(entry)
+                    del queue[entry]
 
     def clear(self) -> list[Slot | Waiting]:
         """Take out everything."""
@@ -177,7 +182,8 @@ class Turns:
         yield from _STOPS
         if not self._slot_went:
             yield _SLOT
-        background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        first, second = _BACKGROUND
+        background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
         # one turn after a stop that nobody has heard: it is for the most urgent of the others
         between_stops = self._unheard is not None
         for priority in background:
