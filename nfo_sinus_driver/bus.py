@@ -176,13 +176,46 @@ class Bus:
             return read_in_steps(unit, address, priority)
         return Transfer(unit, address, priority)
 
-    def write(self, unit: int, address: Address, words: Words, priority: Priority) -> Transfer:
+    def write(
+        self,
+        unit: int,
+        address: Address,
+        words: Words,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> Transfer:
         """
         Write one parameter (to be awaited).
 
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        return Transfer(unit, address, priority, words)
+        return Transfer(unit, address, priority, words, require_wanted=require_wanted)
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address, priority: Priority
+    ) -> Transfer:
+        """
+        Write one parameter and read another, in one transaction (to be awaited, or for a slot).
+
+        The answer has no words if it was only written: see :meth:`Link.write_and_read`.
+
+        :raises LinkError: as the link does.
+        """
+        return Transfer(unit, address, priority, words, source=source)
+
+    def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
+        """
+        Give a task what it waits to read, because it has just been told with something else.
+
+        :returns: whether it waits for that.
+        """
+        awaited = task.awaited
+        if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
+            return False
+        self._turns.withdraw(task)
+        self._advance(task, reply, None)
+        return True
 
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words, priority: Priority
@@ -368,20 +401,23 @@ class Bus:
         if transfer is None:
             return
         try:
-            self._transact(transfer)
+            reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self.request, slot))
         except LinkError as error:
             slot.done(transfer, error)
         else:
             slot.done(transfer, None)
+            slot.told(reply)
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
+            transfer.require_wanted()
             reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self._resume, task, transfer))
-        except LinkError as error:
+        except Exception as error:
+            # the line failed, or nobody wants it any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)
@@ -404,8 +440,12 @@ class Bus:
                 reply = transfer.send()
             elif transfer.words is None:
                 reply = self._link.read(transfer.unit, transfer.address)
-            else:
+            elif transfer.source is None:
                 reply = self._link.write(transfer.unit, transfer.address, transfer.words)
+            else:
+                reply = self._link.write_and_read(
+                    transfer.unit, transfer.address, transfer.words, transfer.source
+                )
         except NotReady:
             raise
         except LinkError as error:

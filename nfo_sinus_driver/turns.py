@@ -82,7 +82,8 @@ class Turns:
 
     A unit that does not answer keeps the line for a time-out with every poll. All of these together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
-    not answer is repeated at once, and after each of them somebody else has a turn, too.
+    not answer is repeated at once, and after each of them somebody else has a turn, too: the most
+    urgent, whatever the others are owed.
 
     Those that have been silent for long are missing. Their polls, and stops that were told to them
     in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
@@ -177,13 +178,15 @@ class Turns:
         if not self._slot_went:
             yield _SLOT
         background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        # one turn after a stop that nobody has heard: it is for the most urgent of the others
+        between_stops = self._unheard is not None
         for priority in background:
-            if self._owed[priority] > 0:
+            if self._owed[priority] > 0 and not between_stops:
                 yield priority
         yield from (Priority.SETPOINT, Priority.SERVICE)
         if missing:
             yield _MISSING
-        if self._owed[_RETRY] > 0:
+        if self._owed[_RETRY] > 0 and not between_stops:
             yield _RETRY
         yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background

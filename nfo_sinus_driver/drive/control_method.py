@@ -107,5 +107,6 @@ class ControlMethod(Protocol):
 
         :param code: the inverter status code that is shown.
         :returns: what more the drive said of it; ``''`` if nothing.
+        :raises DriveError: it cannot be, without taking control from keypad or terminals.
         :raises LinkError: the drive does not answer; what it did is not known.
         """

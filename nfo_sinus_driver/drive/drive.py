@@ -91,6 +91,7 @@ class Drive:
             self._registers,
             self._inverter,
             lambda reason: self._motion.refused(reason) if self._motion else None,
+            lambda reply: self._watch.told(reply),
         )
         self._motion: Motion | None = None
         if settings.control_method != 'monitor':
@@ -390,6 +391,7 @@ class Drive:
             await self._own_timeout.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
+        self._setpoint.connected()
         inverter.connected = inverter.answering = True
         name = '' if identity.model else inverter.model.name
         if identity.model and inverter.model.name == 'sinus_optimal':

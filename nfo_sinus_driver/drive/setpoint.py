@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import enum
 import math
 import time
 from typing import NamedTuple
@@ -26,6 +27,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
@@ -35,10 +37,16 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
-#: An unchanged set-point is written again when the last write is this old, s.
-_REWRITE_PERIOD = 1.0
+#: An unchanged set-point is written again when the last write is this old, s: somebody else may
+#: have changed it meanwhile.
+_REWRITE_PERIOD = 5.0
+#: And this share of the drive's own time-out. Any message keeps that from striking over Classic
+#: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3], and it might be
+#: what commands the drive.
+_KEEP_ALIVE_SHARE = 1 / 3
 #: A drive may be too busy for a set-point so long, s.
 _LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
@@ -64,11 +72,22 @@ class Request(NamedTuple):
 _NONE = Request(NAN, -math.inf)
 
 
+class _Combining(enum.Enum):
+    """Whether the drive takes a set-point and tells its status in one transaction."""
+
+    #: Nobody knows, for none has been answered yet.
+    UNTRIED = enum.auto()
+    TAKEN = enum.auto()
+    #: Not while it stays connected: it has refused the function, or has none.
+    GIVEN_UP = enum.auto()
+
+
 class Setpoint:
     """
     What the motor is to follow while the drive is armed.
 
     :param refused: called when the drive refuses a set-point, with the reason.
+    :param told: called with the status word that a drive told with a set-point.
     """
 
     def __init__(
@@ -78,13 +97,15 @@ class Setpoint:
         registers: Registers,
         inverter: Inverter,
         refused: Callable[[str], None],
+        told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
         self._bus = bus
         self._unit = unit
         self._registers = registers
         self._inverter = inverter
         self._refused = refused
-        self._slot = Slot(self._make, self._done)
+        self._slot = Slot(self._make, self._done, told)
+        self._combining = _Combining.GIVEN_UP
         #: The newest request to this drive; written by any thread, at once.
         self._own = _NONE
         #: The newest one to all drives of the line.
@@ -136,6 +157,11 @@ class Setpoint:
         at = self._request.at
         return time.monotonic() - at if at > self._armed_at else NAN
 
+    def connected(self) -> None:
+        """Find out anew whether the drive tells its status with a set-point that it takes."""
+        able = self._registers.writes_and_reads
+        self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
+
     def arm(self, control_mode: str) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
@@ -173,6 +199,12 @@ class Setpoint:
         if self._waits_for_answer:
             self._waits_for_answer = False
             self._bus.request(self._slot)
+
+    @property
+    def _rewrite_period(self) -> float:
+        """After how long an unchanged set-point is written again, s."""
+        timeout = self._inverter.sio_tot
+        return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
 
     def _is_old(self, at: float) -> bool:
         """Tell whether a request waited so long for the line that it has expired meanwhile."""
@@ -227,7 +259,7 @@ class Setpoint:
 
     def needs(self, words: Words) -> bool:
         """Tell whether this has to be written, for something else stands in the drive, or long."""
-        fresh = time.monotonic() - self._written_at < _REWRITE_PERIOD
+        fresh = time.monotonic() - self._written_at < self._rewrite_period
         return words != self._written or not fresh
 
     def was_told(self, words: Words) -> None:
@@ -302,14 +334,24 @@ class Setpoint:
         words = reference.words(limited)
         if not self.needs(words):
             return None
-        return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        if self._combining is _Combining.GIVEN_UP:
+            return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        status = self._registers.address(STATUS_WORD)
+        return self._bus.write_and_read(
+            self._unit, reference.address, words, status, Priority.SETPOINT
+        )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
             assert transfer.words is not None
+            if transfer.source is not None:
+                self._combining = _Combining.TAKEN
             self._take_note(transfer.words)
+        elif transfer.source is not None and self._gives_up_combining(error):
+            # what is wrong with the set-point itself, if anything is, the drive says now
+            self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.words is not None
             self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
@@ -331,6 +373,24 @@ class Setpoint:
         self._waits_for_answer = True
         self._written = ()
         self._inverter.missed()
+
+    def _gives_up_combining(self, error: LinkError) -> bool:
+        """
+        Tell whether a drive may have refused the transaction, and not the set-point in it.
+
+        One that has never taken any may refuse it in whatever words, or say nothing to a function
+        that it does not know.
+        """
+        untried = self._combining is _Combining.UNTRIED
+        if not isinstance(error, Refused):
+            if untried and isinstance(error, NoAnswer):
+                self._combining = _Combining.GIVEN_UP
+            return False
+        unknown = error.code == Refused.ILLEGAL_FUNCTION
+        if unknown or (untried and error.code != Refused.BUSY):
+            self._combining = _Combining.GIVEN_UP
+            return True
+        return False
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Tell whether a refusal only means that the drive is busy, and not for long yet."""

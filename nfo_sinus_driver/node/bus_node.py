@@ -20,9 +20,6 @@ from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -72,12 +69,7 @@ class BusNode(Node):
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
-        self.create_timer(
-            _PERIOD,
-            lambda: self.line.outbox.put(self._tell),
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        self.line.outbox.put_every(_PERIOD, self._tell)
 
     def start(self) -> None:
         """Open the port and begin to tell."""

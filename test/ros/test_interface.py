@@ -54,6 +54,7 @@ _SETTINGS = {
     'control_method': 'mode_scmd',
     'autostart': True,
     'poll_rate': 0.0,
+    'idle_poll_rate': 0.0,
     'telemetry_rate': 2.0,
     'setpoint_timeout': 2.5,
     'setpoint_max': 0.0,

@@ -115,11 +115,14 @@ class _Judge:
         if request is None:
             return
         places = self._places
-        unit, place, count, words = request
-        if place in places.acknowledging and words is None:
+        unit, place, count, words, source = request
+        if (place if words is None else source and source[0]) in places.acknowledging:
             yield 'reads the status that acknowledges'
-        if (place, count) not in places.whole:
-            yield f'{count} words at {place:04X}h are not exactly one parameter'
+        if source is not None and place not in places.setpoints:
+            yield 'function 23 is not for parameters other than set-points'
+        for start, size in ((place, count), *(() if source is None else (source,))):
+            if (start, size) not in places.whole:
+                yield f'{size} words at {start:04X}h are not exactly one parameter'
         if unit != _EVERYBODY or self._protocol != 'classic':
             self._known.add(unit)
         if words is None:

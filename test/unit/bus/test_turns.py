@@ -307,6 +307,25 @@ def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
     assert turns.take() is other
 
 
+@pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE, Priority.SETPOINT])
+def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
+    kind: Priority,
+) -> None:
+    turns = Turns({2, 4}.__contains__)
+    urgent, silent = entry(kind), stop_of(2)
+    retry = Waiting(cast(Task, 'retry'), Transfer(4, Address((1,), 1), Priority.POLL))
+    for waiting in (retry, *map(entry, _BACKGROUND)):
+        turns.add(waiting)
+    # it costs so much that everybody else has a claim on the line
+    for _ in range(5):
+        turns.add(silent)
+        assert turns.take() is silent
+        turns.took(0.2)
+        turns.add(urgent)
+        assert turns.take() is urgent
+        turns.took(_READ)
+
+
 def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
     turns = Turns(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]

@@ -95,6 +95,9 @@ def test_a_good_ride_has_nothing_to_complain_of(protocol: str) -> None:
         (['01 11 00'], 'not for parameters'),
         (['01 08 0001 0000'], 'not for parameters'),
         (['01 17 0400 0001 0294 0001 02 0003'], 'not for parameters'),
+        (['01 17 02A4 0001 03FC 0001 02 0064'], 'acknowledges'),
+        (['01 17 0258 0001 03FC 0001 02 0064'], 'not exactly one parameter'),
+        ([_ZERO, '01 17 0258 0002 03FC 0001 02 0064', _RUN], 'without set-point 0'),
         ([_ZERO, *_WHO, _RUN, *_WHO, _RUN], 'without set-point 0'),
     ],
 )
