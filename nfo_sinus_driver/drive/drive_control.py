@@ -77,7 +77,7 @@ class DriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & Status.CTRL_FROM_NET)
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Request control with bit 0 low, so that a run command is an edge later [C35].
 
@@ -231,7 +231,7 @@ class OptimalDriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & words_optimal.Status.CONTROL_FROM_BUS)
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Take control with neither Enable nor Switch on.
 

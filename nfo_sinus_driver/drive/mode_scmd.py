@@ -62,7 +62,7 @@ class ModeScmd:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
         return await self._registers.read('fieldbus.mode', priority) == Mode.BUS
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Put the drive under bus control with no run command standing.
 
@@ -76,6 +76,12 @@ class ModeScmd:
             raise DriveError('the drive lets nobody take control now (MODE is Inhibit: tuning?)')
         if mode != Mode.BUS:
             await self._registers.write('fieldbus.mode', Mode.BUS, Priority.SERVICE)
+            try:
+                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)
+                return
+            except Refused:
+                # too soon for it, as it seems
+                await reached(lambda seen: seen.from_bus)
         await self._registers.write(self._command, Scmd.STOP, Priority.STOP)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:

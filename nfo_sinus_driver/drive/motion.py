@@ -177,7 +177,7 @@ class Motion:
         if not self._inverter.settings_need_control:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control()
+        await self._method.take_control(self._await_step)
 
     async def take_back(self) -> None:
         """
@@ -421,7 +421,7 @@ class Motion:
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
         await self.take_control(control_mode)
-        await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
+        await self._await_step(lambda now: now.from_bus)
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
@@ -458,6 +458,9 @@ class Motion:
                     else f'the drive does not start: {self._inverter.describe()}'
                 )
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
+
+    async def _await_step(self, wanted: Callable[[InverterStatus], bool]) -> None:
+        await self._await_status(wanted, Priority.SERVICE, withdrawal.PATIENCE)
 
     async def _await_status(
         self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float

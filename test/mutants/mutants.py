@@ -641,8 +641,9 @@ MUTANTS = (
         2,
         'no stop follows MODE = Bus',
         _METHOD,
-        '        await self._registers.write(self._command, Scmd.STOP, Priority.STOP)\n',
-        '',
+        '                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)\n'
+        '                return\n',
+        '                return\n',
         _CONTROL_TAKEN,
     ),
     Mutant(

@@ -136,6 +136,34 @@ def test_a_drive_that_refuses_set_points_until_it_is_controlled_is_stopped_first
     follow(rig)
 
 
+def test_a_drive_that_takes_its_time_to_be_controlled_is_stopped_then(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.connect()
+    command = rig.register(_COMMANDS['sinus_g2'])
+    show = rig.far._peek
+    not_yet = {'fieldbus.inv_st': 24, 'fieldbus.drive_status': 0}
+    controlled_at = 0.0
+
+    def take_time(register: int, words: Words | None) -> None:
+        nonlocal controlled_at
+        if (register, words) == (MODE, (Mode.BUS,)):
+            controlled_at = rig.clock.now + 0.1
+        if register == command and rig.clock.now < controlled_at:
+            raise Refused(4)
+
+    def show_in_time(key: str) -> int:
+        late = rig.clock.now < controlled_at and key in not_yet
+        return not_yet[key] if late else show(key)
+
+    rig.before, rig.far._peek = take_time, show_in_time
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    assert rig.clock.now > controlled_at > 0
+    assert rig.written(command) == [Scmd.STOP, RUN]
+    follow(rig)
+
+
 def test_settings_of_the_driver_are_written_to_a_drive_that_is_safe(
     make_virtual: MakeVirtual,
 ) -> None:
