@@ -45,8 +45,10 @@ _MOST_OWED = 0.07
 #: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
+#: What only wants to know something, and can wait for a unit that does not answer.
+_ASKS = (Priority.POLL, *_BACKGROUND)
 
-#: A poll of a unit that did not answer the last request.
+#: What is asked of a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
 #: What is said to a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
@@ -80,13 +82,13 @@ class Turns:
     see the fault that should stop the motor: so after each of them something else has a turn, and
     the background's share is of the time between them.
 
-    A unit that does not answer keeps the line for a time-out with every poll. All of these together
+    A unit that does not answer keeps the line for a time-out with every poll. They all together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
     not answer is repeated at once, and after each of them somebody else has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. Their polls, and stops that were told to them
-    in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Those that have been silent for long are missing. What is asked of them, and stops that were told
+    to them in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
@@ -128,18 +130,31 @@ class Turns:
         :param missing: what is for a missing unit may go.
         """
         for rank in self._order(missing):
-            for entry in self._queues[rank]:
+            entry = self._first(rank)
+            if entry is not None:
+                self._queues[rank].remove(entry)
+                self._given = rank
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
-                if unit is None or unit != self._unheard:
-                    self._queues[rank].remove(entry)
-                    self._given = rank
-                    self._told_to_stop = unit if rank in _STOPS else None
-                    return entry
+                self._told_to_stop = unit if rank in _STOPS else None
+                return entry
         if self._unheard is None:
             return None
         # nobody else waits
         self._unheard = None
         return self.take(missing=missing)
+
+    def _first(self, rank: _Rank) -> Slot | Waiting | None:
+        """Return what goes next of one rank; what has another one by now is put there."""
+        for entry in tuple(self._queues[rank]):
+            if isinstance(entry, Slot):
+                return entry
+            if entry.transfer.unit == self._unheard:
+                continue
+            if self._rank(entry) == rank:
+                return entry
+            self._queues[rank].remove(entry)
+            self.add(entry)
+        return None
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -197,7 +212,7 @@ class Turns:
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
             self._told_in_vain.discard(transfer.unit)
-        elif transfer.priority is Priority.POLL:
+        elif transfer.priority in _ASKS:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING
