@@ -44,8 +44,10 @@ _MOST_OWED = 0.07
 #: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
+#: What only wants to know something, and can wait for a unit that does not answer.
+_ASKS = (Priority.POLL, *_BACKGROUND)
 
-#: A poll of a unit that did not answer the last request.
+#: What is asked of a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
 #: What is said to a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
@@ -79,13 +81,13 @@ class Turns:
     see the fault that should stop the motor: so after each of them something else has a turn, and
     the background's share is of the time between them.
 
-    A unit that does not answer keeps the line for a time-out with every poll. All of these together
+    A unit that does not answer keeps the line for a time-out with every poll. They all together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
     not answer is repeated at once, and after each of them somebody else has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. Their polls, and stops that were told to them
-    in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Those that have been silent for long are missing. What is asked of them, and stops that they
+    were told in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
@@ -128,18 +130,32 @@ class Turns:
         :param missing: what is for a missing unit may go.
         """
         for rank in self._order(missing):
-            for entry in self._queues[rank]:
+            entry = self._first(rank)
+            if entry is not None:
+                del self._queues[rank][entry]
+                self._given = rank
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
-                if unit is None or unit != self._unheard:
-                    del self._queues[rank][entry]
-                    self._given = rank
-                    self._told_to_stop = unit if rank in _STOPS else None
-                    return entry
+                self._told_to_stop = unit if rank in _STOPS else None
+                return entry
         if self._unheard is None:
             return None
         # nobody else waits
         self._unheard = None
         return self.take(missing=missing)
+
+    def _first(self, rank: _Rank) -> Slot | Waiting | None:
+        """Return what goes next of one rank; what is for a unit that is missing by now waits."""
+        queue = self._queues[rank]
+        while True:
+            entry = next((one for one in queue if not self._is_unheard(one)), None)
+            if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
+                return entry
+            del queue[entry]
+            self._queues[_MISSING][entry] = None
+
+    def _is_unheard(self, entry: Slot | Waiting) -> bool:
+        """Tell whether it is for the unit that did not answer the stop just now."""
+        return isinstance(entry, Waiting) and entry.transfer.unit == self._unheard
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -203,7 +219,7 @@ class Turns:
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
             self._told_in_vain.discard(transfer.unit)
-        elif transfer.priority is Priority.POLL:
+        elif transfer.priority in _ASKS:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING

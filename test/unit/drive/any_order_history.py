@@ -332,9 +332,11 @@ class History:
             self._forgive_fault()
         self._conditions = conditions
         enabled_at = self.enabled_at
-        # what happens before the run command is given does not end an enabling; nor does a RUN
-        # input that is lost, for a G2 does not tell it from a start that is yet to come
-        unmoved = not self._stood or ended == [False, False, True, False]
+        # what happens before the run command is given does not end an enabling, and what another
+        # master gave is none; nor does a RUN input that is lost, for a G2 does not tell it from a
+        # start that is yet to come
+        given = self._stood and not self._foreign
+        unmoved = not given or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
             self.lose(self.noticed)
         if ended[0]:
