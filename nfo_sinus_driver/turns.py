@@ -87,8 +87,8 @@ class Turns:
     not answer is repeated at once, and after each of them somebody else has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. What is asked of them, and stops that were told
-    to them in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Those that have been silent for long are missing. What is asked of them, and a stop that they
+    were told before in vain, wait until :meth:`take` may give it out, and go ahead of polls then.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
