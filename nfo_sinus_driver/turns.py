@@ -21,7 +21,6 @@ What waits for the line, and which of it goes next. No thread, no clock and noth
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterator
 from typing import Literal
@@ -87,8 +86,8 @@ class Turns:
     not answer is repeated at once, and after each of them somebody else has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. What is asked of them, and a stop that they
-    were told before in vain, wait until :meth:`take` may give it out, and go ahead of polls then.
+    Those that have been silent for long are missing. What is asked of them, and stops that they
+    were told in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
@@ -101,8 +100,9 @@ class Turns:
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
-        self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
+        #: In order; the values say nothing.
+        self._queues: dict[_Rank, dict[Slot | Waiting, None]] = {
+            rank: {} for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
@@ -116,7 +116,7 @@ class Turns:
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
-        self._queues[self._rank(entry)].append(entry)
+        self._queues[self._rank(entry)][entry] = None
 
     @property
     def missing_wait(self) -> bool:
@@ -132,7 +132,7 @@ class Turns:
         for rank in self._order(missing):
             entry = self._first(rank)
             if entry is not None:
-                self._queues[rank].remove(entry)
+                del self._queues[rank][entry]
                 self._given = rank
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
                 self._told_to_stop = unit if rank in _STOPS else None
@@ -144,17 +144,18 @@ class Turns:
         return self.take(missing=missing)
 
     def _first(self, rank: _Rank) -> Slot | Waiting | None:
-        """Return what goes next of one rank; what has another one by now is put there."""
-        for entry in tuple(self._queues[rank]):
-            if isinstance(entry, Slot):
+        """Return what goes next of one rank; what is for a unit that is missing by now waits."""
+        queue = self._queues[rank]
+        while True:
+            entry = next((one for one in queue if not self._is_unheard(one)), None)
+            if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
                 return entry
-            if entry.transfer.unit == self._unheard:
-                continue
-            if self._rank(entry) == rank:
-                return entry
-            self._queues[rank].remove(entry)
-            self.add(entry)
-        return None
+            del queue[entry]
+            self._queues[_MISSING][entry] = None
+
+    def _is_unheard(self, entry: Slot | Waiting) -> bool:
+        """Tell whether it is for the unit that did not answer the stop just now."""
+        return isinstance(entry, Waiting) and entry.transfer.unit == self._unheard
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -174,12 +175,17 @@ class Turns:
                 most = _MOST_OWED if self._queues[rank] else _MOST_SAVED
                 self._owed[rank] = min(owed, most)
 
+    def remove(self, entry: Waiting) -> None:
+        """Take out what need not be sent any more."""
+        for queue in self._queues.values():
+            queue.pop(entry, None)
+
     def withdraw(self, task: Task) -> None:
         """Take out all that a task waits to send."""
         for queue in self._queues.values():
             for entry in tuple(queue):
                 if isinstance(entry, Waiting) and entry.task is task:
-                    queue.remove(entry)
+                    del queue[entry]
 
     def clear(self) -> list[Slot | Waiting]:
         """Take out everything."""
@@ -192,7 +198,8 @@ class Turns:
         yield from _STOPS
         if not self._slot_went:
             yield _SLOT
-        background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        first, second = _BACKGROUND
+        background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
         # one turn after a stop that nobody has heard: it is for the most urgent of the others
         between_stops = self._unheard is not None
         for priority in background:

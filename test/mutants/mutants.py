@@ -302,8 +302,8 @@ MUTANTS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/registers.py',
-        '        return Address(place.addresses, place.words)',
-        '        return Address(place.addresses, 2)',
+        'Address(place.addresses, place.words)',
+        'Address(place.addresses, 2)',
         (_TRACE,),
     ),
     Mutant(
