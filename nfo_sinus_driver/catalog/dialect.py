@@ -107,6 +107,7 @@ class Dialect:
     :ivar command: the codes of SCMD or SMODE.
     :ivar state: gives the state that a status word shows.
     :ivar stateless: a status word may show none; where not, such a word is none of this drive.
+    :ivar writes_and_reads: it has Modbus function 23 ([M0 §6.2.3], [C57]).
     :ivar by_bit: which facts each bit of the status word tells.
     :ivar by_state: which facts only the state tells.
     :ivar codes: its inverter status codes by what they mean.
@@ -121,6 +122,7 @@ class Dialect:
     by_state: Mapping[State, Fact]
     codes: Codes
     stateless: bool = False
+    writes_and_reads: bool = False
 
     def may_say(self, word: int) -> bool:
         """Tell whether a status word is one of those that the manual knows."""
@@ -212,6 +214,7 @@ DIALECTS: Mapping[str, Dialect] = {
             tuned=frozenset({45, 46, 47}),
             tuning_failed=frozenset({16, 17}),
         ),
+        writes_and_reads=True,
     ),
     'sinus_optimal': Dialect(
         control=words_optimal.Control,

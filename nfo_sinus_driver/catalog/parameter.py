@@ -26,6 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import enum
 from fractions import Fraction
+import functools
 import math
 import struct
 
@@ -185,7 +186,7 @@ class Parameter:
     pnu: int | None = None
     canopen: int | None = None
 
-    @property
+    @functools.cached_property
     def kind(self) -> type[bool] | type[int] | type[float] | type[str]:
         """The Python type of its values."""
         if self.labels:
@@ -218,8 +219,21 @@ class Parameter:
 
     def factor(self, protocol: Protocol, scaling: Scaling = DEFAULT_SCALING) -> Fraction:
         """Return the value of one raw count over ``protocol``, in :attr:`unit`."""
+        if scaling is DEFAULT_SCALING and protocol in self._factors:
+            return self._factors[protocol]
         factor = self.place(protocol).factor
         return scaling.factor(self.scale) if factor is None else factor
+
+    @functools.cached_property
+    def _factors(self) -> Mapping[Protocol, Fraction]:
+        """The factors that hold by default, for they are asked for with every value."""
+        default = DEFAULT_SCALING.factor(self.scale) if self.scale else None
+        factors = {protocol: place.factor for protocol, place in self.places.items()}
+        return {
+            protocol: factor
+            for protocol, own in factors.items()
+            if (factor := default if own is None else own) is not None
+        }
 
     def decode(
         self,

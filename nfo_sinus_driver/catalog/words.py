@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 
 
 class Mode(enum.IntEnum):
@@ -113,6 +114,7 @@ class State(enum.Enum):
     FAULTED = 9
 
 
+@functools.lru_cache(maxsize=256)
 def state_of(word: int) -> State:
     """Return the state that a DriveStatus word shows; UNKNOWN for a pattern not in table 16."""
     for mask, pattern, state in _STATES:

@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
 
 
@@ -30,8 +31,8 @@ def take_picture(
     inverter: Inverter,
     setpoint: Setpoint,
     seen: InverterStatus | None,
-    frequency: float = NAN,
-    speed: float = NAN,
+    frequency: Measured = NOT_MEASURED,
+    speed: Measured = NOT_MEASURED,
     actual: float = NAN,
 ) -> Snapshot:
     """
@@ -39,18 +40,19 @@ def take_picture(
 
     :param seen: the status, or ``None`` while the drive is not connected.
     """
-    snapshot = Snapshot(
-        at=time.monotonic(),
+    if seen is None:
+        return Snapshot(
+            at=time.monotonic(),
+            connected=inverter.connected,
+            enabled=setpoint.armed,
+            control_method=inverter.settings.control_method,
+        )
+    code = seen.listed
+    return Snapshot(
+        at=seen.at,
         connected=inverter.connected,
         enabled=setpoint.armed,
         control_method=inverter.settings.control_method,
-    )
-    if seen is None:
-        return snapshot
-    code = inverter.model.inv_st(seen.code)
-    return dataclasses.replace(
-        snapshot,
-        at=seen.at,
         status=seen,
         control_mode=inverter.control_mode,
         unit=inverter.unit,
@@ -62,7 +64,9 @@ def take_picture(
         remedy=code.remedy,
         kind=seen.kind,
         requires_ack=code.requires_ack,
-        frequency=frequency,
-        speed=speed,
+        frequency=frequency.value,
+        frequency_at=frequency.at,
+        speed=speed.value,
+        speed_at=speed.at,
         actual=actual,
     )

@@ -20,19 +20,19 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from concurrent.futures import wait
 import ctypes
-import logging
 import sys
-import threading
 import time
 import traceback
 
 import rclpy
 from rclpy.exceptions import InvalidNodeNameException
 from rclpy.exceptions import ParameterException
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
@@ -44,6 +44,8 @@ from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.executor import NodeExecutor
+from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.output import Output
 from nfo_sinus_driver.node.output import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
@@ -72,9 +74,6 @@ _LAST_CALLBACK = 2.0
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
-_log = logging.getLogger(__name__)
-
-
 class DriverProcess:
     """The nodes of one bus, spun until somebody ends them."""
 
@@ -95,12 +94,10 @@ class DriverProcess:
                 raise ValueError(f'{name}: {error}') from error
         self._drives = line.drives
         self._warn_of_unknown_names(arguments)
-        threads = _GROUPS_OF_A_DRIVE * len(names) + _GROUPS_OF_THE_BUS
-        self._executor = MultiThreadedExecutor(threads)
-        for node in (self._bus_node, *self._drives):
-            self._executor.add_node(node)
-        self._spinning = True
-        self._thread = threading.Thread(target=self._spin, name='executor', daemon=True)
+        self._executors = [
+            NodeExecutor(self._bus_node, _GROUPS_OF_THE_BUS),
+            *(NodeExecutor(node, _GROUPS_OF_A_DRIVE) for node in self._drives),
+        ]
 
     def _warn_of_unknown_names(self, arguments: list[str]) -> None:
         nodes = (self._bus_node, *self._drives)
@@ -112,13 +109,17 @@ class DriverProcess:
         """Open the port and let the nodes work."""
         self._bus_node.start()
         self._bus_node.line.listener.start()
-        self._thread.start()
+        for executor in self._executors:
+            executor.start()
+        for node in self._drives:
+            node.start()
 
     @property
     def alive(self) -> bool:
         """The nodes and the bus still work."""
         line = self._bus_node.line
-        return self._thread.is_alive() and line.bus.alive and line.listener.alive
+        parts = (line.bus, line.outbox, line.listener, *self._executors)
+        return all(part.alive for part in parts)
 
     def stop(self, why: str) -> bool:
         """
@@ -132,36 +133,30 @@ class DriverProcess:
         self._bus_node.line.bus.close()
         self._bus_node.line.outbox.close()
         self._bus_node.line.listener.close(_LAST_CALLBACK)
-        self._spinning = False
-        self._executor.wake()
-        self._thread.join(_LAST_CALLBACK)
-        _await_callbacks(self._executor)
+        end_all(self._executors, _LAST_CALLBACK)
+        for node in self._drives:
+            node.join(_LAST_CALLBACK)
         return confirmed
-
-    def _spin(self) -> None:
-        while self._spinning:
-            try:
-                self._executor.spin_once(timeout_sec=1.0)
-            except Exception:
-                # a mistake in one callback must not take the others with it
-                _log.exception('error in a callback; the driver goes on')
 
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
         # all are told before the first is waited for, and nobody can enable any of them again
-        stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
+        with self._bus_node.line.at_once():
+            stops = {
+                node.stop_for_good(node.settings.shutdown_timeout): node for node in self._drives
+            }
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
-        unconfirmed = [
-            node
-            for node, future in stops
-            if self._may_be_there(node) and not _confirmed(node, future, begun)
+        unconfirmed: list[DriveNode] = []
+        releases: dict[Future[str], DriveNode] = {}
+        for node, stop in _as_they_end(stops):
+            if self._may_be_there(node) and not _confirmed(node, stop):
+                unconfirmed.append(node)
+            elif node.drive.heard:
+                # one that is silent must not take the others' time to be released
+                releases[node.drive.disconnect(_time_left(node, begun))] = node
+        unconfirmed += [
+            node for node, release in _as_they_end(releases) if not _confirmed(node, release)
         ]
-        releases = [
-            (node, node.drive.disconnect(_time_left(node, begun)))
-            for node in self._drives
-            if node.drive.heard and node not in unconfirmed
-        ]
-        unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         for node in unconfirmed:
             node.get_logger().error(
                 'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
@@ -169,18 +164,9 @@ class DriverProcess:
             )
         return not unconfirmed
 
-
     def _may_be_there(self, node: DriveNode) -> bool:
         """Tell whether there may be a motor: one that never answered was never started by us."""
         return node.drive.heard or self._bus_node.line.bus.port_error is None
-
-
-def _await_callbacks(executor: MultiThreadedExecutor) -> None:
-    """Let callbacks end before what they use is destroyed, but not for ever."""
-    # rclpy has no other way to wait for them
-    waiter = threading.Thread(target=executor._executor.shutdown, daemon=True)
-    waiter.start()
-    waiter.join(_LAST_CALLBACK)
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
@@ -188,15 +174,32 @@ def _time_left(node: DriveNode, begun: float) -> float:
     return max(0.0, begun + node.settings.shutdown_timeout - time.monotonic())
 
 
-def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
+def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveNode, Future[str]]]:
     """
-    Wait for the answer to a stop or a release, and log it.
+    Yield nodes with their futures: as these end, and at last those that do not end in time.
+
+    The time that an exit may take is each drive's own: it is over when no drive has answered for so
+    long, for many drives on a slow line take turns.
+    """
+    waiting = set(futures)
+    while waiting:
+        patience = max(futures[future].settings.shutdown_timeout for future in waiting)
+        ended, waiting = wait(waiting, patience + _LAST_ANSWER, FIRST_COMPLETED)
+        for future in ended or waiting:
+            yield futures[future], future
+        if not ended:
+            return
+
+
+def _confirmed(node: DriveNode, future: Future[str]) -> bool:
+    """
+    Log the answer to a stop or a release; false if there is none, or it is no success.
 
     A drive that has never answered anything need not confirm: it may well not be there.
     """
     log = node.get_logger()
     try:
-        answer = future.result(_time_left(node, begun) + _LAST_ANSWER)
+        answer = future.result(timeout=0)
     except FutureTimeoutError:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
