@@ -241,7 +241,10 @@ def test_after_a_lost_answer_the_inverter_status_is_read(make_virtual: MakeVirtu
     rig = fast(make_virtual)
     rig.ride()
     rig.pass_time(0.05)
-    for _ in range(20):
+    for steps in range(20):
+        # at another moment of the poll each time
+        for _ in range(steps):
+            rig.bus.step()
         rig.link.losses = 1
         while rig.link.losses:
             rig.bus.step()
