@@ -263,9 +263,9 @@ def test_after_a_lost_answer_the_inverter_status_is_read(make_virtual: MakeVirtu
     rig = fast(make_virtual)
     rig.ride()
     rig.pass_time(0.05)
-    for number in range(20):
-        # so that it is not the same one of a poll again and again
-        for _ in range(number % 3):
+    for steps in range(20):
+        # at another moment of the poll each time
+        for _ in range(steps):
             rig.bus.step()
         rig.link.losses = 1
         while rig.link.losses:
