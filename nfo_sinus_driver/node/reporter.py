@@ -71,8 +71,6 @@ class Reporter:
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._drive: Callable[[], Drive] | None = None
         self._last_inv_st: tuple[int, Kind] | None = None
-        #: When what was published last was measured.
-        self._frequency_at = self._speed_at = -math.inf
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
         # these flow from the start, whatever the lifecycle says
@@ -145,13 +143,8 @@ class Reporter:
         self._diagnose(snapshot, on_change=True)
         if snapshot.status is None:
             return
-        # what was measured anew; a full line has time for one of the two with some polls only
-        if snapshot.frequency_at > self._frequency_at:
-            self._frequency_at = snapshot.frequency_at
-            self._frequency.publish(Float32(data=snapshot.frequency))
-        if snapshot.speed_at > self._speed_at:
-            self._speed_at = snapshot.speed_at
-            self._speed.publish(Float32(data=snapshot.speed))
+        self._frequency.publish(Float32(data=snapshot.frequency))
+        self._speed.publish(Float32(data=snapshot.speed))
         self._joint_states.publish(self._joint.state(snapshot, stamp, frame_id))
         inv_st = (snapshot.status.code, snapshot.kind)
         if inv_st != self._last_inv_st:

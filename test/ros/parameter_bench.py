@@ -58,6 +58,7 @@ _PERIOD = 0.001
 _READING = (3, 17, 43)
 _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
+_WRITE_AND_READ = 23
 #: MODE, SCMD and the set-point: their Classic names [M0 §6.1], and their registers.
 _COMMANDS = {'E0029': 0x0294, 'E00AD': 0x0298, 'E001E': 0x03FC}
 #: MODE = Bus and Stop, SCMD = Stop, set-point 0: nothing turns by them.
@@ -127,6 +128,10 @@ def _modbus(data: bytes) -> Write | None:
     unit, function = data[:2]
     if function in _READING:
         return None
+    if function == _WRITE_AND_READ:
+        # what is read, then a write of several
+        data = data[:2] + data[6:]
+        function = _WRITE_SEVERAL
     register = data[2] << 8 | data[3]
     if function == _WRITE_ONE:
         payload = data[4:6]

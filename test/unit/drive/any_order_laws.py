@@ -196,7 +196,8 @@ class Laws(History):
 
     def _require_word_of_it(self) -> None:
         """A motor that runs and cannot be stopped is loudly said to."""
-        if not self._ours or self._running_since is None:
+        # what another master has started may never have been seen
+        if not self._ours or self._running_since is None or self._foreign:
             return
         since = max(self._running_since, self.lost_at)
         # the line that is lost was broken before
