@@ -46,11 +46,12 @@ from std_srvs.srv import Trigger
 import trace_file
 from trace_file import Frame
 
-from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import Status
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link import modbus_ascii
 from nfo_sinus_driver.link import modbus_pdu
@@ -376,7 +377,7 @@ def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
 
 def _tells(key: str, before: int | None, word: int) -> bool:
     if key == _INV_ST:
-        return word not in _MODEL.dialect.codes.bus_running
+        return Meaning.BUS_RUNNING not in _MODEL.status_code(word).meanings
     return before is not None and bool((before ^ word) & (_TELLS if key == _STATUS else 0xFFFF))
 
 

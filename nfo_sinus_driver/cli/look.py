@@ -61,7 +61,7 @@ def info(options: argparse.Namespace) -> int:
             'vendor': identity.vendor,
             'firmware': identity.versions,
             'serial number': identity.serial,
-            'status': f'{drive.inverter.describe()} ({drive.model.inv_st(seen.code).description})',
+            'status': f'{drive.inverter.describe()} ({seen.listed.description})',
             'state': seen.state.name.lower().replace('_', ' '),
             'control mode': str(mode.get('control.mode', '')),
             'motor': ', '.join(shown(nameplate[key], drive.model[key].unit) for key in nameplate),

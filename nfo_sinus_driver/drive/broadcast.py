@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
 
 #: The address that every drive listens to and none answers [M0 §6.1.2].
@@ -42,5 +42,5 @@ async def broadcast_stop(bus: Bus) -> None:
     """
     place = load_model('sinus_g2')['fieldbus.mode'].place(Protocol.CLASSIC)
     await bus.write(
-        _EVERYBODY, Address(place.addresses, place.words), (Mode.STOP,), Priority.STOP
+        _EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
     )

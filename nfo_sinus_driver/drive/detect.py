@@ -43,7 +43,7 @@ async def detect_model(bus: Bus, unit: int) -> str:
     try:
         if await bus.identify(unit, Priority.SERVICE) != Identification():
             return 'sinus_g2'
-        await bus.read(unit, Address(place.addresses, place.words), Priority.SERVICE)
+        await bus.read(unit, Address(place.numbers, place.words), Priority.SERVICE)
     except Refused:
         return 'sinus_optimal'
     except Cancelled:

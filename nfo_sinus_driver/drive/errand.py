@@ -24,8 +24,6 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.errors import DriveError
@@ -34,6 +32,8 @@ from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 

@@ -24,15 +24,15 @@ import math
 import time
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -115,7 +115,7 @@ class ErrorLog:
     @property
     def documented(self) -> bool:
         """A manual says where it stands."""
-        return self._inverter.has('fieldbus.scmd')
+        return self._registers.protocol in self._inverter.model.error_logs
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """
@@ -211,7 +211,7 @@ class ErrorLog:
             raise DriveError(
                 f'the error log of this model ({self._inverter.model.name}) is not documented [M1]'
             )
-        return ERROR_LOG[self._registers.protocol]
+        return self._inverter.model.error_logs[self._registers.protocol]
 
     async def _read(
         self, area: ErrorLogArea, limit: int, known: int, priority: Priority
@@ -245,14 +245,11 @@ class ErrorLog:
         self, area: ErrorLogArea, number: int, priority: Priority = Priority.POLL
     ) -> int:
         """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
-        first = area.address(number)
-        classic = self._registers.protocol.value == 'classic'
-        numbers = (first, first + 1) if classic else (first,)
         # nobody waits for what is read in the background, so it is not asked for again at once
         words = await self._registers.read_from(
-            Address(numbers, area.TYPE.words), priority, once=priority > Priority.POLL
+            Address(area.numbers(number), area.words), priority, once=priority > Priority.POLL
         )
-        return area.TYPE.to_raw(words)
+        return area.codec.decode(to_bytes(words))
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
         code, then = code_of(entry), hours_of(entry)

@@ -26,7 +26,7 @@ import math
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
@@ -35,6 +35,7 @@ from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 
 _log = logging.getLogger(__name__)
@@ -175,7 +176,7 @@ class Inverter:
         code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
         assert isinstance(code, int)
         seen = InverterStatus(at, None, code, self.model)
-        if code in seen.codes.anonymous:
+        if seen.means(Meaning.ANONYMOUS):
             mode = await self._registers.read_number('fieldbus.mode', priority, once=once)
             seen = replace(seen, by_mode=mode == Mode.BUS)
         return self._saw(seen)
@@ -369,7 +370,7 @@ class Inverter:
         firmware = Fraction(self.identity.firmware) if told and self.identity else None
         if self._older and firmware is None:
             firmware = Fraction(0)
-        return self.model.inv_st_text(code, firmware)
+        return self.model.status_code(code).shown(firmware)
 
     def describe(self) -> str:
         """Return the inverter status for a message: code and text."""

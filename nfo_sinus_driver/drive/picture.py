@@ -47,7 +47,7 @@ def take_picture(
     )
     if seen is None:
         return snapshot
-    code = inverter.model.inv_st(seen.code)
+    code = seen.listed
     return dataclasses.replace(
         snapshot,
         at=seen.at,

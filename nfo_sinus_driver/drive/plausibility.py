@@ -31,10 +31,10 @@ _MOST: Mapping[str, float] = {
     'status.trq_act': 400.0,
 }
 _CODES: Mapping[str, Callable[[Model, int], bool]] = {
-    'fieldbus.inv_st': lambda model, code: code in model.inv_st_codes,
-    'fieldbus.mode': lambda model, code: code in set(model.dialect.mode),
+    'fieldbus.inv_st': lambda model, code: code in model.status_codes,
+    'fieldbus.mode': lambda model, code: code in model.modes,
     # the upper half is described nowhere [C24]
-    'fieldbus.drive_status': lambda model, word: model.dialect.may_say(word & 0xFFFF),
+    'fieldbus.drive_status': lambda model, word: model.status_word.may_say(word & 0xFFFF),
 }
 
 

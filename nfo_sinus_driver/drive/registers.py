@@ -75,7 +75,7 @@ class Registers:
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
         place = self.model[key].place(self.protocol)
-        return Address(place.addresses, place.words)
+        return Address(place.numbers, place.words)
 
     def words(self, key: str, value: Value) -> Words:
         """

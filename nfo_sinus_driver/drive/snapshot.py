@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import InvStCode
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog.dialect import Codes
+from nfo_sinus_driver.catalog import StatusCode
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.drive.error_log import LogEntry
@@ -72,20 +72,19 @@ class InverterStatus:
     by_mode: bool = False
 
     @functools.cached_property
-    def listed(self) -> InvStCode:
+    def listed(self) -> StatusCode:
         """What the model's table says of the code."""
-        return self.model.inv_st(self.code)
+        return self.model.status_code(self.code)
 
-    @property
-    def codes(self) -> Codes:
-        """The model's codes by what they mean."""
-        return self.model.dialect.codes
+    def means(self, *meanings: Meaning) -> bool:
+        """Tell whether the code means one of these."""
+        return not self.listed.meanings.isdisjoint(meanings)
 
     @functools.cached_property
     def facts(self) -> Fact:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
-            return self.model.dialect.facts(self.word, self.listed.kind)
+            return self.model.status_word.facts(self.word, self.listed.kind)
         facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
         if self._from_bus_by_code:
             facts |= Fact.NETWORK_CONTROL
@@ -97,7 +96,7 @@ class InverterStatus:
     def valid(self) -> Fact:
         """What the drive can say of itself at all."""
         if self.word is not None:
-            return self.model.dialect.valid
+            return self.model.status_word.valid
         return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
 
     @functools.cached_property
@@ -105,12 +104,12 @@ class InverterStatus:
         """How grave the code is; the bits have the last word ([C50], [C95])."""
         if self.word is None:
             return self.listed.kind
-        return self.model.dialect.kind(self.word, self.listed.kind)
+        return self.model.status_word.kind(self.word, self.listed.kind)
 
     @functools.cached_property
     def state(self) -> State:
         """The state of the generic state machine."""
-        return State.UNKNOWN if self.word is None else self.model.dialect.state(self.word)
+        return State.UNKNOWN if self.word is None else self.model.status_word.state(self.word)
 
     @property
     def faulted(self) -> bool:
@@ -120,7 +119,7 @@ class InverterStatus:
     @property
     def standby(self) -> bool:
         """It waits for a command over the bus."""
-        return self.code in self.codes.bus_standby
+        return self.means(Meaning.BUS_STANDBY)
 
     @property
     def from_bus(self) -> bool:
@@ -143,20 +142,19 @@ class InverterStatus:
     def keeps_running(self) -> bool:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing tells a stop from a lower reference
-        may_stop = self.word is None and self.code in self.codes.slowing
+        may_stop = self.word is None and self.means(Meaning.SLOWING)
         return self.runs_by_bus and not may_stop
 
     @property
     def tuning(self) -> bool:
         """It measures the motor, which is energised then, whatever else the status says."""
-        return self.code == self.codes.tuning
+        return self.means(Meaning.TUNING)
 
     @property
     def local(self) -> bool:
         """The code says that keypad or terminals have control, and no word that the bus has."""
-        codes = self.codes
-        told = self.code in codes.terminals or self.code in codes.keypad
-        return told and self.code not in codes.anonymous and not self.from_bus
+        told = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
+        return told and not self.means(Meaning.ANONYMOUS) and not self.from_bus
 
     @property
     def driven(self) -> bool:
@@ -167,18 +165,13 @@ class InverterStatus:
 
     @property
     def _from_bus_by_code(self) -> bool:
-        codes = self.codes
-        if self.code in codes.anonymous:
+        if self.means(Meaning.ANONYMOUS):
             return self.by_mode
-        return self.code in codes.bus_running or self.code in codes.bus_standby
+        return self.means(Meaning.BUS_RUNNING, Meaning.BUS_STANDBY)
 
     @property
     def _driven_by_code(self) -> bool:
-        codes = self.codes
-        return any(
-            self.code in driven
-            for driven in (codes.bus_running, codes.local_running, codes.running)
-        )
+        return self.means(Meaning.BUS_RUNNING, Meaning.LOCAL_RUNNING, Meaning.RUNNING)
 
 
 @dataclass(frozen=True)

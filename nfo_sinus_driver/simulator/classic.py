@@ -25,13 +25,14 @@ from collections.abc import Mapping
 from fractions import Fraction
 import math
 
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog.words import Scmd
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
@@ -50,7 +51,6 @@ from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long the rest of a message may take (s). No manual says [C86].
 _PAUSE = 1.0
-_LOG = ERROR_LOG[Protocol.CLASSIC]
 #: Counters of 24 bits [C26].
 _SHORT = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
 _24_BITS = 0xFFFFFF
@@ -148,9 +148,10 @@ class Classic:
 
     def _enquiry(self, drive: SimulatedDrive, id_: int) -> int:
         """Return the word that stands at an id."""
-        at = id_ - _LOG.first
-        if 0 <= at < _LOG.stride * drive.firmware.log_size:
-            return drive.faults.log_word(at // _LOG.stride) >> 16 * (at % _LOG.stride) & 0xFFFF
+        log = drive.model.error_logs[Protocol.CLASSIC]
+        entry, position = divmod(id_ - log.first, log.stride)
+        if 0 <= entry < drive.firmware.log_size:
+            return to_words(log.codec.encode(drive.faults.log_word(entry)))[position]
         parameter, position = self._find(drive, id_)
         if parameter.access is Access.WRITE:
             raise _Wrong(SioErr.UNREADABLE)
@@ -160,7 +161,7 @@ class Classic:
             raise _Wrong(_FLAGS[refused.reason]) from refused
         if parameter.key in _SHORT and drive.firmware.short_counters:
             raw &= _24_BITS
-        words = parameter.place(Protocol.CLASSIC).type.to_words(raw)
+        words = to_words(parameter.place(Protocol.CLASSIC).number.encode(raw))
         if len(words) > 1 and drive.tears:
             drive.tears -= drive.counters.carry(parameter)
         return words[position]
@@ -172,8 +173,7 @@ class Classic:
         closed = key in _REFERENCES and not firmware.sets_references
         if closed or parameter.access not in (Access.WRITE, Access.READ_WRITE):
             raise _Wrong(SioErr.UNWRITABLE)
-        place = parameter.place(Protocol.CLASSIC)
-        raw = place.type.to_raw([word])
+        raw = parameter.place(Protocol.CLASSIC).number.decode(to_bytes([word]))
         if key == 'fieldbus.scmd':
             raw = _command(drive, raw)
         if drive.faults and not self._in_spite_of_a_fault(drive, key, raw, to_all):
@@ -218,7 +218,7 @@ class _Ids:
             id_: (parameter, position)
             for parameter in model.values()
             if Protocol.CLASSIC in parameter.places
-            for position, id_ in enumerate(parameter.place(Protocol.CLASSIC).addresses)
+            for position, id_ in enumerate(parameter.place(Protocol.CLASSIC).numbers)
         }
 
     def find(self, id_: int) -> tuple[Parameter, int] | None:
@@ -259,7 +259,6 @@ def _at_home(parameter: Parameter, raw: int) -> int:
     protocol = home(parameter)
     exact = raw * parameter.factor(Protocol.CLASSIC) / parameter.factor(protocol)
     kept = math.floor(exact + Fraction(1, 2))
-    type_ = parameter.place(protocol).type
-    if not type_.minimum <= kept <= type_.maximum:
+    if not parameter.place(protocol).number.fits(kept):
         raise _Wrong(SioErr.OUT_OF_RANGE)
     return kept

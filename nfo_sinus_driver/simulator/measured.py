@@ -108,5 +108,5 @@ def measure(
     if function is None:
         return None
     raw = round(function(motor, counters) / float(parameter.factor(protocol)))
-    type_ = parameter.place(protocol).type
-    return min(max(raw, type_.minimum), type_.maximum)
+    codec = parameter.place(protocol).number
+    return min(max(raw, codec.minimum), codec.maximum)

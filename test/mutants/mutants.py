@@ -297,8 +297,8 @@ MUTANTS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/registers.py',
-        '        return Address(place.addresses, place.words)',
-        '        return Address(place.addresses, 2)',
+        '        return Address(place.numbers, place.words)',
+        '        return Address(place.numbers, 2)',
         (_TRACE,),
     ),
     Mutant(

@@ -33,8 +33,8 @@ from support.wire import Request
 from support.wire import understand
 from ways import needs
 
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 _QUICK = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
 _REFUSING = ('--stop-in-tuning', 'refused')

@@ -26,8 +26,8 @@ from support.wire import Request
 from support.wire import understand
 from ways import needs
 
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LineSettings
 
 pytestmark = needs('states')

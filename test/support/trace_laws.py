@@ -22,13 +22,12 @@ from dataclasses import dataclass
 import functools
 from typing import Any
 
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from support.wire import WITH_GAP
 from support.wire import Request
 from support.wire import understand
@@ -167,8 +166,8 @@ def _places(model: str, protocol: str) -> _Places:
             whole |= {(number, 1) for number in place.addresses}
         else:
             whole.add((place.address, place.words))
-    if model == 'sinus_g2':
-        area = ERROR_LOG[bus]
+    area = load_model(model).error_logs.get(bus)
+    if area is not None:
         for entry in range(area.entries if bus is Protocol.MODBUS else area.limit):
             low = area.address(entry)
             whole |= {(low, 1), (low + 1, 1)} if bus is Protocol.CLASSIC else {(low, 2)}

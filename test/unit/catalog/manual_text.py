@@ -136,7 +136,7 @@ def labels_in(text: str) -> dict[int, str]:
 def settings_of_m2() -> Iterator[tuple[Parameter, list[str]]]:
     """The rows of [M2 table 1], by their Classic id, with the group of the catalog."""
     classic = [row for row in G2.values() if Protocol.CLASSIC in row.places]
-    by_id = {row.place(Protocol.CLASSIC).address: row for row in classic}
+    by_id = {row.place(Protocol.CLASSIC).index: row for row in classic}
     for cells in between(manual('M2'), 'ID\tName\tDescription', 'Table 1.'):
         if re.fullmatch(r'E[0-9A-F]{4}', cells[0]) and len(cells) == 7 and cells[1]:
             row = by_id[int(cells[0][1:], 16)]

@@ -20,9 +20,9 @@ from __future__ import annotations
 import pytest
 
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import RawType
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 G2 = load_model('sinus_g2')
 SWITCH = {0: 'OFF', 1: 'ON'}
@@ -148,19 +148,16 @@ def test_enumeration_is_well_formed(key: str) -> None:
         assert place.factor == 1
         assert place.words == 1
         for code, label in row.labels.items():
-            assert place.type.minimum <= code <= place.type.maximum
+            assert place.number.fits(code)
             words = row.encode(row.kind(label) if row.kind is not bool else label, protocol)
-            assert place.type.to_raw(words) == code
+            assert place.number.decode(to_bytes(words)) == code
 
 
 def test_type_of_enumerations() -> None:
     # the two values of RegAmp are numbers, one of them negative [C46]
-    printed = {
-        key
-        for key, row in G2.items()
-        if any(place.type is RawType.ENUM for place in row.places.values())
-    }
-    assert printed == set(LABELS) - {'pi_reg.reg_amp'}
+    printed = set(LABELS) - {'pi_reg.reg_amp'}
+    for key in printed:
+        assert {place.codec.name for place in G2[key].places.values()} == {'uint16_be'}
     assert all(G2[key].minimum is G2[key].maximum is None for key in printed)
     assert {key for key in LABELS if G2[key].kind is bool} == {
         key for key, labels in LABELS.items() if labels == SWITCH

@@ -29,25 +29,31 @@ from manual_text import settings_of_m2
 import pytest
 
 from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import Address
 from nfo_sinus_driver.catalog import Protocol
 
 #: What is misprinted, by key and table, with the reading that is followed.
 MISPRINTS = {
     ('motor.p_nom', 9): (1006, 1005),  # the number of U-Nom [C1]
 }
-#: Types that PROFIBUS has otherwise than Modbus [C23]; an ENUM of Modbus is a UINT16 there.
+#: What PROFIBUS has of another type than Modbus [C23].
 OTHER_TYPES = {
-    'control.st_mode': 'SINT16',
-    'freque.fr_min': 'UINT16',
-    'freque.fr_max': 'UINT16',
-    'pi_reg.reg_amp': 'SINT16',
-    'status.i_rms': 'SINT16',
-    'status.p_out': 'SINT16',
-    'error.overload_s_temp': 'UINT16',
-    'fieldbus.inv_st_with_ack': 'SINT16',
-    'fieldbus.inv_st': 'SINT16',
-    'fieldbus.spd_scl_numerator': 'UINT32',
-    'fieldbus.spd_scl_denominator': 'UINT32',
+    'control.st_mode',
+    'freque.fr_min',
+    'freque.fr_max',
+    'status.i_rms',
+    'status.p_out',
+    'fieldbus.inv_st_with_ack',
+    'fieldbus.inv_st',
+    'fieldbus.spd_scl_numerator',
+    'fieldbus.spd_scl_denominator',
+}
+#: The second elements of an array on PROFIBUS [M0 table 9, table 10].
+SECOND = {
+    'control.accel',
+    'control.retard',
+    'fieldbus.inv_st',
+    'fieldbus.spd_scl_denominator',
 }
 #: What the manual lets a master write and the driver never does.
 NEVER_WRITTEN = {
@@ -70,10 +76,17 @@ def keys_on(protocol: Protocol) -> set[str]:
     return {key for key, row in G2.items() if protocol in row.places}
 
 
+def type_of(place: Address) -> str:
+    """The type of a codec, as the manual prints it."""
+    return place.codec.name.partition('_')[0].upper()
+
+
 def on_bus(key: str, printed: str) -> set[str]:
     """What the catalog may call a type that the manual prints."""
     if printed == 'ENUM' and key in NO_LABELS:
         return {'SINT16' if key == 'pi_reg.reg_amp' else 'UINT16'}
+    if printed == 'ENUM':
+        return {'UINT16'}
     # two masks in one, to be written in one message
     return {'UINT32'} if printed == '2 * UINT16' else {printed}
 
@@ -89,8 +102,8 @@ def test_classic_ids_and_types() -> None:
                 assert Protocol.CLASSIC not in row.places
                 continue
             place = row.place(Protocol.CLASSIC)
-            assert place.addresses == ids, row.key
-            assert place.type.name in on_bus(row.key, line.cells[1]), row.key
+            assert place.numbers == ids, row.key
+            assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             seen.add(row.key)
     assert seen == keys_on(Protocol.CLASSIC)
 
@@ -102,10 +115,10 @@ def test_modbus_registers_and_types() -> None:
             (row,) = line.parameters
             registers = [int(number, 16) for number in re.findall(r'([0-9A-F]{4})h', line.cells[0])]
             place = row.place(Protocol.MODBUS)
-            assert place.address == registers[0], row.key
-            assert place.type.name in on_bus(row.key, line.cells[1]), row.key
+            assert place.index == registers[0], row.key
+            assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             if line.cells[1] != '2 * UINT16':  # its second register has a line of its own
-                assert list(place.occupied) == registers, row.key
+                assert place.occupied == [(number,) for number in registers], row.key
             seen.add(row.key)
     assert seen == keys_on(Protocol.MODBUS)
 
@@ -122,19 +135,30 @@ def test_profibus_numbers_types_and_access() -> None:
                 if misprint is not None:
                     assert printed == misprint[0], 'no misprint any more'
                     printed = misprint[1]
-                assert row.pnu == printed, row.key
-                type_ = row.place(Protocol.MODBUS).type.name
-                expected = OTHER_TYPES.get(row.key, 'UINT16' if type_ == 'ENUM' else type_)
-                if line.cells[2].startswith('Array') and expected == 'UINT32' == type_:
-                    expected = 'UINT16'  # the two masks are an array here
-                assert line.cells[2].split()[-1] == expected, row.key
+                place = row.place('profibus')
+                assert place.index == printed, row.key
+                sub_index = 0 if line.cells[2].startswith('Array') else None
+                if row.key in SECOND:
+                    sub_index = 1
+                assert place.sub_index == sub_index, row.key
+                assert place.factor == row.factor(Protocol.MODBUS)
+                expected = line.cells[2].split()[-1]
+                if row.key == 'error.overload_s_temp':
+                    assert expected == 'UINT16'
+                    expected = 'SINT16'  # it goes down to -100 [C23]
+                elif row.key == 'fieldbus.drv_ctrl_write_mask':
+                    assert expected == 'UINT16'
+                    expected = 'UINT32'  # the two masks are an array here
+                assert type_of(place) == expected, row.key
+                modbus = type_of(row.place(Protocol.MODBUS))
+                assert (type_of(place) == modbus) == (row.key not in OTHER_TYPES), row.key
                 allowed = {'R/W': Access.READ_WRITE, 'R': Access.READ, 'W': Access.WRITE}
                 if row.access is Access.ACKNOWLEDGE or row.key in NEVER_WRITTEN:
                     assert 'R' in line.cells[1]
                 else:
                     assert row.access is allowed[line.cells[1]], row.key
                 seen.add(row.key)
-    assert seen == {key for key, row in G2.items() if row.pnu is not None}
+    assert seen == {key for key, row in G2.items() if 'profibus' in row.addresses}
 
 
 def test_canopen_indices() -> None:
@@ -146,9 +170,12 @@ def test_canopen_indices() -> None:
                 assert line.name == 'SetpointSource'
                 continue
             for row in line.parameters:
-                assert row.canopen == int(index[1], 16), row.key
+                place = row.place('canopen')
+                assert place.index == int(index[1], 16), row.key
+                # no type is printed
+                assert type_of(place) == type_of(row.place(Protocol.MODBUS)), row.key
                 seen.add(row.key)
-    assert seen == {key for key, row in G2.items() if row.canopen is not None}
+    assert seen == {key for key, row in G2.items() if 'canopen' in row.addresses}
 
 
 @pytest.mark.parametrize('table', [2, 4, 9])
@@ -314,7 +341,7 @@ def test_inverter_status() -> None:
     for cells in between(manual('M0'), '### 8.2', 'Table 19:'):
         if len(cells) < 4 or not cells[0].isdigit():
             continue
-        entry = G2.inv_st(int(cells[0]))
+        entry = G2.status_code(int(cells[0]))
         assert entry.text == cells[1]
         assert entry.requires_ack == (cells[2] == 'X')
         if cells[3] and entry.code:
@@ -327,6 +354,6 @@ def test_inverter_status_of_old_firmware() -> None:
     seen = set()
     for cells in between(manual('M2'), 'Value\tDisplay Text', 'Table 3 Values'):
         if cells[0].isdigit():
-            assert G2.inv_st(int(cells[0])).old_text == cells[1]
+            assert G2.status_code(int(cells[0])).old_text == cells[1]
             seen.add(int(cells[0]))
     assert seen == set(range(48))

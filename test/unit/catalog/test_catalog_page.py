@@ -76,7 +76,7 @@ def test_every_parameter_has_its_row(name: str) -> None:
     for row in load_model(name).values():
         first = f'`{row.key}`' if row.is_setting else row.name
         registers = [
-            f'{place.address:04X}h'
+            f'{place.index:04X}h'
             for protocol, place in row.places.items()
             if protocol is Protocol.MODBUS
         ]

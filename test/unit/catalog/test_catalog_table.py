@@ -22,15 +22,25 @@ from fractions import Fraction
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import RawType
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
 
 G2 = load_model('sinus_g2')
 ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
+
+#: The types that the manual prints.
+CODECS = {
+    'UINT16': 'uint16_be',
+    'ENUM': 'uint16_be',
+    'SINT16': 'sint16_be',
+    'UINT32': 'uint32_ws',
+    'SINT32': 'sint32_ws',
+}
 
 #: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
 GOLDEN = [
@@ -168,7 +178,7 @@ def words_of(parameter: Parameter, protocol: Protocol, value: Fraction) -> tuple
     """The words of an exact value; fails unless it is a whole number of counts that fits."""
     raw = value / parameter.factor(protocol)
     assert raw.denominator == 1, f'{parameter.key}: {value} is between two counts'
-    return parameter.place(protocol).type.to_words(raw.numerator)
+    return to_words(parameter.place(protocol).number.encode(raw.numerator))
 
 
 @ROWS
@@ -183,8 +193,11 @@ def test_row_is_consistent(parameter: Parameter) -> None:
         assert parameter.minimum is parameter.maximum is None
     for protocol, place in parameter.places.items():
         count = place.words if protocol is Protocol.CLASSIC else 1
-        assert len(place.addresses) == count
-        assert all(0 <= address <= 0xFFFF for address in place.addresses)
+        assert len(place.numbers) == count
+        assert all(0 <= number <= 0xFFFF for number in place.numbers)
+    for address in parameter.addresses.values():
+        assert address.source.startswith('M0 table ')
+        assert address.factor > 0
 
 
 @ROWS
@@ -194,7 +207,9 @@ def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
             if bound is not None:
                 words_of(parameter, protocol, bound)
         for code in parameter.labels:
-            assert parameter.place(protocol).type.to_words(code) == (code & 0xFFFF,)
+            codec = parameter.place(protocol).number
+            assert to_words(codec.encode(code)) == (code & 0xFFFF,)
+            assert codec.decode(to_bytes([code & 0xFFFF])) == code
 
 
 def test_parameters_that_are_scaled_differently_on_the_two_buses() -> None:
@@ -295,7 +310,7 @@ def test_golden_row(
 ) -> None:
     row = G2[key]
     place = row.place(Protocol.MODBUS)
-    assert (place.address, place.type, row.unit) == (register, RawType[type_], unit)
+    assert (place.index, place.codec.name, row.unit) == (register, CODECS[type_], unit)
     assert row.decode(words) == value
     assert row.encode(value) == words
 
@@ -306,7 +321,7 @@ def test_golden_row_of_classic(
 ) -> None:
     row = G2[key]
     place = row.place(Protocol.CLASSIC)
-    assert (place.addresses, place.type) == (ids, RawType[type_])
+    assert (place.numbers, place.codec.name) == (ids, CODECS[type_])
     assert row.decode(words, Protocol.CLASSIC) == value
     assert row.encode(value, Protocol.CLASSIC) == words
 
@@ -319,7 +334,7 @@ def test_parameter_that_is_not_on_a_bus_says_so() -> None:
 
 
 def test_model_is_a_mapping_of_its_parameters() -> None:
-    assert isinstance(G2, Model)
+    assert isinstance(G2, Family)
     assert G2.name == 'sinus_g2'
     assert len(G2) == len(list(G2)) == 155
     assert all(G2[key].key == key for key in G2)

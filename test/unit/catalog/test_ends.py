@@ -56,9 +56,9 @@ def test_where_it_stands(ends: Ends) -> None:
     if ends.register is None:
         assert Protocol.MODBUS not in row.places
     else:
-        assert row.place(Protocol.MODBUS).address == ends.register
+        assert row.place(Protocol.MODBUS).index == ends.register
     assert row.place(protocol).words == ends.words
-    assert tuple(f'E{id_:04X}' for id_ in row.place(Protocol.CLASSIC).addresses) == ends.classic
+    assert tuple(f'E{id_:04X}' for id_ in row.place(Protocol.CLASSIC).numbers) == ends.classic
 
 
 @SETTINGS

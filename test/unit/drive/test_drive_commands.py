@@ -31,10 +31,10 @@ import pytest
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 

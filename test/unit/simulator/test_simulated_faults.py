@@ -24,7 +24,7 @@ from nfo_sinus_driver.simulator.variant import CHOICES
 from nfo_sinus_driver.simulator.variant import Variant
 
 MODEL = load_model('sinus_g2')
-FAULTS = [code for code in range(48) if MODEL.inv_st(code).kind is Kind.FAULT]
+FAULTS = [code for code in range(48) if MODEL.status_code(code).kind is Kind.FAULT]
 SERIAL = {14, 15}
 KEEPS = Variant(run_command_in_fault='keeps')
 
