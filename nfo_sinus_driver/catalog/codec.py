@@ -182,8 +182,10 @@ def codec_of(name: str) -> Number | Text:
 
     :raises ValueError: there is none of that name.
     """
-    if found := _OTHER.fullmatch(name):
-        return (Bcd if found[1] == 'bcd' else Text)(name, int(found[2]))
+    if found := _BCD.fullmatch(name):
+        return Bcd(name, int(found[1]))
+    if found := _STRING.fullmatch(name):
+        return Text(name, int(found[1]))
     found = _INTEGER.fullmatch(name)
     if found is None or (found['order'] is None) != (found['bits'] == '8'):
         raise ValueError(f'{name!r} is no codec')
@@ -229,6 +231,8 @@ _ORDERS: Mapping[str, tuple[_Order, _Order, int]] = {
     'hb': (_halves, _joined, 2),
 }
 _INTEGER = re.compile(
-    r'(?P<type>[us]int)(?P<bits>8|16|32)(_(?P<order>be|le|ws|hb))?(\[(?P<low>\d+):(?P<high>\d+)\])?'
+    r'(?P<type>[us]int)(?P<bits>8|16|32)(_(?P<order>be|le|(?<=32_)ws|hb))?'
+    r'(\[(?P<low>\d+):(?P<high>\d+)\])?'
 )
-_OTHER = re.compile(r'(bcd|string)([1-9]\d*)')
+_BCD = re.compile(r'bcd(8|16|32)')
+_STRING = re.compile(r'string([1-9]\d*)')
