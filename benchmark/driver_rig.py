@@ -15,74 +15,106 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import contextlib
 import threading
 import time
+from typing import Any
 
 from nfo_sinus_msgs.msg import BusStatistics
 from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import Telemetry
+from rcl_interfaces.srv import ListParameters
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from rig import PATIENCE
 from rig import Rig
 from rig import executable
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+import trace_file
+
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import load_model
 
 #: Unlike any other drive's name: what is said to these must never reach a motor.
-NAMES = [f'simulated_for_bench_{number}' for number in range(1, 9)]
+NAMES = [f'simulated_for_bench_{number}' for number in range(1, 33)]
 _FORMATS = {'modbus_rtu': '8E1', 'modbus_ascii': '7E1', 'classic': '7E1'}
+_DEPTH = 10
 #: From the moment that every drive is polled until nothing is special any more, s.
 _SETTLE = 2.0
 
 
 class Listener(Node):
-    """Subscribes to everything that flows, as a plotting tool would."""
+    """
+    A client of the driver, and an audience to everything that flows, as a plotting tool would be.
+
+    The audience is a node that nobody spins: its messages arrive, and are dropped. So it costs the
+    driver what any subscriber costs, and the benchmark next to nothing.
+    """
 
     def __init__(self, names: list[str], context: Context) -> None:
         super().__init__('bench_listener', context=context)
-        self.measured: set[str] = set()
-        self._cycle_times: list[float] = []
+        #: When each drive's node was seen to be active, s.
+        self.active: dict[str, float] = {}
+        self._waiting = {name: self._await_active(name) for name in names}
+        self.audience = Node('bench_audience', context=context)
         for name in names:
-            self._listen(DriveStatus, f'/{name}/status')
-            self._listen(Telemetry, f'/{name}/telemetry')
-            self._listen(Float32, f'/{name}/actual_speed')
-            # goes out only while the node is active
-            self.create_subscription(
-                Float32,
-                f'/{name}/actual_frequency',
-                lambda _, name=name: self.measured.add(name),
-                10,
-            )
-        self.create_subscription(
-            BusStatistics, '/nfo_sinus_bus/statistics', self._on_statistics, 10
-        )
+            self._hear(DriveStatus, f'/{name}/status')
+            self._hear(Telemetry, f'/{name}/telemetry')
+            self._hear(Float32, f'/{name}/actual_speed')
+            self._hear(Float32, f'/{name}/actual_frequency')
+        self._hear(BusStatistics, '/nfo_sinus_bus/statistics')
 
-    @contextlib.contextmanager
-    def cycle_times(self) -> Iterator[list[float]]:
-        """Collect what the driver says of its own cycle time, s."""
-        self._cycle_times = times = []
-        yield times
-        self._cycle_times = []
+    def destroy_node(self) -> None:
+        """Leave, the audience too."""
+        self.audience.destroy_node()
+        super().destroy_node()
 
     def enable(self, name: str) -> None:
         """Let a drive run and follow set-points."""
-        client = self.create_client(SetBool, f'/{name}/enable')
-        if not client.wait_for_service(PATIENCE):
-            raise RuntimeError(f'{name} cannot be enabled: there is no service')
-        response = client.call(SetBool.Request(data=True), timeout_sec=PATIENCE)
-        if response is None or not response.success:
-            raise RuntimeError(f'{name} cannot be enabled: {response}')
+        self._command(SetBool, f'/{name}/enable', data=True)
 
-    def _listen(self, message_type: type, topic: str) -> None:
-        self.create_subscription(message_type, topic, lambda _: None, 10)
+    def enable_all(self) -> None:
+        """Let every drive run and follow set-points."""
+        self._command(Trigger, '/nfo_sinus_bus/enable_all')
 
-    def _on_statistics(self, message: BusStatistics) -> None:
-        self._cycle_times.append(message.cycle_time)
+    def known(self, name: str) -> set[str]:
+        """Return the names of a drive's parameters as its node has them now."""
+        answer = self._call(ListParameters, f'/{name}/list_parameters')
+        return set(answer.result.names)
+
+    def _command(self, service_type: type, service: str, **fields: object) -> None:
+        response = self._call(service_type, service, **fields)
+        if not response.success:
+            raise RuntimeError(f'{service}: {response.message}')
+
+    def _call(self, service_type: type, service: str, **fields: object) -> Any:
+        client = self.create_client(service_type, service)
+        try:
+            if not client.wait_for_service(PATIENCE):
+                raise RuntimeError(f'there is no service {service}')
+            response = client.call(service_type.Request(**fields), timeout_sec=PATIENCE)
+        finally:
+            self.destroy_client(client)
+        if response is None:
+            raise RuntimeError(f'{service} does not answer')
+        return response
+
+    def _await_active(self, name: str) -> Subscription:
+        def active(_: Float32) -> None:
+            if name not in self.active:
+                self.active[name] = time.monotonic()
+                self.destroy_subscription(self._waiting[name])
+
+        # goes out only while the node is active
+        return self.create_subscription(Float32, f'/{name}/actual_frequency', active, _DEPTH)
+
+    def _hear(self, message_type: type, topic: str) -> None:
+        self.audience.create_subscription(message_type, topic, lambda _: None, _DEPTH)
 
 
 class DriverRig(Rig):
@@ -90,6 +122,8 @@ class DriverRig(Rig):
     A simulated line with the driver on it, settled.
 
     :param settings: ROS parameters for all drives.
+
+    :ivar startup: how long it took until every drive was active, with all its parameters known.
     """
 
     def __init__(
@@ -114,22 +148,41 @@ class DriverRig(Rig):
                 parameters[f'{name}:address'] = address
             arguments = [f'{name}:={value}' for name, value in parameters.items()]
             self.listener = self._start_listener()
+            started = time.monotonic()
             self.driver = self.start(
-                *self._program(),
+                executable('driver'),
                 '--ros-args',
                 *(word for argument in arguments for word in ('-p', argument)),
             )
             self._while_starting()
-            self.wait_for(lambda: self.listener.measured >= set(self.names), self.driver)
+            self.startup = self._started(started)
             time.sleep(_SETTLE)
             failing.pop_all()
 
-    def _program(self) -> tuple[str, ...]:
-        """Return how the driver is started."""
-        return (executable('driver'),)
-
     def _while_starting(self) -> None:
         """Do what has to be done while the driver starts."""
+
+    def _started(self, started: float) -> dict[str, float]:
+        """Wait until all drives are active and known; return what that took since the start."""
+        active = self.listener.active
+        self.wait_for(lambda: active.keys() >= set(self.names), self.driver)
+        done = max(active.values())
+        space = Protocol.CLASSIC if self.line.protocol == 'classic' else Protocol.MODBUS
+        settings = load_model('sinus_g2').settings
+        wanted = {parameter.key for parameter in settings if space in parameter.places}
+        for name in self.names:
+            if not self.listener.known(name) >= wanted:
+                self.wait_for(lambda name=name: self.listener.known(name) >= wanted, self.driver)
+                done = time.monotonic()
+        frames = [frame for frame in self.frames() if frame.last <= done]
+        on_wire = self.line.limit(trace_file.once(frames))
+        return {
+            'start': done - started,
+            'start_line': done - frames[0].first,
+            'start_wire': on_wire,
+            'start_ratio': (done - started) / on_wire,
+            'start_line_ratio': (done - frames[0].first) / on_wire,
+        }
 
     def _start_listener(self) -> Listener:
         context = Context()

@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-A Modbus master that reads the driver's cycle over and over; a process of its own.
+Libraries as a Modbus RTU master that makes the driver's reads over and over; a process of its own.
 
-The cycle is what the driver polls: status word, inverter status, frequency and speed, of each
-drive. It runs until it is ended.
+It runs until it is ended.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ import argparse
 import asyncio
 from collections.abc import Callable
 import itertools
+import struct
 import time
 
 import minimalmodbus
@@ -31,32 +31,23 @@ from pymodbus.client import AsyncModbusSerialClient
 from pymodbus.client import ModbusSerialClient
 from pymodbus.framer import FramerType
 from pymodbus.pdu import ModbusPDU
+import recorded_cycle
+from trace_file import READ_FUNCTIONS
 from trace_file import Line
 
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
-
-STATUS = 'fieldbus.drive_status'
-KEYS = (STATUS, 'fieldbus.inv_st', 'status.frq_act', 'status.spd_act')
 #: Two stop bits for the parity: a character is as long, and a pseudo-terminal can do it. With
 #: parity these libraries cannot even open it, for the C library says that it has none.
-CHAR_FORMAT = '8N2'
 _SERIAL = {'bytesize': 8, 'parity': 'N', 'stopbits': 2}
 _TIMEOUT = 0.2
 
-#: Unit, register, number of registers.
-Read = tuple[int, int, int]
+#: Unit, function, register, number of registers.
+Read = tuple[int, int, int, int]
 
 
-def place(key: str) -> tuple[int, int]:
-    """Return register and number of registers of a parameter."""
-    where = load_model('sinus_g2')[key].place(Protocol.MODBUS)
-    return where.address, where.words
-
-
-def reads(drives: int) -> list[Read]:
-    """Return the reads of one cycle."""
-    return [(unit, *place(key)) for unit in range(1, drives + 1) for key in KEYS]
+def reads(cycle: recorded_cycle.Cycle) -> list[Read]:
+    """Return what a cycle reads."""
+    found = (struct.unpack('>BBHH', request[:6].ljust(6, b'\0')) for request, _ in cycle)
+    return [read for read in found if read[1] in READ_FUNCTIONS]
 
 
 def run_pymodbus(port: str, line: Line, cycle: list[Read]) -> None:
@@ -66,7 +57,7 @@ def run_pymodbus(port: str, line: Line, cycle: list[Read]) -> None:
     )
     if not client.connect():
         raise SystemExit('pymodbus cannot open the port')
-    for unit, register, count in itertools.cycle(cycle):
+    for unit, _, register, count in itertools.cycle(cycle):
         _check(client.read_holding_registers(register, count=count, device_id=unit))
         time.sleep(line.gap)
 
@@ -80,7 +71,7 @@ def run_pymodbus_async(port: str, line: Line, cycle: list[Read]) -> None:
         )
         if not await client.connect():
             raise SystemExit('pymodbus cannot open the port')
-        for unit, register, count in itertools.cycle(cycle):
+        for unit, _, register, count in itertools.cycle(cycle):
             _check(await client.read_holding_registers(register, count=count, device_id=unit))
             await asyncio.sleep(line.gap)
 
@@ -89,14 +80,14 @@ def run_pymodbus_async(port: str, line: Line, cycle: list[Read]) -> None:
 
 def run_minimalmodbus(port: str, line: Line, cycle: list[Read]) -> None:
     """Read with minimalmodbus, which keeps the gap itself."""
-    units = {unit: minimalmodbus.Instrument(port, unit) for unit, _, _ in cycle}
+    units = {unit: minimalmodbus.Instrument(port, unit) for unit, *_ in cycle}
     # all share one port
     serial = units[cycle[0][0]].serial
     serial.baudrate, serial.timeout = line.baud_rate, _TIMEOUT
     for name, value in _SERIAL.items():
         setattr(serial, name, value)
-    for unit, register, count in itertools.cycle(cycle):
-        units[unit].read_registers(register, count)
+    for unit, function, register, count in itertools.cycle(cycle):
+        units[unit].read_registers(register, count, function)
 
 
 def _check(answer: ModbusPDU) -> None:
@@ -105,9 +96,9 @@ def _check(answer: ModbusPDU) -> None:
 
 
 MASTERS: dict[str, Callable[[str, Line, list[Read]], None]] = {
+    'minimalmodbus': run_minimalmodbus,
     'pymodbus sync + gap': run_pymodbus,
     'pymodbus async + gap': run_pymodbus_async,
-    'minimalmodbus': run_minimalmodbus,
 }
 
 
@@ -117,9 +108,10 @@ def main() -> None:
     parser.add_argument('master', choices=MASTERS)
     parser.add_argument('port')
     parser.add_argument('baud_rate', type=int)
-    parser.add_argument('drives', type=int)
+    parser.add_argument('cycle')
     options = parser.parse_args()
-    MASTERS[options.master](options.port, Line(options.baud_rate), reads(options.drives))
+    cycle = reads(recorded_cycle.load(options.cycle))
+    MASTERS[options.master](options.port, Line(options.baud_rate), cycle)
 
 
 if __name__ == '__main__':

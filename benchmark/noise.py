@@ -163,7 +163,7 @@ def main() -> None:
     text = '\n'.join(lines)
     print(text)
     if options.write:
-        page.write(text, page.NOISE)
+        page.write(text, 'noise')
 
 
 def _measure(case: Case, baud_rate: int, seconds: float) -> str:

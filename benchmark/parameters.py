@@ -100,7 +100,7 @@ def _reading(frames: list[Frame]) -> list[Frame]:
     known: set[int] = set()
     found: list[Frame] = []
     for number, frame in enumerate(frames):
-        register = trace_file.read_register(frame) if frame.is_request else None
+        register = trace_file.read_register(frame.data) if frame.is_request else None
         # before it, the time-out of the drive is read, which are settings too
         if register in _SETTINGS and (found or _follows(frames[number:])):
             if register in known:
@@ -115,7 +115,7 @@ def _reading(frames: list[Frame]) -> list[Frame]:
 def _follows(frames: list[Frame]) -> bool:
     """Tell whether a whole row of settings begins here."""
     requests = [frame for frame in frames if frame.is_request][:5]
-    return all(trace_file.read_register(frame) in _SETTINGS for frame in requests)
+    return all(trace_file.read_register(frame.data) in _SETTINGS for frame in requests)
 
 
 def _keypad(rig: DriverRig, changes: int) -> list[float]:
@@ -144,7 +144,7 @@ def _shares(frames: list[Frame], rig: DriverRig) -> tuple[float, float]:
     whose = 'other'
     for frame in frames:
         if frame.is_request:
-            register = trace_file.read_register(frame)
+            register = trace_file.read_register(frame.data)
             whose = 'settings' if register in _SETTINGS else 'other'
             whose = 'poll' if register in _POLLED else whose
         spent[whose] += rig.line.limit([frame])

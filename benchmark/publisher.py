@@ -15,7 +15,8 @@
 Publishes set-points at random moments and says when; a process of its own.
 
 Each drive gets one in its turn. Prints one JSON list: moment (s of the steady clock), number of
-the drive, value. Then it waits to be ended.
+the drive, value. Then it waits to be ended. With a count of 0 all drives get the same set-point
+again and again, until it is ended.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ _PATIENCE = 30.0
 _PERIODS = (0.05, 0.1)
 #: Hz. No value comes again before all others were published.
 VALUES = [5.0 + 0.5 * step for step in range(61)]
+#: The set-point that does not change, Hz, and how often each drive gets it, s.
+_SAME = 20.0
+_SAME_PERIOD = 0.1
 
 
 def main() -> None:
@@ -55,6 +59,10 @@ def main() -> None:
         if time.monotonic() > deadline:
             raise SystemExit('not every drive listens to its set-points')
         time.sleep(0.05)
+    while not options.count:
+        for publisher in publishers:
+            publisher.publish(Float32(data=_SAME))
+        time.sleep(_SAME_PERIOD)
     chance = random.Random()
     published = []
     for number in range(options.count):

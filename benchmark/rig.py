@@ -26,13 +26,17 @@ import sys
 import tempfile
 import time
 
-import processor
+import resources
 import trace_file
 from trace_file import Frame
 from trace_file import Line
 
 #: A process that has not done by then what it should never will, s.
 PATIENCE = 60.0
+#: The same for each drive on the line, s.
+_PATIENCE_DRIVE = 15.0
+#: How much of the log is told, characters.
+_TOLD = 2000
 #: Where these programs are.
 FOLDER = Path(__file__).parent
 
@@ -70,6 +74,7 @@ class Rig(contextlib.ExitStack):
         folder = self.enter_context(tempfile.TemporaryDirectory(prefix='nfo_sinus_bench_'))
         self.line = Line(baud_rate, protocol)
         self.drives = drives
+        self.folder = Path(folder)
         self.port = str(Path(folder, 'line'))
         self._trace = Path(folder, 'trace')
         self._log = Path(folder, 'log')
@@ -117,27 +122,32 @@ class Rig(contextlib.ExitStack):
 
     def begin_watch(self, process: subprocess.Popen[str]) -> Callable[[], Window]:
         """Return what tells later what happened from now on."""
-        start, cost, others = time.monotonic(), processor.of_process(process.pid), self._others()
+        start, cost, others = time.monotonic(), resources.of_process(process.pid), self._others()
 
         def watched() -> Window:
             now = time.monotonic()
             if process.poll() is not None:
-                raise RuntimeError(f'a process has ended:\n{self.log}')
+                raise RuntimeError(f'a process has ended:\n{self.log[-_TOLD:]}')
             return Window(
                 trace_file.frames_of(self._trace, start, now),
                 now - start,
-                (processor.of_process(process.pid) - cost) / (now - start),
+                (resources.of_process(process.pid) - cost) / (now - start),
                 (self._others() - others) / (now - start),
             )
 
         return watched
 
     def _others(self) -> float:
-        return processor.of_all_but([os.getpid(), *(process.pid for process in self._processes)])
+        return resources.of_all_but([os.getpid(), *(process.pid for process in self._processes)])
 
-    def frames(self) -> list[Frame]:
-        """Return all that the line has carried."""
-        return trace_file.frames_of(self._trace)
+    def end(self, process: subprocess.Popen[str]) -> None:
+        """End a process before the rig ends."""
+        _end(process)
+        self._processes.remove(process)
+
+    def frames(self, start: float = 0.0) -> list[Frame]:
+        """Return all that the line has carried since a moment, s."""
+        return trace_file.frames_of(self._trace, start)
 
     def requests(self) -> list[float]:
         """Return when each request began on the line, be it as noisy as it may."""
@@ -149,10 +159,11 @@ class Rig(contextlib.ExitStack):
 
         :raises RuntimeError: it ended, or that never came; says what was logged.
         """
-        deadline = time.monotonic() + PATIENCE
+        # all of them start one after another on one line
+        deadline = time.monotonic() + PATIENCE + _PATIENCE_DRIVE * self.drives
         while not condition():
             if process.poll() is not None or time.monotonic() > deadline:
-                raise RuntimeError(f'it does not start as it should:\n{self.log}')
+                raise RuntimeError(f'it does not do as it should:\n{self.log[-_TOLD:]}')
             time.sleep(0.05)
 
 

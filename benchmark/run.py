@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-How fast the driver is, and how fast others are: prints one table.
+How fast the driver is, and how fast others are: prints tables.
 
 Simulated drives on a line that takes its time, the driver and its users, each a process of its
 own. docs/performance.md explains the rows.
@@ -21,92 +21,98 @@ own. docs/performance.md explains the rows.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 import os
 import signal
-import statistics
 import sys
 import time
 
-from measurements import Effort
-from measurements import Figures
 from measurements import Measurement
 from measurements import all_measurements
 import page
-import processor
+import resources
+from row import Effort
+from row import Row
+from row import blamed
+from row import merged
 
-_WHOLE = Effort(window=5.0, setpoints=500, events=3)
-_QUICK = Effort(window=3.0, setpoints=60, events=1)
+_WHOLE = Effort(window=5.0, rounds=5, setpoints=500, stops=40, events=3)
+_QUICK = Effort(window=3.0, rounds=3, setpoints=100, stops=10, events=1)
 #: The machine is calm when everybody else takes less than this, cores.
 _CALM = 0.5
-#: What may not happen in any run, so that a median would hide it.
-_COUNTED = ('short_gaps', 'lost')
-#: What counts in every run: the events, and the longest that any of them took.
-_SUMMED = (*_COUNTED, 'events')
-_WORST = ('longest', 'ratio', 'beyond', 'polls')
+#: How often a measurement is tried; a busy machine can spoil one.
+_ATTEMPTS = 2
 
 
 def main() -> None:
-    """Measure and print the table."""
-    options = _parser().parse_args()
+    """Measure and print the tables."""
+    parser = _parser()
+    options = parser.parse_args()
+    if options.write and options.baud:
+        parser.error('--write replaces whole tables: not with --baud')
     # end what was started, however this ends
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     # nobody else's drives may hear what is published here
     os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    chosen = [row for row in all_measurements() if not options.only or row.group in options.only]
-    runs = 1 if options.quick else options.runs
+    chosen = [
+        one
+        for one in all_measurements()
+        if (not options.only or one.group in options.only)
+        and (not options.baud or one.baud_rate in options.baud)
+    ]
+    runs = options.runs or (1 if options.quick else 5)
     effort = _QUICK if options.quick else _WHOLE
-    measured: list[list[dict[str, Figures]]] = [[] for _ in chosen]
-    loads = []
+    measured: list[list[list[Row]]] = [[] for _ in chosen]
+    loads: list[float] = []
     for run in range(1, runs + 1):
         for measurement, results in zip(chosen, measured, strict=True):
-            results.append(_measure(measurement, effort, options.calm, loads))
-            _tell(f'run {run} of {runs}', measurement, results[-1])
-    rows = [
-        (measurement, title, merged(measurement.group, [found[title] for found in results]))
-        for measurement, results in zip(chosen, measured, strict=True)
-        for title in results[0]
-    ]
-    text = f'{page.circumstances(_command(), runs, loads)}\n\n{page.tables(rows)}'
-    print(text)
-    if options.write:
-        page.write(text)
+            began = time.monotonic()
+            try:
+                results.append(_measure(measurement, effort, options.calm, loads))
+            except RuntimeError as error:
+                # the others are not lost with it
+                _say(f'{measurement}: NOT MEASURED: {error}')
+                continue
+            took = time.monotonic() - began
+            _tell(f'run {run} of {runs}, {took:.0f} s', measurement, results[-1])
+    rows: dict[str, list[Row]] = {}
+    for measurement, results in zip(chosen, measured, strict=True):
+        found = [merged(same) for same in zip(*results, strict=True)]
+        rows.setdefault(measurement.group, []).extend(found)
+    circumstances = page.circumstances(_command(), runs, loads)
+    for group, found in rows.items():
+        text = f'{circumstances}\n\n{page.tables(found)}'
+        summary = page.summary(group, found)
+        print(f'{group}\n\n{summary}\n\n{text}\n')
+        if options.write:
+            page.write(text, group)
+            if summary:
+                page.write(summary, f'summary of {group}')
 
 
 def _measure(
     measurement: Measurement, effort: Effort, patience: float, loads: list[float]
-) -> dict[str, Figures]:
+) -> list[Row]:
     """Measure, again while the machine is not calm and there is patience (s)."""
     deadline = time.monotonic() + patience
-    counted: dict[tuple[str, str], float] = {}
+    failures = 0
+    measured: list[list[Row]] = []
     while True:
-        processor.await_calm(_CALM, deadline - time.monotonic())
+        if patience:
+            resources.await_calm(_CALM, deadline - time.monotonic())
         loads.append(os.getloadavg()[0])
-        rows = measurement.measure(effort)
-        # it is no excuse that others were busy
-        for title, figures in rows.items():
-            for name in figures.keys() & set(_COUNTED):
-                figures[name] += counted.get((title, name), 0.0)
-                counted[title, name] = figures[name]
-        others = max(figures['others'] for figures in rows.values())
+        try:
+            measured.append(measurement.measure(effort))
+        except RuntimeError as error:
+            failures += 1
+            if failures == _ATTEMPTS:
+                raise
+            _say(f'{measurement}: tried again: {error}')
+            continue
+        others = max(row.figures['others'] for row in measured[-1])
         if others < 100 * _CALM or time.monotonic() > deadline:
-            return rows
-
-
-def merged(group: str, results: list[Figures]) -> Figures:
-    """Return the medians of the runs; what must never happen is counted over all of them."""
-    names = {name for figures in results for name in figures}
-    return {
-        name: _merging(group, name)([figures[name] for figures in results if name in figures])
-        for name in names
-    }
-
-
-def _merging(group: str, name: str) -> Callable[[list[float]], float]:
-    if name in _SUMMED:
-        return sum
-    return max if group == 'stop' and name in _WORST else statistics.median
+            # it is no excuse that others were busy
+            return [blamed(same) for same in zip(*measured, strict=True)]
 
 
 def _command() -> str:
@@ -116,20 +122,26 @@ def _command() -> str:
     return ' '.join([*words, *sys.argv[1:]])
 
 
-def _tell(run: str, measurement: Measurement, rows: dict[str, Figures]) -> None:
-    where = f'{measurement.baud_rate} bit/s, {measurement.drives} drives'
-    for title, figures in rows.items():
-        told = ', '.join(f'{name} {value:.3f}' for name, value in figures.items())
-        print(f'{run}: {title}, {where}: {told}', file=sys.stderr, flush=True)
+def _tell(run: str, measurement: Measurement, rows: list[Row]) -> None:
+    for row in rows:
+        told = ', '.join(f'{name} {value:.3f}' for name, value in row.figures.items())
+        where = f'{measurement.what}, {row.baud_rate} bit/s, {row.drives} drives'
+        _say(f'{run}: {row.what} ({where}): {told}')
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
-    add('--runs', type=int, default=5, help='how often everything is measured (default: 5)')
-    add('--quick', action='store_true', help='one short run, to see that it works')
-    groups = list(dict.fromkeys(row.group for row in all_measurements()))
-    add('--only', action='append', choices=groups, help='only these rows; may be repeated')
+    add('--runs', type=int, help='how often everything is measured (default: 5; --quick: 1)')
+    add('--quick', action='store_true', help='shorter windows, fewer events, one run')
+    groups = list(dict.fromkeys(one.group for one in all_measurements()))
+    add('--only', action='append', choices=groups, help='only these tables; may be repeated')
+    rates = sorted({one.baud_rate for one in all_measurements()})
+    add('--baud', action='append', type=int, choices=rates, help='only at this rate')
     add(
         '--calm',
         type=float,
@@ -138,7 +150,7 @@ def _parser() -> argparse.ArgumentParser:
         help='wait until the machine is calm, and measure again what was disturbed, for so long '
         'at most with each measurement',
     )
-    add('--write', action='store_true', help=f'put the table into docs/{page.PAGE.name}')
+    add('--write', action='store_true', help=f'put the tables into docs/{page.PAGE.name}')
     add('--domain', type=int, default=90, metavar='ID', help='ROS domain (default: 90)')
     return parser
 

@@ -21,25 +21,25 @@ has to stop one of them, which is then enabled again.
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Container
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from dataclasses import replace
 import itertools
 from itertools import pairwise
-from pathlib import Path
 import random
 import signal
 import statistics
-import sys
 import threading
 import time
 
 from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
 from rclpy.qos import QoSProfile
-from rig import FOLDER
 from rig import PATIENCE
+from row import Effort
+from row import Figures
+from row import Row
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
@@ -53,9 +53,6 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import modbus_ascii
-from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.simulator.control import Client
 
 #: ``setpoint_timeout`` of every drive, s.
@@ -73,7 +70,10 @@ _TELLS = ~int(Status.SETPOINT_REACHED | Status.LIMIT_ACTIVE | Status.REV_OP_ENAB
 _MODEL = load_model('sinus_g2')
 _STATUS, _INV_ST, _MODE_KEY = 'fieldbus.drive_status', 'fieldbus.inv_st', 'control.mode'
 
-Figures = dict[str, float]
+#: The character that stands for address 0 in a Classic frame [M0 §6.1].
+_ADDRESS_ZERO = 0x20
+#: How many drives are on the line.
+_DRIVES = 8
 
 
 @dataclass(frozen=True)
@@ -90,45 +90,48 @@ class _Event:
 
 
 class _Wire:
-    """What frames look like on one line."""
+    """What frames mean on one line, whichever function carries it."""
 
     def __init__(self, protocol: str) -> None:
         self._protocol = protocol
-        self._space = Protocol.CLASSIC if protocol == 'classic' else Protocol.MODBUS
-        self.setpoint = 'fieldbus.setpoint' if protocol == 'classic' else 'status.frq_set'
+        self._classic = protocol == 'classic'
+        self._space = Protocol.CLASSIC if self._classic else Protocol.MODBUS
+        self.setpoint = 'fieldbus.setpoint' if self._classic else 'status.frq_set'
 
-    def read(self, unit: int, key: str) -> bytes:
-        """Return the request that reads a parameter."""
-        place = _MODEL[key].place(self._space)
-        if self._protocol == 'classic':
-            return classic.encode(classic.Enquiry(unit, place.address))
-        return self._modbus(modbus_pdu.Read(unit, place.address, place.words))
+    def reads(self, request: bytes, unit: int, key: str) -> bool:
+        """Tell whether a request reads a parameter."""
+        place = _MODEL[key].place(self._space).address
+        if self._classic:
+            return request == classic.encode(classic.Enquiry(unit, place))
+        message = self._message(request)
+        return message[0] == unit and trace_file.read_register(message) == place
 
-    def write(self, unit: int, key: str, word: int) -> bytes:
-        """Return the request that writes a parameter of one word."""
-        place = _MODEL[key].place(self._space)
-        if self._protocol == 'classic':
-            return classic.encode(classic.Select(unit, place.address, word))
-        return self._modbus(modbus_pdu.Write(unit, place.address, (word,)))
+    def writes(self, request: bytes, units: Container[int], key: str, word: int) -> bool:
+        """Tell whether a request gives one of some units a word."""
+        place = _MODEL[key].place(self._space).address
+        if self._classic:
+            unit = request[1] - _ADDRESS_ZERO
+            return unit in units and request == classic.encode(classic.Select(unit, place, word))
+        unit, register, value = trace_file.written(self._message(request))
+        return unit in units and (register, value) == (place, word)
 
     def is_refusal(self, unit: int, answer: bytes) -> bool:
         """Tell whether an answer is the refusal of a drive."""
-        if self._protocol == 'classic':
+        if self._classic:
             return answer == classic.encode(classic.Nak(unit))
         message = self._message(answer)
         return message[0] == unit and message[1] >= 0x80
 
     def word(self, answer: bytes) -> int:
         """Return what a read is answered, the low word of it."""
-        if self._protocol == 'classic':
+        if self._classic:
             return int(answer[8:12], 16)
         return int.from_bytes(self._message(answer)[3:5], 'big')
 
-    def _message(self, answer: bytes) -> bytes:
-        return bytes.fromhex(answer[1:-2].decode()) if answer[:1] == b':' else answer
-
-    def _modbus(self, request: modbus_pdu.Request[object]) -> bytes:
-        return (modbus_ascii if self._protocol == 'modbus_ascii' else rtu).encode(request)
+    def _message(self, frame: bytes) -> bytes:
+        if self._protocol == 'modbus_ascii':
+            return bytes.fromhex(frame[1:-2].decode())
+        return frame
 
 
 class _Feeder(threading.Thread):
@@ -265,27 +268,18 @@ FEW_KINDS = ('service stop', 'fault', 'fault in a poll', 'set-point time-out', '
 SLOW_KINDS = tuple(kind for kind in FEW_KINDS if kind != 'fault in a poll')
 
 
-class StopRig(DriverRig):
-    """A rig whose driver tells when its services are called."""
-
-    def _program(self) -> tuple[str, ...]:
-        return sys.executable, str(FOLDER / 'stamping_driver.py'), str(self._stamps)
-
-    @property
-    def _stamps(self) -> Path:
-        return Path(f'{self.port}.stamps')
-
-    def stamps(self) -> list[float]:
-        """Return when services were called, as the driver saw it."""
-        return [float(line) for line in self._stamps.read_text().splitlines()]
+def measure(protocol: str, baud_rate: int, kinds: Sequence[str], effort: Effort) -> list[Row]:
+    """Return a row for each kind of event, on a full line of eight drives."""
+    with DriverRig(baud_rate, _DRIVES, protocol, setpoint_timeout=TIMEOUT) as rig:
+        found = _measure(rig, kinds, effort.events)
+    aims = {'beyond': 5.0, 'polls': 2.0}
+    return [
+        Row('stop', f'{kind}, {protocol}', baud_rate, _DRIVES, figures, aims)
+        for kind, figures in found.items()
+    ]
 
 
-def measure(rig: StopRig, kinds: Sequence[str], count: int) -> dict[str, Figures]:
-    """
-    Return the figures of each kind of event; the driver has ended then.
-
-    :param count: how often each of them happens.
-    """
+def _measure(rig: DriverRig, kinds: Sequence[str], count: int) -> dict[str, Figures]:
     feeder = _Feeder(rig)
     with Client.at_link(rig.port) as drives:
         ride = _Ride(rig, drives, feeder)
@@ -303,14 +297,6 @@ def measure(rig: StopRig, kinds: Sequence[str], count: int) -> dict[str, Figures
         rig.driver.send_signal(signal.SIGTERM)
         rig.driver.wait(PATIENCE)
         events.append(_Event('SIGTERM', 0, at))
-    stamps = rig.stamps()
-    for kind in [kind for kind in kinds if kind in _SERVICES]:
-        # the same again from when the driver was called
-        events += [
-            replace(event, kind=f'{kind}, called', at=min(at for at in stamps if at > event.at))
-            for event in events
-            if event.kind == kind
-        ]
     frames = rig.frames()
     limit = trace_file.longest_transaction(window.frames, rig.line)
     wire = _Wire(rig.line.protocol)
@@ -324,12 +310,10 @@ def measure(rig: StopRig, kinds: Sequence[str], count: int) -> dict[str, Figures
             'p99': 1e3 * trace_file.percentile(delays, 99),
             'longest': 1e3 * max(delays),
             'limit': 1e3 * limit,
-            'ratio': max(delays) / limit,
+            'longest_ratio': max(delays) / limit,
+            'beyond': 1e3 * (max(delays) - limit),
             'others': window.figures()['others'],
         }
-        if kind not in _SERVICES:
-            # what ROS takes until the driver is called is none of the bus
-            found[kind]['beyond'] = 1e3 * (max(delays) - limit)
         if kind in _INJECTED:
             found[kind]['polls'] = max(polls for _, polls in seen)
     return found
@@ -353,13 +337,13 @@ def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
     if event.kind not in _INJECTED:
         return stop - event.at, 0
     keys = (_MODE_KEY,) if event.kind == 'control mode changed' else (_STATUS, _INV_ST)
-    requests = {wire.read(event.unit, key): key for key in (_STATUS, *keys)}
+    asked = dict.fromkeys((_STATUS, *keys))
     before: dict[str, int] = {}
     told, polls = [], 0
     for request, answer in pairwise(frames):
         if answer.last > stop or not request.is_request or answer.is_request:
             continue
-        key = requests.get(request.data)
+        key = next((key for key in asked if wire.reads(request.data, event.unit, key)), None)
         happened = answer.last >= event.at
         polls += happened and key == _STATUS
         if happened and wire.is_refusal(event.unit, answer.data):
@@ -384,10 +368,13 @@ def _tells(key: str, before: int | None, word: int) -> bool:
 def _stops(event: _Event, frames: list[Frame], wire: _Wire) -> Iterator[Frame]:
     """Return the requests that answer an event."""
     units = (event.unit,) if event.unit else range(1, 95)
+    key, word = 'fieldbus.scmd', int(Scmd.STOP)
     if event.kind == 'set-point time-out':
-        wanted = {wire.write(unit, wire.setpoint, 0) for unit in units}
-    elif event.kind.startswith('service quick_stop'):
-        wanted = {wire.write(unit, 'fieldbus.mode', Mode.STOP) for unit in units}
-    else:
-        wanted = {wire.write(unit, 'fieldbus.scmd', Scmd.STOP) for unit in units}
-    return (frame for frame in frames if frame.is_request and frame.data in wanted)
+        key, word = wire.setpoint, 0
+    elif event.kind == 'service quick_stop':
+        key, word = 'fieldbus.mode', int(Mode.STOP)
+    return (
+        frame
+        for frame in frames
+        if frame.is_request and wire.writes(frame.data, units, key, word)
+    )

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,7 +28,8 @@ import struct
 #: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU;
 #: and with seven data bits: Modbus ASCII and Classic.
 _BITS = {'modbus_rtu': 11, 'modbus_ascii': 10, 'classic': 10}
-_READ = 3
+READ_FUNCTIONS = (3, 4)
+_WRITE_ONE, _WRITE_SEVERAL, _READ_AND_WRITE = 6, 16, 23
 #: How a Classic ENQUIRY begins and ends; the address is a character from here on [M0 §6.1].
 _EOT, _ENQ, _ADDRESS_ZERO = 4, 5, 0x20
 #: Less than this is what floating point makes of a time since the machine started, s.
@@ -114,18 +116,14 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
     """
     Return the cycles of all units: from one read of a parameter to the next, of the same unit.
 
+    Whichever function reads it: one that writes something else as well counts, too.
+
     :param place: the register or the Classic id of the parameter.
 
     :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio.
     """
-    begins: dict[int, list[int]] = {}
-    for number, frame in enumerate(frames):
-        if frame.is_request:
-            unit, what = _asks(frame, line.protocol)
-            if what == place:
-                begins.setdefault(unit, []).append(number)
     times, limits = [], []
-    for numbers in begins.values():
+    for numbers in _begins(frames, line, place).values():
         for begin, end in pairwise(numbers):
             times.append(frames[end].first - frames[begin].first)
             limits.append(line.limit(frames[begin:end]))
@@ -134,23 +132,70 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
         'p99': 1e3 * percentile(times, 99),
         'limit': 1e3 * statistics.median(limits),
         'ratio': statistics.median(a / b for a, b in zip(times, limits, strict=True)),
-        'units': len(begins),
     }
+
+
+def units_with_cycles(frames: Sequence[Frame], line: Line, place: int) -> int:
+    """Return from how many units a parameter was read twice at least."""
+    return sum(len(numbers) > 1 for numbers in _begins(frames, line, place).values())
+
+
+def _begins(frames: Sequence[Frame], line: Line, place: int) -> dict[int, list[int]]:
+    """Return which frames ask for a parameter, by unit."""
+    begins: dict[int, list[int]] = {}
+    for number, frame in enumerate(frames):
+        if frame.is_request:
+            unit, what = _asks(frame, line.protocol)
+            if what == place:
+                begins.setdefault(unit, []).append(number)
+    return begins
 
 
 def _asks(frame: Frame, protocol: str) -> tuple[int, int | None]:
     """Return whom a request asks, and for which register or id, if it reads one."""
     data = frame.data
     if protocol == 'modbus_rtu':
-        return data[0], read_register(frame)
+        return data[0], read_register(data)
     enquires = data[0] == _EOT and data[-1] == _ENQ
     return data[1] - _ADDRESS_ZERO, int(data[3:-1], 16) if enquires else None
 
 
-def read_register(frame: Frame) -> int | None:
-    """Return which register a request reads, or ``None`` if it reads none."""
-    _, function, register = struct.unpack('>BBH', frame.data[:4])
-    return register if function == _READ else None
+def read_register(request: bytes) -> int | None:
+    """Return which register a Modbus RTU request reads, or ``None`` if it reads none."""
+    _, function, register = struct.unpack('>BBH', request[:4].ljust(4, b'\0'))
+    return register if function in (*READ_FUNCTIONS, _READ_AND_WRITE) else None
+
+
+def writes(frames: Sequence[Frame], register: int) -> Iterator[tuple[float, int, int]]:
+    """Return when a register was written by Modbus RTU, of which unit, and its (first) word."""
+    for frame in frames:
+        if frame.is_request:
+            unit, where, word = written(frame.data)
+            if where == register:
+                yield frame.first, unit, word
+
+
+def written(request: bytes) -> tuple[int, int | None, int]:
+    """Return the unit, the register that a Modbus RTU request writes, if any, and the word."""
+    unit, function = request[:2]
+    if function == _WRITE_ONE:
+        return unit, *struct.unpack('>HH', request[2:6])
+    if function == _WRITE_SEVERAL:
+        return unit, *struct.unpack('>H3xH', request[2:9])
+    if function == _READ_AND_WRITE:
+        return unit, *struct.unpack('>H3xH', request[6:13])
+    return unit, None, 0
+
+
+def once(frames: Sequence[Frame]) -> list[Frame]:
+    """Return the transactions that differ, each as it was the first time."""
+    asked: set[bytes] = set()
+    found: list[Frame] = []
+    for request, answer in pairwise(frames):
+        if request.is_request and not answer.is_request and request.data not in asked:
+            asked.add(request.data)
+            found += (request, answer)
+    return found
 
 
 def additions(frames: Sequence[Frame], line: Line) -> dict[str, float]:

@@ -63,7 +63,7 @@ from nfo_sinus_driver.timers import tighten_timers
 from nfo_sinus_driver.turns import Turns
 from nfo_sinus_driver.turns import Waiting
 
-__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Task', 'Transfer']
+__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Statistics', 'Task', 'Transfer']
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -86,7 +86,10 @@ class Bus:
         self._awake = threading.Event()
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
-        self._turns = Turns(self.silences.is_silent)
+        self._turns = Turns(
+            self.silences.is_silent,
+            lambda unit: self.silences.is_missing(unit, time.monotonic()),
+        )
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
@@ -148,9 +151,9 @@ class Bus:
         """The worker works."""
         return self._thread.is_alive()
 
-    def statistics(self) -> Statistics:
-        """Return the counters and times of the line."""
-        return self.recorder.statistics()
+    def statistics(self, unit: int | None = None) -> Statistics:
+        """Return the counters and times of the line, or of one unit on it."""
+        return self.recorder.statistics(unit)
 
     @property
     def port_error(self) -> PortError | None:
@@ -173,13 +176,46 @@ class Bus:
             return read_in_steps(unit, address, priority)
         return Transfer(unit, address, priority)
 
-    def write(self, unit: int, address: Address, words: Words, priority: Priority) -> Transfer:
+    def write(
+        self,
+        unit: int,
+        address: Address,
+        words: Words,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> Transfer:
         """
         Write one parameter (to be awaited).
 
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        return Transfer(unit, address, priority, words)
+        return Transfer(unit, address, priority, words, require_wanted=require_wanted)
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address, priority: Priority
+    ) -> Transfer:
+        """
+        Write one parameter and read another, in one transaction (to be awaited, or for a slot).
+
+        The answer has no words if it was only written: see :meth:`Link.write_and_read`.
+
+        :raises LinkError: as the link does.
+        """
+        return Transfer(unit, address, priority, words, source=source)
+
+    def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
+        """
+        Give a task what it waits to read, because it has just been told with something else.
+
+        :returns: whether it waits for that.
+        """
+        awaited = task.awaited
+        if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
+            return False
+        self._turns.withdraw(task)
+        self._advance(task, reply, None)
+        return True
 
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words, priority: Priority
@@ -300,7 +336,10 @@ class Bus:
         if not self._port.is_open:
             self._fail_all(self._port.error)
             return min(self._sleepers.next_moment, self._port.reopen_at)
-        return -math.inf if self._send_next() else self._sleepers.next_moment
+        if self._send_next():
+            return -math.inf
+        missing_from = self.silences.missing_from if self._turns.missing_wait else math.inf
+        return min(self._sleepers.next_moment, missing_from)
 
     def _take_in(self) -> None:
         while self._inbox:
@@ -349,7 +388,7 @@ class Bus:
 
     def _send_next(self) -> bool:
         """Send what is most urgent; false if there is nothing to send."""
-        entry = self._turns.take()
+        entry = self._turns.take(missing=time.monotonic() >= self.silences.missing_from)
         if isinstance(entry, Slot):
             self._write_slot(entry)
         elif entry is not None:
@@ -362,20 +401,23 @@ class Bus:
         if transfer is None:
             return
         try:
-            self._transact(transfer)
+            reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self.request, slot))
         except LinkError as error:
             slot.done(transfer, error)
         else:
             slot.done(transfer, None)
+            slot.told(reply)
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
+            transfer.require_wanted()
             reply = self._transact(transfer)
         except NotReady as error:
             self._later(error.until, functools.partial(self._resume, task, transfer))
-        except LinkError as error:
+        except Exception as error:
+            # the line failed, or nobody wants it any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)
@@ -398,8 +440,12 @@ class Bus:
                 reply = transfer.send()
             elif transfer.words is None:
                 reply = self._link.read(transfer.unit, transfer.address)
-            else:
+            elif transfer.source is None:
                 reply = self._link.write(transfer.unit, transfer.address, transfer.words)
+            else:
+                reply = self._link.write_and_read(
+                    transfer.unit, transfer.address, transfer.words, transfer.source
+                )
         except NotReady:
             raise
         except LinkError as error:
@@ -414,12 +460,12 @@ class Bus:
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
-        self.silences.note(unit, now, error)
+        self.silences.note(unit, now, error, now - started)
         self._turns.took(now - started)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
-            self.recorder.transaction(now, now - started, error)
+            self.recorder.transaction(unit, now, now - started, error)
 
     def _open_when_due(self) -> None:
         now = time.monotonic()

@@ -65,9 +65,13 @@ class Transfer:
     One transaction that a coroutine awaits.
 
     A read, or a write if ``words`` is given, or whatever ``send`` does.
+
+    :param require_wanted: called by the worker at the moment of sending; what it raises goes to the
+        coroutine, and nothing is sent.
+    :ivar source: what is read in the same transaction as the write, or ``None``.
     """
 
-    __slots__ = ('address', 'priority', 'send', 'unit', 'words')
+    __slots__ = ('address', 'priority', 'require_wanted', 'send', 'source', 'unit', 'words')
 
     def __init__(
         self,
@@ -76,12 +80,21 @@ class Transfer:
         priority: Priority,
         words: Words | None = None,
         send: Callable[[], Reply] | None = None,
+        require_wanted: Callable[[], None] = lambda: None,
+        source: Address | None = None,
     ) -> None:
         self.unit = unit
         self.address = address
         self.priority = priority
         self.words = words
         self.send = send
+        self.require_wanted = require_wanted
+        self.source = source
+
+    def reads(self, unit: int, address: Address) -> bool:
+        """Tell whether it only reads a parameter."""
+        reading = self.words is None and self.send is None
+        return reading and self.unit == unit and self.address == address
 
     def __await__(self) -> Generator[Transfer, Reply, Reply]:
         return (yield self)
@@ -212,13 +225,16 @@ class Slot:
     :param make: called by the worker at the moment of sending; returns what to write now, or
         ``None`` if there is nothing to write any more.
     :param done: called by the worker with the error, or ``None`` when the unit took it.
+    :param told: called after that with the answer of a unit that took it.
     """
 
     def __init__(
         self,
         make: Callable[[], Transfer | None],
         done: Callable[[Transfer, LinkError | None], None],
+        told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
         self.make = make
         self.done = done
+        self.told = told
         self.pending = False

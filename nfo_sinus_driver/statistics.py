@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Counters and times of one line."""
+"""Counters and times of one line, and of each unit on it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
-#: Of how many of the last transactions the round trips are kept.
+#: Of how many of the last transactions the round trips are kept: of a line, and of one unit.
 _ROUND_TRIPS = 1000
+_ROUND_TRIPS_OF_A_UNIT = 200
 #: Over how long the utilisation is taken, s.
 _WINDOW = 2.0
 
@@ -35,11 +36,13 @@ _WINDOW = 2.0
 @dataclass(frozen=True)
 class Statistics:
     """
-    How a line is doing; times in seconds, NaN where nothing was measured yet.
+    How a line is doing, or one unit on it; times in seconds, NaN where nothing was measured yet.
 
-    :ivar utilisation: share of the last two seconds in which the line was in use, 0 to 1.
-    :ivar cycle_time: how long the slowest drive's last round of polling took.
+    :ivar utilisation: share of the last two seconds in which the line was in use, or in use for
+        this unit, 0 to 1.
+    :ivar cycle_time: how long the last round of polling took; of a line, that of its slowest unit.
     :ivar transactions: requests sent, answered or not.
+    :ivar reconnects: how often the port was opened again, or the unit was connected to again.
     """
 
     utilisation: float
@@ -52,28 +55,32 @@ class Statistics:
     reconnects: int
     round_trip_min: float
     round_trip_mean: float
+    round_trip_median: float
     round_trip_p99: float
     round_trip_max: float
 
 
-class Recorder:
-    """Takes the measurements; written by the bus worker alone, read by anyone."""
+class Tally:
+    """
+    What is counted of a line, or of one unit; a transaction costs the same however many there are.
 
-    def __init__(self) -> None:
+    :param round_trips: how many of the last round trips are kept.
+    """
+
+    def __init__(self, round_trips: int = _ROUND_TRIPS) -> None:
         self.transactions = 0
         self.timeouts = 0
         self.damaged = 0
         self.refused = 0
         self.retries = 0
-        self.reconnects = 0
+        #: How long the last round of polling took, s.
+        self.cycle_time = math.nan
         self._opened = 0
-        self._round_trips: deque[float] = deque(maxlen=_ROUND_TRIPS)
+        self._round_trips: deque[float] = deque(maxlen=round_trips)
         self._busy: deque[tuple[float, float]] = deque()
-        self._cycles: dict[int, float] = {}
 
     def opened(self) -> None:
-        """Count that the port was opened; every time but the first is a reconnect."""
-        self.reconnects = self._opened
+        """Count an opening or a connection; every one but the first is a reconnect."""
         self._opened += 1
 
     def transaction(self, now: float, seconds: float, error: LinkError | None) -> None:
@@ -96,35 +103,78 @@ class Recorder:
         """Record the round trip of a transaction that was answered."""
         self._round_trips.append(seconds)
 
-    def retry(self) -> None:
-        """Count a request that is sent again."""
-        self.retries += 1
-
-    def cycle(self, unit: int, seconds: float) -> None:
-        """Record how long one round of polling took for a unit."""
-        self._cycles[unit] = seconds
-
-    def forget_cycle(self, unit: int) -> None:
-        """Take a unit that is no longer polled out."""
-        self._cycles.pop(unit, None)
-
-    def statistics(self) -> Statistics:
+    def statistics(self, cycle_time: float) -> Statistics:
         """Return the present figures."""
         start = time.monotonic() - _WINDOW
-        busy = sum(seconds for end, seconds in tuple(self._busy) if end >= start)
+        busy = sum(seconds for end, seconds in self._busy.copy() if end >= start)
         trips = sorted(self._round_trips.copy())
-        cycles = tuple(self._cycles.copy().values())
         return Statistics(
             utilisation=min(1.0, busy / _WINDOW),
-            cycle_time=max(cycles, default=math.nan),
+            cycle_time=cycle_time,
             transactions=self.transactions,
             timeouts=self.timeouts,
             damaged=self.damaged,
             refused=self.refused,
             retries=self.retries,
-            reconnects=self.reconnects,
-            round_trip_min=trips[0] if trips else math.nan,
+            reconnects=max(0, self._opened - 1),
+            round_trip_min=_at(trips, 0.0),
             round_trip_mean=sum(trips) / len(trips) if trips else math.nan,
-            round_trip_p99=trips[math.ceil(0.99 * len(trips)) - 1] if trips else math.nan,
-            round_trip_max=trips[-1] if trips else math.nan,
+            round_trip_median=_at(trips, 0.5),
+            round_trip_p99=_at(trips, 0.99),
+            round_trip_max=_at(trips, 1.0),
         )
+
+
+def _at(trips: list[float], share: float) -> float:
+    """Return the least of some sorted times that this share of them does not exceed."""
+    return trips[max(1, math.ceil(share * len(trips))) - 1] if trips else math.nan
+
+
+class Recorder:
+    """Takes the measurements of a line; written by the bus worker alone, read by anyone."""
+
+    def __init__(self) -> None:
+        self._line = Tally()
+        self._units: dict[int, Tally] = {}
+
+    def opened(self) -> None:
+        """Count that the port was opened; every time but the first is a reconnect."""
+        self._line.opened()
+
+    def connected(self, unit: int) -> None:
+        """Count that a unit was connected to; every time but the first is a reconnect."""
+        self._of(unit).opened()
+
+    def transaction(self, unit: int, now: float, seconds: float, error: LinkError | None) -> None:
+        """Count a transaction that kept the line busy until ``now``, and how it ended."""
+        self._line.transaction(now, seconds, error)
+        self._of(unit).transaction(now, seconds, error)
+
+    def retry(self, unit: int) -> None:
+        """Count a request to a unit that is sent again."""
+        self._line.retries += 1
+        self._of(unit).retries += 1
+
+    def cycle(self, unit: int, seconds: float) -> None:
+        """Record how long one round of polling took for a unit."""
+        self._of(unit).cycle_time = seconds
+
+    def forget_cycle(self, unit: int) -> None:
+        """Take note of a unit that is no longer polled."""
+        self._of(unit).cycle_time = math.nan
+
+    def statistics(self, unit: int | None = None) -> Statistics:
+        """Return the present figures of the line, or of one unit on it."""
+        if unit is not None:
+            # who only asks leaves no trace: this is called by any thread
+            tally = self._units.get(unit) or Tally()
+            return tally.statistics(tally.cycle_time)
+        cycles = (tally.cycle_time for tally in self._units.copy().values())
+        known = (cycle for cycle in cycles if not math.isnan(cycle))
+        return self._line.statistics(max(known, default=math.nan))
+
+    def _of(self, unit: int) -> Tally:
+        tally = self._units.get(unit)
+        if tally is None:
+            tally = self._units[unit] = Tally(_ROUND_TRIPS_OF_A_UNIT)
+        return tally

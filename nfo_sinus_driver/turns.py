@@ -48,10 +48,12 @@ _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 
 #: A poll of a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
+#: What is said to a unit that has been silent for long.
+_MISSING: Literal['missing'] = 'missing'
 _SLOT: Literal['slot'] = 'slot'
 #: What makes a motor stop, ahead of what only looks whether one does.
 _COMMAND: Literal['command'] = 'command'
-_Rank = Priority | Literal['slot', 'command', 'retry']
+_Rank = Priority | Literal['slot', 'command', 'retry', 'missing']
 _STOPS = (_COMMAND, Priority.STOP)
 _SHARES: dict[_Rank, float] = {
     _RETRY: RETRY_SHARE,
@@ -80,15 +82,25 @@ class Turns:
 
     A unit that does not answer keeps the line for a time-out with every poll. All of these together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
-    not answer is repeated at once, and after each of them somebody else has a turn, too.
+    not answer is repeated at once, and after each of them somebody else has a turn, too: the most
+    urgent, whatever the others are owed.
+
+    Those that have been silent for long are missing. Their polls, and stops that were told to them
+    in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
+    :param is_missing: tells whether it has been silent for long.
     """
 
-    def __init__(self, is_silent: Callable[[int], bool] = lambda unit: False) -> None:
+    def __init__(
+        self,
+        is_silent: Callable[[int], bool] = lambda unit: False,
+        is_missing: Callable[[int], bool] = lambda unit: False,
+    ) -> None:
         self._is_silent = is_silent
+        self._is_missing = is_missing
         self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY)
+            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
@@ -97,14 +109,25 @@ class Turns:
         #: Who was told to stop just now, and who did not answer that.
         self._told_to_stop: int | None = None
         self._unheard: int | None = None
+        #: Units that were told to stop since they were last known to answer, and said nothing.
+        self._told_in_vain: set[int] = set()
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
         self._queues[self._rank(entry)].append(entry)
 
-    def take(self) -> Slot | Waiting | None:
-        """Take out what goes next; ``None`` if nothing waits."""
-        for rank in self._order():
+    @property
+    def missing_wait(self) -> bool:
+        """Something waits that is for a missing unit."""
+        return bool(self._queues[_MISSING])
+
+    def take(self, *, missing: bool = True) -> Slot | Waiting | None:
+        """
+        Take out what goes next; ``None`` if nothing waits.
+
+        :param missing: what is for a missing unit may go.
+        """
+        for rank in self._order(missing):
             for entry in self._queues[rank]:
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
                 if unit is None or unit != self._unheard:
@@ -116,13 +139,15 @@ class Turns:
             return None
         # nobody else waits
         self._unheard = None
-        return self.take()
+        return self.take(missing=missing)
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
         told = self._told_to_stop
         self._unheard = told if told is not None and self._is_silent(told) else None
+        if self._unheard is not None:
+            self._told_in_vain.add(self._unheard)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -148,16 +173,20 @@ class Turns:
             queue.clear()
         return entries
 
-    def _order(self) -> Iterator[_Rank]:
+    def _order(self, missing: bool) -> Iterator[_Rank]:
         yield from _STOPS
         if not self._slot_went:
             yield _SLOT
         background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        # one turn after a stop that nobody has heard: it is for the most urgent of the others
+        between_stops = self._unheard is not None
         for priority in background:
-            if self._owed[priority] > 0:
+            if self._owed[priority] > 0 and not between_stops:
                 yield priority
         yield from (Priority.SETPOINT, Priority.SERVICE)
-        if self._owed[_RETRY] > 0:
+        if missing:
+            yield _MISSING
+        if self._owed[_RETRY] > 0 and not between_stops:
             yield _RETRY
         yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background
@@ -166,7 +195,15 @@ class Turns:
         if isinstance(entry, Slot):
             return _SLOT
         transfer = entry.transfer
-        if transfer.priority is Priority.POLL and self._is_silent(transfer.unit):
-            return _RETRY
+        if not self._is_silent(transfer.unit):
+            self._told_in_vain.discard(transfer.unit)
+        elif transfer.priority is Priority.POLL:
+            return _MISSING if self._is_missing(transfer.unit) else _RETRY
+        elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
+            return _MISSING
         commands = transfer.priority is Priority.STOP and transfer.words is not None
         return _COMMAND if commands else transfer.priority
+
+    def _is_repeated(self, transfer: Transfer) -> bool:
+        """Tell whether this is a stop for a unit that did not answer the last one."""
+        return transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain

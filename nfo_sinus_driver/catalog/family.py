@@ -57,6 +57,7 @@ class Family(Mapping[str, Parameter]):
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
     :ivar status_word: what its status word means.
     :ivar modes: the codes of who controls it.
+    :ivar writes_and_reads: it has Modbus function 23.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Family(Mapping[str, Parameter]):
     error_logs: Mapping[str, ErrorLogArea]
     status_word: StatusWord
     modes: Collection[int]
+    writes_and_reads: bool
 
     def __getitem__(self, key: str) -> Parameter:
         return self.parameters[key]
@@ -140,6 +142,7 @@ def load_family(name: str) -> Family:
         error_logs={row.protocol: row for row in logs},
         status_word=words.STATUS_WORD,
         modes=frozenset(words.Mode),
+        writes_and_reads=words.WRITES_AND_READS,
     )
 
 

@@ -165,6 +165,13 @@ def _parser() -> argparse.ArgumentParser:
         action='store_true',
         help='try every baud rate and parity; takes long',
     )
+    scan.add_argument(
+        '--params',
+        metavar='FILE',
+        help='write a parameter file for the driver, with all that was found; - is the standard '
+        'output',
+    )
+    scan.add_argument('--force', action='store_true', help='let --params replace a file')
     verb('info', 'show who the drive is and how it is doing', json=True)
     list_ = verb('list', 'show all settings of the drive', json=True)
     list_.add_argument(
@@ -200,7 +207,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_yes(errors)
     errors.add_argument('--erase', action='store_true', help='erase it, after it was shown')
-    monitor = verb('monitor', 'show what the drive does, until Ctrl-C', json=True)
+    monitor = verb(
+        'monitor', 'show what the drive does, until Ctrl-C; then how the line was doing', json=True
+    )
     monitor.add_argument(
         '--period',
         type=_seconds,
@@ -209,6 +218,13 @@ def _parser() -> argparse.ArgumentParser:
         help='from one line to the next (default: 0.5)',
     )
     monitor.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+    monitor.add_argument(
+        '--addresses',
+        type=_addresses,
+        default=(),
+        metavar='LIST',
+        help='several drives of the line, such as 1-10,20 (default: that of --address)',
+    )
     verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
     _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))
     stop = verb('stop', 'stop a motor that the bus runs, and give control back', json=True)

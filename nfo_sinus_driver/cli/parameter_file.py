@@ -42,7 +42,7 @@ from nfo_sinus_driver.cli.trouble import listed
 HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')
 
 _PARAMETERS = 'ros__parameters'
-_STANDARD = '-'
+STANDARD = '-'
 #: What ROS itself gives to nodes, below names with dots.
 _ROS_OWN = ('qos_overrides.',)
 _TITLE = '# Parameters of an NFO Sinus drive; also a ROS parameter file.'
@@ -87,7 +87,7 @@ def write_file(name: str, text: str) -> None:
 
     :raises Trouble: it cannot be written.
     """
-    if name == _STANDARD:
+    if name == STANDARD:
         sys.stdout.write(text)
         sys.stdout.flush()
         return
@@ -111,12 +111,12 @@ def read_file(name: str) -> ParameterFile:
     :raises Trouble: it cannot be read, or is none.
     """
     try:
-        text = sys.stdin.read() if name == _STANDARD else Path(name).read_text(encoding='utf-8')
+        text = sys.stdin.read() if name == STANDARD else Path(name).read_text(encoding='utf-8')
     except OSError as error:
         raise Trouble(f'{name} cannot be read: {error.strerror}') from error
     except UnicodeDecodeError as error:
         raise Trouble(f'{name} is no text in UTF-8: is it a parameter file?') from error
-    return parse_file(text, 'the standard input' if name == _STANDARD else name)
+    return parse_file(text, 'the standard input' if name == STANDARD else name)
 
 
 def parse_file(text: str, name: str) -> ParameterFile:

@@ -19,18 +19,25 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from collections.abc import Iterator
+from collections.abc import Mapping
 from collections.abc import Sequence
 import copy
 import json
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.cli.driver_params import driver_params
+from nfo_sinus_driver.cli.driver_params import require_new
+from nfo_sinus_driver.cli.parameter_file import STANDARD
+from nfo_sinus_driver.cli.parameter_file import write_file
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -58,8 +65,13 @@ _ADVICE = (
 def scan(options: argparse.Namespace) -> int:
     """Find out who answers on the line."""
     assert set(_LIKELIEST) == set(BAUD_RATES)
+    if options.params:
+        require_new(options.params, force=options.force)
+    # a parameter file on the standard output is alone there
+    show = remark if options.params == STANDARD else put
     lines = _lines(options)
     found: dict[int, dict[str, str]] = {}
+    lines_of: dict[int, tuple[int, str]] = {}
     with progress('scanning', len(lines) * len(options.addresses)) as step:
         for baud_rate, char_format in lines:
             line = copy.copy(options)
@@ -70,16 +82,47 @@ def scan(options: argparse.Namespace) -> int:
             for address, facts in _who_answers(line, asked, step):
                 facts['line'] = f'{baud_rate} {char_format}' if baud_rate else 'gateway'
                 if not found and not options.json:
-                    put(_row({name: name for name, _ in _COLUMNS}))
+                    show(_row({name: name for name, _ in _COLUMNS}))
                 found[address] = facts
+                lines_of[address] = line.baud_rate, line.char_format
                 if not options.json:
-                    put(_row({'address': f'{address:>7}', **facts}))
+                    show(_row({'address': f'{address:>7}', **facts}))
     if options.json:
         drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
-        put(json.dumps(drives, ensure_ascii=False, indent=2))
+        show(json.dumps(drives, ensure_ascii=False, indent=2))
     if not found:
         raise Trouble(_ADVICE)
+    if options.params:
+        _write_params(options, found, lines_of)
     return 0
+
+
+def _write_params(
+    options: argparse.Namespace,
+    found: Mapping[int, Mapping[str, str]],
+    lines: Mapping[int, tuple[int, str]],
+) -> None:
+    """
+    Write what the driver needs to start with the drives that were found.
+
+    :raises Trouble: they do not speak alike, so that no line could have them all.
+    """
+    if len(set(lines.values())) > 1:
+        told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
+        raise Trouble(
+            listed(
+                'no parameter file was written: one line has one baud rate and format, and the '
+                'drives have several; set them alike (nfo-sinus set serial.si_baud=...)',
+                told,
+            )
+        )
+    baud_rate, char_format = next(iter(lines.values()))
+    write_file(options.params, driver_params(options, baud_rate, char_format, found))
+    if options.params != STANDARD:
+        remark(
+            f'saved in {options.params}; start the driver with it: ros2 run nfo_sinus_driver '
+            f'driver --ros-args --params-file {options.params}'
+        )
 
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
@@ -122,7 +165,12 @@ def _ask(drive: Remote) -> dict[str, str] | None:
         if isinstance(cause, PortError):
             raise
         if isinstance(cause, Refused):
-            return {'product': f'no {drive.model.name}?', 'firmware': '', 'serial number': ''}
+            return {
+                'product': f'no {drive.model.name}?',
+                'firmware': '',
+                'serial number': '',
+                'model': AUTO,
+            }
         if not isinstance(cause, NoAnswer):
             remark(str(error))
         return None
@@ -130,6 +178,7 @@ def _ask(drive: Remote) -> dict[str, str] | None:
         'product': identity.model or drive.model.name,
         'firmware': identity.versions,
         'serial number': identity.serial,
+        'model': drive.model.name,
     }
 
 

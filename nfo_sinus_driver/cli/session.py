@@ -22,6 +22,8 @@ from collections.abc import Collection
 from collections.abc import Coroutine
 from collections.abc import Mapping
 from concurrent.futures import Future
+import math
+import time
 from typing import Any
 from typing import TypeVar
 
@@ -59,6 +61,7 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.statistics import Statistics
 
 _T = TypeVar('_T')
 
@@ -190,6 +193,8 @@ class Session:
     def __init__(self, options: argparse.Namespace, *, writes: bool = False) -> None:
         self._options = options
         self._writes = writes
+        #: When the last round of reading each drive was over, s.
+        self._polled_at: dict[int, float] = {}
         try:
             line = line_settings(
                 options.protocol,
@@ -214,6 +219,22 @@ class Session:
         if address is None:
             address = self._options.address
         return Remote(self._bus, self._settings(address))
+
+    def polled(self, address: int) -> None:
+        """Take note that one round of reading a drive is over."""
+        now = time.monotonic()
+        before = self._polled_at.get(address, math.nan)
+        self._polled_at[address] = now
+        self._bus.call(lambda: self._bus.recorder.cycle(address, now - before))
+
+    def statistics(self, address: int | None = None) -> Statistics:
+        """Return the counters and times of the line, or of one drive on it."""
+
+        async def ask() -> Statistics:
+            # on the bus, behind what was noted before
+            return self._bus.statistics(address)
+
+        return self._bus.run(ask()).result()
 
     def command(self, listener: Listener, **settings: Any) -> Drive:
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The verb ``monitor``: what the drive does, again and again; it only reads."""
+"""The verb ``monitor``: what the drives do, again and again; it only reads."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.statistics_table import as_facts
+from nfo_sinus_driver.cli.statistics_table import statistics_table
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import PortError
@@ -49,16 +51,20 @@ _CLEAR_LINE = '\r\x1b[K'
 
 
 def monitor(options: argparse.Namespace) -> int:
-    """Show what the drive does until somebody ends it."""
-    live = sys.stdout.isatty() and not options.json
+    """Show what the drives do until somebody ends it, and then how the line was doing."""
+    addresses = options.addresses or (options.address,)
+    live = sys.stdout.isatty() and not options.json and len(addresses) == 1
     answered = False
     with Session(options) as session:
-        drive = session.drive()
-        drive.identify(thoroughly=False)
+        drives = [session.drive(address) for address in addresses]
+        if len(drives) == 1:
+            # with others beside it the missing one has a line that says so
+            drives[0].identify(thoroughly=False)
         try:
             for turn in itertools.count(1):
                 started = time.monotonic()
-                answered = _show(drive, live=live, as_json=options.json)
+                shown = [_show(drive, session, options, live=live) for drive in drives]
+                answered = all(shown)
                 if turn == options.count:
                     break
                 time.sleep(max(0.0, started + options.period - time.monotonic()))
@@ -68,13 +74,20 @@ def monitor(options: argparse.Namespace) -> int:
         finally:
             if live:
                 print()
+        if not options.json:
+            for line in statistics_table(session, addresses):
+                print(line, file=sys.stderr)
     return int(not answered)
 
 
-def _show(drive: Remote, *, live: bool, as_json: bool) -> bool:
+def _show(
+    drive: Remote, session: Session, options: argparse.Namespace, *, live: bool
+) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
+        if drive.inverter.identity is None:
+            drive.identify(thoroughly=False)
         seen, values = drive.do(lambda: _measure(drive))
     except DriveError as error:
         if isinstance(error.__cause__, PortError):
@@ -83,13 +96,17 @@ def _show(drive: Remote, *, live: bool, as_json: bool) -> bool:
         text = str(error)
         answered = False
     else:
+        session.polled(drive.address)
         facts = _facts(drive, seen, values)
         text = _line(drive, values)
         answered = True
-    if as_json:
-        put(json.dumps({'time': now.isoformat(), **facts}, ensure_ascii=False))
+    if options.json:
+        told = as_facts(session.statistics(drive.address))
+        whole = {'time': now.isoformat(), 'address': drive.address, **facts, 'statistics': told}
+        put(json.dumps(whole, ensure_ascii=False))
         return answered
-    text = f'{now:%H:%M:%S}  {text}'
+    who = f'{drive.address:>3}  ' if options.addresses else ''
+    text = f'{now:%H:%M:%S}  {who}{text}'
     if live:
         width = shutil.get_terminal_size().columns - 1
         print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A stop for every drive on a Classic line at once [M0 §6.1.5]."""
+"""What is said to every drive on a Classic line at once [M0 §6.1.4]; a stop for all of them."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
 
 #: The address that every drive listens to and none answers [M0 §6.1.2].
-_EVERYBODY = 95
+EVERYBODY = 95
 
 
 def can_broadcast(bus: Bus) -> bool:
-    """Tell whether the protocol of a line has a broadcast that stops."""
+    """Tell whether the protocol of a line has a broadcast that every drive obeys."""
     return Protocol(bus.space) is Protocol.CLASSIC
 
 
@@ -42,5 +42,5 @@ async def broadcast_stop(bus: Bus) -> None:
     """
     place = load_model('sinus_g2')['fieldbus.mode'].place(Protocol.CLASSIC)
     await bus.write(
-        _EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
+        EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
     )

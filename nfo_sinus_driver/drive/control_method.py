@@ -53,10 +53,11 @@ class ControlMethod(Protocol):
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Put the drive under bus control with no run command standing.
 
+        :param reached: for a drive that refuses what comes before its status says who has control.
         :raises DriveError: it lets nobody.
         """
 
@@ -107,5 +108,6 @@ class ControlMethod(Protocol):
 
         :param code: the inverter status code that is shown.
         :returns: what more the drive said of it; ``''`` if nothing.
+        :raises DriveError: it cannot be, without taking control from keypad or terminals.
         :raises LinkError: the drive does not answer; what it did is not known.
         """

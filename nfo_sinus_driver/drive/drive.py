@@ -27,6 +27,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import load_model
@@ -90,6 +91,7 @@ class Drive:
             self._registers,
             self._inverter,
             lambda reason: self._motion.refused(reason) if self._motion else None,
+            lambda reply: self._watch.told(reply),
         )
         self._motion: Motion | None = None
         if settings.control_method != 'monitor':
@@ -159,6 +161,11 @@ class Drive:
         return self._setpoint.armed
 
     @property
+    def setpoint(self) -> Setpoint:
+        """What it is to follow, for coroutines on the bus."""
+        return self._setpoint
+
+    @property
     def last_error(self) -> LogEntry | None:
         """The newest entry of the error log that was read in the background."""
         return self._log_watch.newest
@@ -182,6 +189,11 @@ class Drive:
     def stop_overdue(self) -> bool:
         """It has had time to confirm it, and no fault keeps it from turning the motor."""
         return self._motion is not None and self._motion.taking_back.overdue
+
+    @property
+    def statistics(self) -> Statistics:
+        """The counters and times of what is said to this drive."""
+        return self._bus.statistics(self._unit)
 
     def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[str]:
         """
@@ -379,6 +391,7 @@ class Drive:
             await self._own_timeout.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
+        self._setpoint.connected()
         inverter.connected = inverter.answering = True
         name = '' if identity.model else inverter.model.name
         if identity.model and inverter.model.name == 'sinus_optimal':

@@ -27,6 +27,7 @@ import contextlib
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive.advice import CONTROLLED_ELSEWHERE
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.errors import DriveError
@@ -76,7 +77,7 @@ class DriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & Status.CTRL_FROM_NET)
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Request control with bit 0 low, so that a run command is an edge later [C35].
 
@@ -172,11 +173,16 @@ class DriveControl:
         A serial fault by MODE = Stop alone first, else by reading SioErr [C99]. Over Classic
         nothing can be written while any fault is active, so that reading has to do [M0 §6.1.5]; the
         run bits that stand then lead nowhere without a new edge [M0 table 16].
+
+        :raises DriveError: a serial fault is left, for keypad or terminals keep the control that
+            MODE = Stop would take from them.
         """
-        registers, why = self._registers, ''
+        registers, why, elsewhere = self._registers, '', False
         if Meaning.SERIAL_FAILURE in registers.model.status_code(code).meanings:
-            with contextlib.suppress(Refused):
-                await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
+            elsewhere = await registers.read('fieldbus.mode', Priority.SERVICE) == Mode.EXT
+            if not elsewhere:
+                with contextlib.suppress(Refused):
+                    await registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)
             why = await registers.acknowledge_serial_fault()
         try:
             for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
@@ -190,6 +196,8 @@ class DriveControl:
                     )
             else:
                 await registers.acknowledge('fieldbus.inv_st_with_ack', Priority.SERVICE)
+        if elsewhere and await registers.read('fieldbus.inv_st', Priority.SERVICE) == code:
+            raise DriveError(CONTROLLED_ELSEWHERE)
         return why
 
     async def _change(
@@ -223,7 +231,7 @@ class OptimalDriveControl:
         word = int(await self._registers.read_number(_STATUS, priority))
         return bool(word & words_optimal.Status.CONTROL_FROM_BUS)
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Take control with neither Enable nor Switch on.
 

@@ -156,16 +156,22 @@ class Errands:
         """
         Write SCMD; once, for nobody knows what has happened before a second one.
 
-        It waits for its turn with the stops: one that comes later must not overtake it. Only a
-        drive that is busy is told again for a while, for it has done nothing.
+        It waits for its turn with the stops, so that one which comes later does not overtake it,
+        and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
+        told again for a while, for it has done nothing.
 
         :raises DriveError: it was stopped meanwhile.
         """
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
-            loan.require_wanted()
             try:
-                await self._registers.write('fieldbus.scmd', command, Priority.STOP, once=True)
+                await self._registers.write(
+                    'fieldbus.scmd',
+                    command,
+                    Priority.STOP,
+                    once=True,
+                    require_wanted=loan.require_wanted,
+                )
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
@@ -201,7 +207,7 @@ class Errands:
             )
         loan.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
-        await motion.method.take_control()
+        await motion.take_control(control_mode)
         deadline = time.monotonic() + withdrawal.PATIENCE
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:

@@ -32,14 +32,20 @@ from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NO_CODE
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
+#: The parameter that a status begins with.
+STATUS_WORD = 'fieldbus.drive_status'
 #: Firmware from which on [M0] describes the Classic protocol [C3].
 _FIRST_OF_V2_03 = 4.28
 #: As long as RunDly of the G2 can be, s.
@@ -110,9 +116,8 @@ class Inverter:
         self.fault_is_fresh = False
         #: Measured values that were told to be impossible.
         self._told_impossible: set[str] = set()
-        #: Hz and rpm, as last polled.
-        self.frequency = math.nan
-        self.speed = math.nan
+        #: What was polled last, by catalog key.
+        self.polled: dict[str, Measured] = {}
         #: It changes its parameters itself just now.
         self.tuning = False
         self.control_mode = ''
@@ -130,24 +135,37 @@ class Inverter:
         *,
         once: bool = False,
         alarming: Callable[[InverterStatus], bool] = lambda _: False,
+        told: Reply | None = None,
+        code_for: float = 0.0,
     ) -> InverterStatus:
         """
         Read the status, without acknowledging anything.
 
         :param once: do not repeat a request when nobody answers.
+        :param told: the status word, where the drive has just told it with something else.
+        :param code_for: how long an inverter status counts, s, that was read with the very status
+            word that stands, if nothing was on its way then (:attr:`InverterStatus.plain`).
         :param alarming: tells of half a status whether it may have to stop the motor; if it does
             and has not before, the rest is read at the head of the bus.
         :raises LinkError: the drive does not answer.
         """
-        if not self.has('fieldbus.drive_status'):
+        if not self.has(STATUS_WORD):
             return await self._look_at_code(priority, once)
         before = self.seen
-        word, at = await self._read_word(priority, once)
+        if told is None:
+            word, at = await self._read_word(priority, once)
+        else:
+            word, at = self.status_word(told.words), told.arrived
+        held = self.seen
+        if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
+            seen = replace(held, at=at)
+            if not alarming(seen):
+                return self._saw(seen)
         seen = InverterStatus(at, word, NO_CODE, self.model)
         alarmed = before is not None and word != before.word and alarming(seen)
         priority = Priority.STOP if alarmed else priority
-        code = int(await self._registers.read_number('fieldbus.inv_st', priority, once=once))
-        seen = replace(seen, code=code)
+        code, code_at = await self._read_code(priority, once)
+        seen = replace(seen, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
         # a fault or an alarm came or went between the two; one that stays so is treated as the
@@ -166,16 +184,22 @@ class Inverter:
         return self._saw(seen)
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        word, at = await self._registers.read_at('fieldbus.drive_status', priority, once=once)
-        assert isinstance(word, int)
-        # the upper half is described nowhere [C24]
-        return word & 0xFFFF, at
+        reply = await self._registers.read_reply(STATUS_WORD, priority, once=once)
+        return self.status_word(reply.words), reply.arrived
+
+    def status_word(self, words: Words) -> int:
+        """Return what counts of a status word: the upper half is described nowhere [C24]."""
+        return int(self._registers.number(STATUS_WORD, words)) & 0xFFFF
+
+    async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
+        code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
+        assert isinstance(code, int)
+        return code, at
 
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
-        code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
-        assert isinstance(code, int)
-        seen = InverterStatus(at, None, code, self.model)
+        code, at = await self._read_code(priority, once)
+        seen = InverterStatus(at, None, code, self.model, code_at=at)
         if seen.means(Meaning.ANONYMOUS):
             mode = await self._registers.read_number('fieldbus.mode', priority, once=once)
             seen = replace(seen, by_mode=mode == Mode.BUS)
@@ -224,6 +248,20 @@ class Inverter:
                 'check motor and scaling in the drive, and that no other master is on the line',
             )
         return math.nan
+
+    def last_polled(self, key: str) -> Measured:
+        """Return what a poll has measured last."""
+        return self.polled.get(key, NOT_MEASURED)
+
+    @property
+    def frequency(self) -> float:
+        """Hz, as last polled."""
+        return self.last_polled('status.frq_act').value
+
+    @property
+    def speed(self) -> float:
+        """The speed as last polled, rpm."""
+        return self.last_polled('status.spd_act').value
 
     @property
     def can_time_out(self) -> bool:

@@ -22,6 +22,7 @@ import contextlib
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.drive.advice import CONTROLLED_ELSEWHERE
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.errors import DriveError
@@ -61,19 +62,27 @@ class ModeScmd:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
         return await self._registers.read('fieldbus.mode', priority) == Mode.BUS
 
-    async def take_control(self) -> None:
+    async def take_control(self, reached: Reached) -> None:
         """
         Put the drive under bus control with no run command standing.
+
+        No manual says that a drive forgets the run command of an earlier session when control is
+        taken, so the stop is the very next frame.
 
         :raises DriveError: it is tuning.
         """
         mode = await self._registers.read('fieldbus.mode', Priority.SERVICE)
         if mode == Mode.INHIBIT:
             raise DriveError('the drive lets nobody take control now (MODE is Inhibit: tuning?)')
-        if mode == Mode.BUS:
-            await self._registers.write(self._command, Scmd.STOP, Priority.SERVICE)
-        else:
+        if mode != Mode.BUS:
             await self._registers.write('fieldbus.mode', Mode.BUS, Priority.SERVICE)
+            try:
+                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)
+                return
+            except Refused:
+                # too soon for it, as it seems
+                await reached(lambda seen: seen.from_bus)
+        await self._registers.write(self._command, Scmd.STOP, Priority.STOP)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """
@@ -157,19 +166,30 @@ class ModeScmd:
 
         Any other by reading the status that acknowledges, once nothing is left that could turn the
         motor. If the drive lets go of nothing, what releases it soonest is the very next frame.
+
+        :raises DriveError: a serial fault is left, for keypad or terminals keep the control that
+            MODE = Stop would take from them.
         """
         listed = self._registers.model.status_code(code)
         if Meaning.SERIAL_FAILURE not in listed.meanings:
             await self._acknowledge_by_reading(control_mode)
             return ''
-        await self._control_removed()
+        elsewhere = await self._controlled_elsewhere()
+        if not elsewhere:
+            await self._control_removed()
         why = ''
         if await self._shows(code):
             # older firmware obeys no MODE that is for it alone while the fault is active [C9]
             why = await self._registers.acknowledge_serial_fault()
         if await self._shows(code):
             await self._acknowledge_by_reading(control_mode)
+            if elsewhere and await self._shows(code):
+                raise DriveError(CONTROLLED_ELSEWHERE)
         return why
+
+    async def _controlled_elsewhere(self) -> bool:
+        """Tell whether keypad or terminals have control, which MODE = Stop would take from them."""
+        return await self._registers.read('fieldbus.mode', _ACK) == Mode.EXT
 
     async def _shows(self, code: int) -> bool:
         return await self._registers.read('fieldbus.inv_st', _ACK) == code
@@ -200,13 +220,6 @@ class ModeSmode(ModeScmd):
     _command = 'fieldbus.smode'
     _soonest = ('fieldbus.smode', Smode.STOP)
 
-    async def take_control(self) -> None:
-        """Put the drive under bus control with no run command standing."""
-        if await self.in_control(Priority.SERVICE):
-            await self._registers.write(self._command, Smode.STOP, Priority.SERVICE)
-        else:
-            await self._registers.write('fieldbus.mode', OptimalMode.BUS, Priority.SERVICE)
-
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """
         Write set-point 0 for every control mode, and read it back.
@@ -231,4 +244,8 @@ class ModeSmode(ModeScmd):
 
     async def _control_removed(self) -> bool:
         """Leave control where it is: Manual would hand it to the keypad."""
+        return False
+
+    async def _controlled_elsewhere(self) -> bool:
+        """Tell that it does not matter: MODE is not written here."""
         return False

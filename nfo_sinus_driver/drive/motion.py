@@ -74,8 +74,8 @@ class Motion:
         self._refusal: tuple[float, str] | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
-        #: A quick stop is on its way, which the drive has not confirmed yet.
-        self._releasing = False
+        #: How many quick stops are on their way, which the drive has not confirmed yet.
+        self._releasing = 0
 
     def _note_change(self) -> None:
         self._changed_at = time.monotonic()
@@ -166,6 +166,20 @@ class Motion:
             return f'stopping ({self._inverter.describe()})'
         return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
 
+    async def take_control(self, control_mode: str) -> None:
+        """
+        Put the drive under bus control, with no run command standing.
+
+        The set-point of an earlier session is removed before, where the drive lets us: one that has
+        kept its run command, too, would turn the motor at once.
+
+        :raises DriveError: it lets nobody take control.
+        """
+        if not self._inverter.settings_need_control:
+            with contextlib.suppress(DriveError, Refused):
+                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await self._method.take_control(self._await_step)
+
     async def take_back(self) -> None:
         """
         Take back what was commanded on loan; control is kept.
@@ -187,7 +201,7 @@ class Motion:
             return f'{await self.stop()} (this drive has no quick stop)'
         ours = self.concerned
         self.disarm()
-        self._releasing = True
+        self._releasing += 1
         try:
             ours = ours or await self._method.in_control(Priority.STOP)
             ours = ours or (await self._inverter.look(Priority.STOP)).tuning
@@ -209,7 +223,7 @@ class Motion:
                 'trying a stop'
             ) from error
         finally:
-            self._releasing = False
+            self._releasing -= 1
         if not ours:
             return self._no_control(self._inverter.seen)
         self._withdrawal.begin()
@@ -270,8 +284,10 @@ class Motion:
 
         :raises DriveError: the drive does not confirm that it stops.
         """
-        # a run command may be on its way, whoever has control at this moment
-        ours = self.ours or self.stopping
+        # a run command may be on its way, whoever has control at this moment; and where the bus has
+        # it, one may stand that an acknowledgement has not come to remove yet
+        seen = self._inverter.seen
+        ours = self.ours or self.stopping or (seen is not None and seen.from_bus)
         stopped = await self.stop() if ours else ''
         if not await self._method.in_control(Priority.SERVICE):
             return stopped or 'control is not ours'
@@ -405,11 +421,11 @@ class Motion:
                 f'the drive is in control mode {control_mode}, expected is {expected}: '
                 'set control.mode in the drive or expected_control_mode in the driver'
             )
-        await self._method.take_control()
-        await self._await_status(lambda now: now.from_bus, Priority.SERVICE, withdrawal.PATIENCE)
-        await prepare()
+        await self.take_control(control_mode)
+        await self._await_step(lambda now: now.from_bus)
         if inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await prepare()
         await self._method.run(self._await_start)
         await self._await_start(lambda now: now.runs)
         self._note_change()
@@ -443,6 +459,9 @@ class Motion:
                     else f'the drive does not start: {self._inverter.describe()}'
                 )
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
+
+    async def _await_step(self, wanted: Callable[[InverterStatus], bool]) -> None:
+        await self._await_status(wanted, Priority.SERVICE, withdrawal.PATIENCE)
 
     async def _await_status(
         self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float

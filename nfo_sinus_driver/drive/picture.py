@@ -22,7 +22,9 @@ import time
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
 
 
@@ -30,8 +32,8 @@ def take_picture(
     inverter: Inverter,
     setpoint: Setpoint,
     seen: InverterStatus | None,
-    frequency: float = NAN,
-    speed: float = NAN,
+    frequency: Measured = NOT_MEASURED,
+    speed: Measured = NOT_MEASURED,
     actual: float = NAN,
 ) -> Snapshot:
     """
@@ -62,7 +64,9 @@ def take_picture(
         remedy=code.remedy,
         kind=seen.kind,
         requires_ack=code.requires_ack,
-        frequency=frequency,
-        speed=speed,
+        frequency=frequency.value,
+        frequency_at=frequency.at,
+        speed=speed.value,
+        speed_at=speed.at,
         actual=actual,
     )

@@ -81,6 +81,14 @@ class Reference:
         """Return the set-point that words mean to the drive, after its own rounding."""
         return self._registers.number(self._key, words)
 
+    async def read(self, priority: Priority) -> Words:
+        """
+        Read back what stands there; a request that nobody answers is not repeated.
+
+        :raises LinkError: the drive does not answer, or refuses.
+        """
+        return await self._registers.read_words(self._key, priority, once=True)
+
     async def write_zero(self, priority: Priority, *, once: bool = True) -> None:
         """
         Write set-point 0.

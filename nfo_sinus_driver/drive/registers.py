@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus
@@ -76,6 +77,11 @@ class Registers:
         """Return where a parameter stands."""
         place = self.model[key].place(self.protocol)
         return Address(place.numbers, place.words)
+
+    @property
+    def writes_and_reads(self) -> bool:
+        """The drive has a function that writes one parameter and reads another, on this line."""
+        return self.protocol is Protocol.MODBUS and self.model.writes_and_reads
 
     def words(self, key: str, value: Value) -> Words:
         """
@@ -141,12 +147,12 @@ class Registers:
         self, key: str, priority: Priority, *, once: bool = False
     ) -> tuple[Value, float]:
         """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        reply = await self._read(key, priority, once)
+        reply = await self.read_reply(key, priority, once=once)
         return self.value(key, reply.words), reply.arrived
 
     async def read_words(self, key: str, priority: Priority, *, once: bool = False) -> Words:
         """Read a parameter as it stands in the drive."""
-        return (await self._read(key, priority, once)).words
+        return (await self.read_reply(key, priority, once=once)).words
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
@@ -191,15 +197,23 @@ class Registers:
         return ', '.join(flag_names(flags & ~_BLOCKED))
 
     async def write(
-        self, key: str, value: Value, priority: Priority, *, once: bool = False
+        self,
+        key: str,
+        value: Value,
+        priority: Priority,
+        *,
+        once: bool = False,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         """
         Write a parameter.
 
         :param once: do not repeat the request when nobody answers.
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        await self.write_words(key, self.words(key, value), priority, once=once)
+        words = self.words(key, value)
+        await self._ask(self.address(key), priority, words, once, require_wanted)
 
     async def write_words(
         self, key: str, words: Words, priority: Priority, *, once: bool = False
@@ -226,8 +240,8 @@ class Registers:
         except ValueError:
             return False
 
-    async def _read(self, key: str, priority: Priority, once: bool) -> Reply:
-        """Read a parameter; what cannot be counts only when it comes again."""
+    async def read_reply(self, key: str, priority: Priority, *, once: bool = False) -> Reply:
+        """Read a parameter as it stands in the drive; what cannot be counts when it comes again."""
         address = self.address(key)
         reply = await self._ask(address, priority, None, once)
         before = self._odd.pop(key, None)
@@ -241,7 +255,12 @@ class Registers:
         return reply
 
     async def _ask(
-        self, address: Address, priority: Priority, words: Words | None, once: bool
+        self,
+        address: Address,
+        priority: Priority,
+        words: Words | None,
+        once: bool,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
         # what is busy has done nothing; a stop that is sent once is tried on by who wants it
@@ -250,7 +269,7 @@ class Registers:
             try:
                 if words is None:
                     return await self._bus.read(self._unit, address, priority)
-                return await self._bus.write(self._unit, address, words, priority)
+                return await self._bus.write(self._unit, address, words, priority, require_wanted)
             except (NoAnswer, DamagedAnswer) as error:
                 self.unanswered += isinstance(error, NoAnswer)
                 tries -= 1
@@ -261,4 +280,4 @@ class Registers:
                     raise
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)
-            self._bus.recorder.retry()
+            self._bus.recorder.retry(self._unit)

@@ -17,30 +17,69 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import enum
 import math
 import time
+from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 
-#: An unchanged set-point is written again when the last write is this old, s.
-_REWRITE_PERIOD = 1.0
+#: An unchanged set-point is written again when the last write is this old, s: somebody else may
+#: have changed it meanwhile.
+_REWRITE_PERIOD = 5.0
+#: And this share of the drive's own time-out. Any message keeps that from striking over Classic
+#: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3], and it might be
+#: what commands the drive.
+_KEEP_ALIVE_SHARE = 1 / 3
 #: A drive may be too busy for a set-point so long, s.
 _LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
 _WATCH_PERIOD = 0.25
+#: How often at most it is read back whether the drive took what was told to all drives, s.
+_READ_BACK_PERIOD = 0.5
+
+
+class Request(NamedTuple):
+    """
+    A set-point that somebody asks for.
+
+    :ivar value: in the unit of the control mode.
+    :ivar at: when it came in, s of ``time.monotonic``.
+    :ivar most: what whoever asks limits it to, in either direction.
+    """
+
+    value: float
+    at: float
+    most: float = math.inf
+
+
+_NONE = Request(NAN, -math.inf)
+
+
+class _Combining(enum.Enum):
+    """Whether the drive takes a set-point and tells its status in one transaction."""
+
+    #: Nobody knows, for none has been answered yet.
+    UNTRIED = enum.auto()
+    TAKEN = enum.auto()
+    #: Not while it stays connected: it has refused the function, or has none.
+    GIVEN_UP = enum.auto()
 
 
 class Setpoint:
@@ -48,6 +87,7 @@ class Setpoint:
     What the motor is to follow while the drive is armed.
 
     :param refused: called when the drive refuses a set-point, with the reason.
+    :param told: called with the status word that a drive told with a set-point.
     """
 
     def __init__(
@@ -57,21 +97,29 @@ class Setpoint:
         registers: Registers,
         inverter: Inverter,
         refused: Callable[[str], None],
+        told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
         self._bus = bus
         self._unit = unit
         self._registers = registers
         self._inverter = inverter
         self._refused = refused
-        self._slot = Slot(self._make, self._done)
-        #: The newest request and when it came in; written by any thread, at once.
-        self._request: tuple[float, float] = (NAN, -math.inf)
+        self._slot = Slot(self._make, self._done, told)
+        self._combining = _Combining.GIVEN_UP
+        #: The newest request to this drive; written by any thread, at once.
+        self._own = _NONE
+        #: The newest one to all drives of the line.
+        self._shared = _NONE
         self.control_mode = ''
         self._reference: Reference | None = None
         self._armed_at = math.inf
         self._written: tuple[int, ...] = ()
         self._written_at = 0.0
         self._watch: Task | None = None
+        #: What reads back whether the drive took what was told to all, and when it last did.
+        self._reading_back: Task | None = None
+        self._read_back_at = -math.inf
+        self._told_missed = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
@@ -89,9 +137,14 @@ class Setpoint:
         """
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
-        self._request = (value, time.monotonic())
+        self._own = Request(value, time.monotonic())
         if self.armed:
             self._bus.request(self._slot)
+
+    @property
+    def _request(self) -> Request:
+        """The newest request, whomever it was for."""
+        return self._own if self._own.at >= self._shared.at else self._shared
 
     @property
     def armed(self) -> bool:
@@ -101,8 +154,13 @@ class Setpoint:
     @property
     def age(self) -> float:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
-        at = self._request[1]
+        at = self._request.at
         return time.monotonic() - at if at > self._armed_at else NAN
+
+    def connected(self) -> None:
+        """Find out anew whether the drive tells its status with a set-point that it takes."""
+        able = self._registers.writes_and_reads
+        self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
     def arm(self, control_mode: str) -> None:
         """
@@ -121,6 +179,7 @@ class Setpoint:
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
+        self._told_missed = False
         self._busy_since = math.inf
         if self._reference is not None:
             self._watch = self._bus.spawn(self._watch_age())
@@ -130,9 +189,10 @@ class Setpoint:
         self._armed_at = math.inf
         self.commanded = NAN
         self.clamped = False
-        if self._watch is not None:
-            watch, self._watch = self._watch, None
-            self._bus.cancel(watch)
+        for task in (self._watch, self._reading_back):
+            if task is not None:
+                self._bus.cancel(task)
+        self._watch = self._reading_back = None
 
     def answered(self) -> None:
         """Take note that the drive answers; write what could not be written before."""
@@ -140,26 +200,130 @@ class Setpoint:
             self._waits_for_answer = False
             self._bus.request(self._slot)
 
+    @property
+    def _rewrite_period(self) -> float:
+        """After how long an unchanged set-point is written again, s."""
+        timeout = self._inverter.sio_tot
+        return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
+
     def _is_old(self, at: float) -> bool:
         """Tell whether a request waited so long for the line that it has expired meanwhile."""
         timeout = self._inverter.settings.setpoint_timeout
         return bool(timeout) and time.monotonic() - at > timeout
 
-    def _limited(self, value: float, most: float) -> float:
-        if self._inverter.settings.setpoint_max:
-            most = min(most, self._inverter.settings.setpoint_max)
-        return max(-most, min(most, value))
+    # --- together with the other drives of the line, on the bus -------------------------------
+
+    @property
+    def why_not_shared(self) -> str:
+        """Why it cannot follow a set-point that is told to all drives; ``''`` if it can."""
+        settings = self._inverter.settings
+        if settings.control_method == 'monitor':
+            return 'is only monitored'
+        if not settings.follows_setpoints:
+            return f'follows a reference of its own ({settings.reference})'
+        return '' if self.armed else 'is not enabled'
+
+    @property
+    def quantity(self) -> tuple[str, str]:
+        """What a set-point means to it: control mode and unit."""
+        return self.control_mode, self._inverter.unit
+
+    @property
+    def most(self) -> float:
+        """The greatest set-point that it may be given, in either direction."""
+        assert self._reference is not None
+        return min(self._reference.most, self._inverter.settings.setpoint_max or math.inf)
+
+    def counts(self, request: Request) -> bool:
+        """Tell whether a request to all came after the drive was enabled, and is still fresh."""
+        return request.at > self._armed_at and not self._is_old(request.at)
+
+    def is_newest(self, request: Request) -> bool:
+        """Tell whether nothing newer was asked of this drive than a request to all."""
+        return request.at >= self._own.at
+
+    def take(self, request: Request) -> None:
+        """Take a request to all for one to this drive; who asks for it writes it, too."""
+        self._shared = request
+        self._accept()
+
+    def follow(self, request: Request) -> None:
+        """Take a request to all for one to this drive, and write it to this drive."""
+        self._shared = request
+        self._bus.request(self._slot)
+
+    def words(self, request: Request) -> tuple[Address, Words]:
+        """Return what is to be written for a request, and where."""
+        assert self._reference is not None
+        return self._reference.address, self._reference.words(self._limited(request))
+
+    def needs(self, words: Words) -> bool:
+        """Tell whether this has to be written, for something else stands in the drive, or long."""
+        fresh = time.monotonic() - self._written_at < self._rewrite_period
+        return words != self._written or not fresh
+
+    def was_told(self, words: Words) -> None:
+        """Take note of what was written to all drives; it is read back whether this one took it."""
+        if not self._inverter.answering:
+            # it gets its own when it answers
+            self._written = ()
+            self._waits_for_answer = True
+            return
+        changed = words != self._written
+        self._take_note(words)
+        if changed and self._reading_back is None:
+            self._reading_back = self._bus.spawn(self._read_back())
+
+    async def _read_back(self) -> None:
+        reference = self._reference
+        assert reference is not None
+        await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - time.monotonic())
+        self._read_back_at = time.monotonic()
+        try:
+            kept = await reference.read(Priority.POLL)
+        except LinkError as error:
+            self.was_missed(error)
+            return
+        finally:
+            self._reading_back = None
+        # nothing was written between the reading and this
+        if kept == self._written:
+            return
+        if not self._told_missed:
+            self._told_missed = True
+            self._tell(
+                Severity.WARNING,
+                f'it did not take the set-point for all drives: it keeps {self._value(kept):g}; '
+                'it is given its own',
+            )
+        self._written = ()
+        self._bus.request(self._slot)
+
+    # --- to this drive ------------------------------------------------------------------------
+
+    def _limited(self, request: Request) -> float:
+        most = min(self.most, request.most)
+        return max(-most, min(most, request.value))
+
+    def _accept(self) -> tuple[float, float]:
+        """Take note that the newest request counts; return its value, and what it is limited to."""
+        request = self._request
+        limited = self._limited(request)
+        self.clamped = limited != request.value
+        self._expired = False
+        if self._warned:
+            self._warned = False
+            self._tell(Severity.INFO, 'set-points arrive again')
+        return request.value, limited
 
     def _make(self) -> Transfer | None:
-        value, at = self._request
         reference = self._reference
-        if reference is None or at <= self._armed_at or self._is_old(at):
+        if reference is None or not self.counts(self._request):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
             return None
-        limited = self._limited(value, reference.most)
-        self.clamped = limited != value
+        value, limited = self._accept()
         if self.clamped and not self._clamp_told:
             self._tell(
                 Severity.WARNING,
@@ -167,34 +331,66 @@ class Setpoint:
                 '(setpoint_max, or the limit of the drive)',
             )
         self._clamp_told = self.clamped
-        self._expired = False
-        if self._warned:
-            self._warned = False
-            self._tell(Severity.INFO, 'set-points arrive again')
         words = reference.words(limited)
-        if words == self._written and time.monotonic() - self._written_at < _REWRITE_PERIOD:
+        if not self.needs(words):
             return None
-        return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        if self._combining is _Combining.GIVEN_UP:
+            return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+        status = self._registers.address(STATUS_WORD)
+        return self._bus.write_and_read(
+            self._unit, reference.address, words, status, Priority.SETPOINT
+        )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
             assert transfer.words is not None
-            self._busy_since = math.inf
-            self._written = transfer.words
-            self._written_at = time.monotonic()
-            self.commanded = self._value(transfer.words)
+            if transfer.source is not None:
+                self._combining = _Combining.TAKEN
+            self._take_note(transfer.words)
+        elif transfer.source is not None and self._gives_up_combining(error):
+            # what is wrong with the set-point itself, if anything is, the drive says now
+            self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.words is not None
             self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
         else:
-            # the poll asks at once whether it is there, and has the time that a silent drive may
-            # take from its neighbours
-            self._registers.unanswered += isinstance(error, NoAnswer)
-            self._waits_for_answer = True
-            self._written = ()
-            self._inverter.missed()
+            self.was_missed(error)
+
+    def _take_note(self, words: Words) -> None:
+        """Take note that these words stand in the drive now."""
+        self._busy_since = math.inf
+        self._written = words
+        self._written_at = time.monotonic()
+        self.commanded = self._value(words)
+
+    def was_missed(self, error: LinkError) -> None:
+        """Take note that nobody knows what stands in the drive; it is written when it answers."""
+        # the poll asks at once whether it is there, and has the time that a silent drive may
+        # take from its neighbours
+        self._registers.unanswered += isinstance(error, NoAnswer)
+        self._waits_for_answer = True
+        self._written = ()
+        self._inverter.missed()
+
+    def _gives_up_combining(self, error: LinkError) -> bool:
+        """
+        Tell whether a drive may have refused the transaction, and not the set-point in it.
+
+        One that has never taken any may refuse it in whatever words, or say nothing to a function
+        that it does not know.
+        """
+        untried = self._combining is _Combining.UNTRIED
+        if not isinstance(error, Refused):
+            if untried and isinstance(error, NoAnswer):
+                self._combining = _Combining.GIVEN_UP
+            return False
+        unknown = error.code == Refused.ILLEGAL_FUNCTION
+        if unknown or (untried and error.code != Refused.BUSY):
+            self._combining = _Combining.GIVEN_UP
+            return True
+        return False
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Tell whether a refusal only means that the drive is busy, and not for long yet."""
@@ -219,7 +415,7 @@ class Setpoint:
     async def _watch_age_for_ever(self) -> None:
         while True:
             timeout = self._inverter.settings.setpoint_timeout
-            last = max(self._request[1], self._armed_at)
+            last = max(self._request.at, self._armed_at)
             left = last + timeout - time.monotonic() if timeout else math.inf
             if left > 0 or self._expired:
                 await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)

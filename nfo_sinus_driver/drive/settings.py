@@ -76,6 +76,8 @@ class DriveSettings:
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
+    :ivar idle_poll_rate: Hz, while the motor stands and nobody has enabled it; 0 is as
+        ``poll_rate``.
     :ivar telemetry_rate: Hz; 0 turns telemetry off.
     :ivar lost_after: s; after so long without a valid frame a drive that is asked is lost.
     :ivar setpoint_timeout: s; 0 turns it off.
@@ -93,6 +95,7 @@ class DriveSettings:
     control_method: str = 'mode_scmd'
     reference: str = 'fieldbus'
     poll_rate: float = 0.0
+    idle_poll_rate: float = 0.0
     telemetry_rate: float = 2.0
     lost_after: float = 1.0
     setpoint_timeout: float = 2.5
@@ -127,6 +130,7 @@ class DriveSettings:
         if not any(self.address in allowed for allowed in ADDRESSES.values()):
             raise ValueError(f'address {self.address}: allowed are 0 to 247')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
+        _between('idle_poll_rate', self.idle_poll_rate, 0, 1000, 'Hz (0: as poll_rate)')
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
         _between('lost_after', self.lost_after, 0.2, 60, 's')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')

@@ -22,6 +22,7 @@ import enum
 import functools
 import math
 from typing import TYPE_CHECKING
+from typing import NamedTuple
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Fact
@@ -44,6 +45,20 @@ _DRIVEN = frozenset(
 )
 
 
+class Measured(NamedTuple):
+    """
+    A measured value; NaN where the drive tells none.
+
+    :ivar at: when it arrived, s of ``time.monotonic``; minus infinity before the first.
+    """
+
+    value: float = NAN
+    at: float = -math.inf
+
+
+NOT_MEASURED = Measured()
+
+
 class Severity(enum.Enum):
     """How grave an event is; it becomes the level of a log line."""
 
@@ -57,9 +72,10 @@ class InverterStatus:
     """
     What the drive's status word and its inverter status say at one moment.
 
-    :ivar at: when the answer arrived, s of ``time.monotonic``.
+    :ivar at: when the answer arrived, s of ``time.monotonic``; that of the word, if there is one.
     :ivar word: DriveStatus, the low 16 bits [C24]; ``None`` if the drive has none [C21].
     :ivar code: the inverter status code, read without acknowledging.
+    :ivar code_at: when that arrived, likewise.
     :ivar model: whose words these are.
     :ivar by_mode: where there is no status word and the code does not say who controls: MODE says
         that the bus does.
@@ -70,6 +86,7 @@ class InverterStatus:
     code: int
     model: Model
     by_mode: bool = False
+    code_at: float = -math.inf
 
     @functools.cached_property
     def listed(self) -> StatusCode:
@@ -151,6 +168,20 @@ class InverterStatus:
         return self.means(Meaning.TUNING)
 
     @property
+    def plain(self) -> bool:
+        """
+        The motor stands or runs, without alarm or fault, and nothing is on its way.
+
+        As long as the status word stays as it is then, the code can only change to another that
+        makes nobody do anything: speeding up, at the reference, slowing down, the brake chopper,
+        standing by for keypad or terminals [M0 tables 15, 16 and 19].
+        """
+        if self.kind is not Kind.STATUS or self.means(Meaning.TUNING, Meaning.START_DELAY):
+            return False
+        # and both say the same
+        return self.driven == self.runs == self._driven_by_code
+
+    @property
     def local(self) -> bool:
         """The code says that keypad or terminals have control, and no word that the bus has."""
         told = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
@@ -185,8 +216,8 @@ class Snapshot:
     :ivar unit: of ``setpoint`` and ``actual``.
     :ivar setpoint: what the drive was last given, NaN while it was given none.
     :ivar setpoint_age: s since the newest valid set-point came in; NaN if none did.
-    :ivar frequency: Hz.
-    :ivar speed: rpm.
+    :ivar frequency: Hz, as last measured, which was at ``frequency_at``.
+    :ivar speed: rpm, likewise.
     :ivar text: the inverter status as on the display.
     :ivar kind: its kind; the fault bit has the last word [C95].
     """
@@ -203,7 +234,9 @@ class Snapshot:
     setpoint_clamped: bool = False
     actual: float = NAN
     frequency: float = NAN
+    frequency_at: float = -math.inf
     speed: float = NAN
+    speed_at: float = -math.inf
     text: str = ''
     description: str = ''
     remedy: str = ''

@@ -31,6 +31,7 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.notices import Notices
@@ -40,16 +41,18 @@ from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
 #: How often a drive is looked at while its node is not active, s.
-_IDLE_PERIOD = 0.5
+_INACTIVE_PERIOD = 0.5
 #: How often the control mode is read, while no motor that stands may start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
@@ -63,8 +66,23 @@ _KEEP_ALIVE_SHARE = 1 / 3
 _LAST_CHANCE = 0.6
 #: How often at most, if the port is gone too, s.
 _SHORTEST_PAUSE = 0.02
-#: The value that is polled beside frequency and speed, by control mode.
-_ACTUAL_KEYS = {'Torque': 'status.trq_act', 'PI-Reg': 'status.reg_act'}
+#: What the control mode is about, which is measured with every poll.
+_ACTUAL_KEYS = {
+    'Freque': 'status.frq_act',
+    'Speed': 'status.spd_act',
+    'Torque': 'status.trq_act',
+    'PI-Reg': 'status.reg_act',
+}
+#: What is measured whatever it is about.
+_BASIC_KEYS = ('status.frq_act', 'status.spd_act')
+#: How often what else a poll is made of is read, s: the other one of frequency and speed, and an
+#: inverter status that the status word gives no reason to read. All that makes the driver do
+#: something shows in that word: fault, control lost, a stop, the current limit.
+_SLOW_PERIOD = 0.1
+#: On a full line, where each read waits for its turn, once in so many turns of this drive: so two
+#: reads that every poll takes become 2.4 at most, with the control mode, which changes least.
+_SLOW_TURNS = 15
+_MODE_TURNS = 60
 
 
 class Watch:
@@ -101,9 +119,13 @@ class Watch:
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
         self._failures = 0
+        #: How long it took to have one value read, s: long, where the line is full.
+        self._turn = 0.0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint = ''
+        #: A status word that came with something else, and has not been judged yet.
+        self._told: Reply | None = None
         self._told_fault = 0
         #: How many requests nobody had answered when it was last looked at.
         self._unanswered = 0
@@ -127,6 +149,25 @@ class Watch:
         self._bus.recorder.forget_cycle(self._inverter.settings.address)
         self._publish(None)
 
+    def told(self, reply: Reply) -> None:
+        """
+        Take a status word that the drive has told with something else, if it told one.
+
+        It is the answer to a look that waits for it; else it begins one at once, if it is news.
+        """
+        inverter, registers = self._inverter, self._registers
+        if self._task is None or not inverter.connected or not reply.words:
+            return
+        place = registers.address(STATUS_WORD)
+        if self._bus.answer(self._task, inverter.settings.address, place, reply):
+            return
+        # what cannot be counts for nothing: the next poll reads it again
+        if not registers.can_be(STATUS_WORD, reply.words):
+            return
+        if inverter.seen and inverter.status_word(reply.words) != inverter.seen.word:
+            self._told = reply
+            self.wake()
+
     def wake(self) -> None:
         """Look at the drive at once."""
         if self._task is not None:
@@ -144,9 +185,12 @@ class Watch:
 
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
+        self._bus.recorder.connected(self._inverter.settings.address)
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = ''
+        self._told = None
+        self._inverter.polled.clear()
 
     async def _poll_for_ever(self) -> None:
         polled_at = -math.inf
@@ -191,14 +235,26 @@ class Watch:
     @property
     def _period(self) -> float:
         """The time from one poll to the next, s."""
+        settings = self._inverter.settings
+        rate = settings.poll_rate
+        if settings.idle_poll_rate and self._is_idle:
+            rate = settings.idle_poll_rate
+        period = 1 / rate if rate else 0.0
         if not self.active:
-            period = _IDLE_PERIOD
-        else:
-            rate = self._inverter.settings.poll_rate
-            period = 1 / rate if rate else 0.0
+            period = _INACTIVE_PERIOD
         if self._inverter.sio_tot:
             period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
         return period
+
+    @property
+    def _is_idle(self) -> bool:
+        """The motor stands, and nobody has begun anything that may change that."""
+        motion, seen = self._motion, self._inverter.seen
+        commanded = motion is not None and (motion.ours or motion.stopping)
+        if commanded or seen is None or seen.driven:
+            return False
+        # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
+        return not any(abs(value) > 0 for value in (self._inverter.frequency, self._inverter.speed))
 
     @property
     def _heard_at(self) -> float:
@@ -214,17 +270,47 @@ class Watch:
     @property
     def _mode_is_due(self) -> bool:
         """The control mode is to be read again; it can only change while the motor stands."""
-        stands = self._setpoint.armed and self._inverter.frequency == 0
-        return stands or time.monotonic() - self._mode_read_at > _MODE_PERIOD
+        inverter = self._inverter
+        stands = self._setpoint.armed and 0 in (inverter.frequency, inverter.speed)
+        period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
+        return stands or time.monotonic() - self._mode_read_at > period
+
+    @property
+    def _slow_period(self) -> float:
+        """How old may be what is not part of every poll, s."""
+        return max(_SLOW_PERIOD, _SLOW_TURNS * self._turn)
+
+    @property
+    def _code_holds(self) -> float:
+        """How long an inverter status counts while the status word stays the same, s."""
+        motion = self._motion
+        if motion is not None and (motion.stopping or (motion.ours and not motion.armed)):
+            return 0.0
+        if self._registers.unanswered > self._unanswered:
+            # it may have been switched off and on
+            return 0.0
+        return self._slow_period
 
     async def _look(self) -> InverterStatus:
         """Read the status and judge it."""
         inverter = self._inverter
         alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
+
+        async def look() -> InverterStatus:
+            told, self._told = self._told, None
+            if told is not None and inverter.seen and told.arrived <= inverter.seen.at:
+                # somebody else has looked since
+                told = None
+            return await inverter.look(
+                Priority.POLL,
+                once=True,
+                alarming=alarming,
+                told=told,
+                code_for=self._code_holds,
+            )
+
         # both words of a status are of one moment, so they are repeated together
-        seen = await self._insist(
-            lambda: inverter.look(Priority.POLL, once=True, alarming=alarming)
-        )
+        seen = await self._insist(look)
         # one that is busy, or whose answer was damaged, was there
         inverter.was_silent = self._registers.unanswered > self._unanswered
         self._unanswered = self._registers.unanswered
@@ -245,12 +331,16 @@ class Watch:
             if mode != before and self._motion:
                 # before it is told: a set-point never has the unit of another mode
                 self._motion.watch(seen)
-        inverter.frequency = frequency = await self._measure('status.frq_act')
-        inverter.speed = speed = await self._measure('status.spd_act')
-        actual = {'Freque': frequency, 'Speed': speed}.get(inverter.control_mode, NAN)
-        if inverter.control_mode in _ACTUAL_KEYS:
-            actual = await self._measure(_ACTUAL_KEYS[inverter.control_mode])
-        self._publish(seen, frequency=frequency, speed=speed, actual=actual)
+        actual = _ACTUAL_KEYS.get(inverter.control_mode)
+        if actual is not None:
+            asked_at = time.monotonic()
+            await self._measure(actual)
+            self._turn = time.monotonic() - asked_at
+        for key in _BASIC_KEYS:
+            age = time.monotonic() - inverter.last_polled(key).at
+            if key != actual and age >= self._slow_period:
+                await self._measure(key)
+        self._publish(seen)
 
     def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
         """Say on change that a fault stands, unless who ended a ride because of it has told."""
@@ -260,8 +350,12 @@ class Watch:
             self._inverter.tell(Severity.ERROR, f'{text}; then call ~/fault_ack')
         self._told_fault = code
 
-    async def _measure(self, key: str) -> float:
-        """Read a measured value; NaN if it is not to be had from a drive that answers."""
+    async def _measure(self, key: str) -> None:
+        """Measure a value anew; NaN if it is not to be had from a drive that answers."""
+        value = await self._read_measured(key)
+        self._inverter.polled[key] = Measured(value, time.monotonic())
+
+    async def _read_measured(self, key: str) -> float:
         try:
             return await self._insist(lambda: self._inverter.measure(key, Priority.POLL))
         except PortError:
@@ -293,7 +387,7 @@ class Watch:
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
                 if self._silent_for_long or in_vain:
                     raise
-                self._bus.recorder.retry()
+                self._bus.recorder.retry(self._inverter.settings.address)
             else:
                 self._inverter.answering = True
                 self._setpoint.answered()
@@ -336,8 +430,11 @@ class Watch:
             self._complaint = text
             self._inverter.tell(Severity.ERROR, text)
 
-    def _publish(self, seen: InverterStatus | None, **values: float) -> None:
-        self.snapshot = take_picture(self._inverter, self._setpoint, seen, **values)
+    def _publish(self, seen: InverterStatus | None) -> None:
+        inverter = self._inverter
+        frequency, speed = (inverter.last_polled(key) for key in _BASIC_KEYS)
+        actual = inverter.last_polled(_ACTUAL_KEYS.get(inverter.control_mode, '')).value
+        self.snapshot = take_picture(inverter, self._setpoint, seen, frequency, speed, actual)
         self._listener.on_snapshot(self.snapshot)
 
     def _explain(self, error: LinkError | DriveError) -> str:

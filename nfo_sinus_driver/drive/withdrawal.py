@@ -45,6 +45,7 @@ _LOST_RETRY_PERIOD = 1.0
 _COMPLAINT_PERIOD = 5.0
 #: Each time it is said after a longer while, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
+_NOT_ANSWERED = 'no answer yet'
 
 
 class _Outcome(enum.Enum):
@@ -88,6 +89,8 @@ class Withdrawal:
         #: What became of the last attempt, and when; ``None`` before the first has ended.
         self._outcome: _Outcome | None = None
         self._tried_at = 0.0
+        #: How often there was a new reason; what an earlier attempt shows says nothing of it.
+        self._reasons = 0
         self._unconfirmed = ''
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
@@ -125,16 +128,17 @@ class Withdrawal:
             self.begin_anew()
         if self._task is None:
             self._outcome = None
-            self._unconfirmed = 'no answer yet'
+            self._unconfirmed = _NOT_ANSWERED
             self._due = time.monotonic() + PATIENCE
             self._task = self._bus.spawn(self._keep_trying())
 
     def begin_anew(self) -> None:
-        """Begin, or try again at once: what the last attempt has shown counts no more."""
+        """Begin, or try again at once: what attempts show that have begun counts no more."""
         if self._task is None:
             self.begin()
         else:
             self._outcome = None
+            self._reasons += 1
             self._bus.wake(self._task)
 
     async def finish(self, patience: float | None = None) -> None:
@@ -219,6 +223,7 @@ class Withdrawal:
         return silent >= settings.lost_after
 
     async def _attempt(self) -> _Outcome:
+        reasons = self._reasons
         try:
             self._outcome = await self._try_once()
         except (NoAnswer, DamagedAnswer) as error:
@@ -228,6 +233,8 @@ class Withdrawal:
         except Exception as error:
             # even a mistake of ours must not end the trying
             self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, str(error) or repr(error)
+        if self._reasons > reasons:
+            self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NOT_ANSWERED
         self._tried_at = time.monotonic()
         return self._outcome
 

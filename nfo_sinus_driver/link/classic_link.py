@@ -58,8 +58,12 @@ _LUMP = 0.03
 #: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
 _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
-#: How long drives may be busy with a broadcast, which none of them confirms, s.
+#: How long drives may be busy with a broadcast, which none of them confirms, s: this at most, else
+#: so many times what the slowest of them took lately for a request of its own, which is forgotten
+#: by and by.
 _TURNAROUND = 0.1
+_TURNAROUND_MARGIN = 2.0
+_KEPT_OF_SLOWEST = 0.98
 #: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
 #: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
 #: certain, see Doubts.
@@ -119,8 +123,8 @@ class ClassicLink:
         self._inv_st: dict[int, tuple[int, float]] = {}
         self._last: _Answer | None = None
         self._echoes = False
-        #: Nothing is sent before.
-        self._free_at = 0.0
+        #: What the slowest unit took lately until its answer began, s.
+        self._slowest = _TURNAROUND
 
     def open(self) -> None:
         """
@@ -246,10 +250,7 @@ class ClassicLink:
         """Write one word; return when the answer came."""
         self._listen(request)
         if request.unit == BROADCAST:
-            sent = self._send(request)
-            self._last = None
-            self._free_at = sent + _TURNAROUND
-            return sent
+            return self._call(request)
         began = time.monotonic()
         try:
             answer, arrived, _ = self._transact(request)
@@ -260,6 +261,16 @@ class ClassicLink:
         if isinstance(answer, Nak):
             raise self._refusal(request.unit, began)
         return arrived
+
+    def _call(self, request: Select) -> float:
+        """Tell all units something, and leave them the time to do it; return when it was said."""
+        sent = self._send(request)
+        self._last = None
+        until = sent + min(_TURNAROUND, _TURNAROUND_MARGIN * self._slowest)
+        while time.monotonic() < until:
+            # an echo, or what is late: nobody answers this
+            self._port.read(until)
+        return sent
 
     def _refusal(self, unit: int, began: float) -> Refused:
         """
@@ -313,7 +324,7 @@ class ClassicLink:
     def _listen(self, request: Request) -> None:
         """Take what came unasked; wait for it where it could pass for the answer to a request."""
         last = self._last
-        until = self._free_at
+        until = 0.0
         if last and last.request.unit == request.unit and last.kind in nameless(request):
             pause = max(_NO_DOUBLE * self._settings.char_time, _NO_DOUBLE_LEAST)
             until = max(until, last.arrived + pause)
@@ -349,6 +360,8 @@ class ClassicLink:
         # units answer in order: whatever was still to come has come before this
         self._doubts.end(request.unit)
         self._last = _Answer(request, classic.kind(answer), arrived)
+        took = arrived - sent - len(classic.encode(answer)) * self._settings.char_time
+        self._slowest = max(took, _KEPT_OF_SLOWEST * self._slowest)
         if more:
             self._distrust(request)
         again = before is not None and before.request == request and isinstance(answer, Value)

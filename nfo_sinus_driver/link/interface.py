@@ -130,6 +130,8 @@ class Link(Protocol):
         """
         Write one parameter and read another, in one transaction.
 
+        :returns: the words read; none if it was only written, because what was read could not have
+            been believed. A write is not held back for that.
         :raises LinkError: as its subclasses say.
         """
 

@@ -35,9 +35,12 @@ from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_probes import answer_kinds
 from nfo_sinus_driver.link.modbus_probes import probes
@@ -137,6 +140,23 @@ class SerialLink(ModbusLink):
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
         self._safe[unit] = tuple(probes)
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        """
+        Write one parameter and read another (function 23), or only write it.
+
+        It is only written where the answer could be confused with another, for no write waits until
+        the line can be believed.
+
+        :raises LinkError: as its subclasses say.
+        """
+        request = WriteAndRead(unit, address.numbers[0], words, source.numbers[0], source.words)
+        self._await_silence(request)
+        if not self._doubts.of(unit).isdisjoint(answer_kinds(request)):
+            return self.write(unit, address, words)
+        return Reply(*self._ask(request))
 
     # --- what the protocols differ in -------------------------------------------------------------
 
@@ -279,7 +299,7 @@ class SerialLink(ModbusLink):
 
         :raises NeverSilent: there is none.
         """
-        is_write = isinstance(request, Write)
+        is_write = isinstance(request, (Write, WriteAndRead))
         patience = self._write_patience if is_write else self._settings.response_timeout
         give_up = max(self._line_end + self._gap, time.monotonic()) + patience
         came = False

@@ -20,9 +20,6 @@ from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -35,6 +32,7 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.line import RELIABLE
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.setpoints import SetpointsForAll
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 
@@ -66,16 +64,12 @@ class BusNode(Node):
         link = open_link(values['protocol'], self._port, settings)
         self.line = Line(Bus(link), Outbox(), values['retries'])
         self._all_drives = AllDrives(self, self.line)
+        self._setpoints_for_all = SetpointsForAll(self, self.line)
         self._told_port: str | None = ''
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
-        self.create_timer(
-            _PERIOD,
-            lambda: self.line.outbox.put(self._tell),
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+        self.line.outbox.put_every(_PERIOD, self._tell)
 
     def start(self) -> None:
         """Open the port and begin to tell."""
@@ -84,11 +78,7 @@ class BusNode(Node):
 
     def _tell(self) -> None:
         statistics = self.line.bus.statistics()
-        silent = [
-            node.get_name()
-            for node in self.line.drives
-            if node.state != 'unconfigured' and not node.drive.snapshot.connected
-        ]
+        silent = [node.get_name() for node in self.line.drives if node.is_silent]
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.line.bus.port_error

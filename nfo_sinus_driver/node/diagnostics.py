@@ -45,41 +45,48 @@ def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
     return DiagnosticArray(header=Header(stamp=stamp), status=[status])
 
 
+def drive_verdict(
+    snapshot: Snapshot, *, lifecycle_state: str, stop_overdue: bool, drift: Sequence[Change]
+) -> tuple[bytes, str]:
+    """Return how grave it is what one drive says, and what a person should know of it."""
+    if stop_overdue:
+        message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
+        return DiagnosticStatus.ERROR, message
+    if not snapshot.connected:
+        # a node that nobody configured has nothing to complain about
+        waiting = lifecycle_state == 'unconfigured'
+        level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
+        return level, 'not connected: the log of the node says what to check'
+    level = _LEVELS[snapshot.kind]
+    if snapshot.kind is not Kind.STATUS:
+        return level, f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
+    if drift:
+        message = f'{snapshot.text}; {len(drift)} parameters differ from the parameter file'
+        return DiagnosticStatus.WARN, message
+    return level, snapshot.text
+
+
 def drive_status(
     name: str,
+    verdict: tuple[bytes, str],
     snapshot: Snapshot,
     *,
     lifecycle_state: str,
     address: int,
     identity: Identity | None,
-    stop_overdue: bool,
     last_error: LogEntry | None,
     parameters: str,
     drift: Sequence[Change],
+    statistics: Statistics,
 ) -> DiagnosticStatus:
     """
     Return how one drive is doing.
 
+    :param verdict: as :func:`drive_verdict` has it.
     :param last_error: the newest entry of its error log.
     :param parameters: how many of them are known.
     :param drift: what is otherwise than the parameter file says.
     """
-    if stop_overdue:
-        level = DiagnosticStatus.ERROR
-        message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
-    elif not snapshot.connected:
-        # a node that nobody configured has nothing to complain about
-        waiting = lifecycle_state == 'unconfigured'
-        level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
-        message = 'not connected: the log of the node says what to check'
-    else:
-        level = _LEVELS[snapshot.kind]
-        message = snapshot.text
-        if snapshot.kind is not Kind.STATUS:
-            message = f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
-        elif drift:
-            level = DiagnosticStatus.WARN
-            message = f'{snapshot.text}; {len(drift)} parameters differ from the parameter file'
     code = '' if snapshot.status is None else str(snapshot.status.code)
     serial = identity.serial if identity else ''
     values = {
@@ -97,7 +104,9 @@ def drive_status(
         'enabled': str(snapshot.enabled),
         'setpoint': _quantity(snapshot.setpoint, snapshot.unit),
         'actual': _quantity(snapshot.actual, snapshot.unit),
+        **_figures(statistics),
     }
+    level, message = verdict
     return _status(level, f'{name}: drive', message, serial, values)
 
 
@@ -126,19 +135,29 @@ def bus_status(
         level, message = DiagnosticStatus.WARN, f'silent: {", ".join(silent_drives)}'
     else:
         level, message = DiagnosticStatus.OK, 'all drives answer'
-    values = {
-        'port': port,
+    values = {'port': port, **_figures(statistics)}
+    return _status(level, f'{name}: line', message, port, values)
+
+
+def _figures(statistics: Statistics) -> dict[str, str]:
+    return {
         'utilisation': f'{100 * statistics.utilisation:.0f} %',
-        'cycle time': f'{1000 * statistics.cycle_time:.1f} ms',
+        'cycle time': _milliseconds(statistics.cycle_time),
         'transactions': str(statistics.transactions),
         'timeouts': str(statistics.timeouts),
         'damaged': str(statistics.damaged),
         'refused': str(statistics.refused),
         'retries': str(statistics.retries),
         'reconnects': str(statistics.reconnects),
-        'round trip p99': f'{1000 * statistics.round_trip_p99:.1f} ms',
+        'round trip min': _milliseconds(statistics.round_trip_min),
+        'round trip median': _milliseconds(statistics.round_trip_median),
+        'round trip p99': _milliseconds(statistics.round_trip_p99),
+        'round trip max': _milliseconds(statistics.round_trip_max),
     }
-    return _status(level, f'{name}: line', message, port, values)
+
+
+def _milliseconds(seconds: float) -> str:
+    return '' if math.isnan(seconds) else f'{1000 * seconds:.1f} ms'
 
 
 def _status(

@@ -22,12 +22,10 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
-import time
+import threading
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock import ClockType
 from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -43,12 +41,13 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import require_address
+from nfo_sinus_driver.node.autostart import Autostart
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
 from nfo_sinus_driver.node.error_log import ErrorLogServices
 from nfo_sinus_driver.node.joint import Joint
-from nfo_sinus_driver.node.lifecycle import refuse_what_cannot_be
+from nfo_sinus_driver.node.lifecycle import answer_transitions
 from nfo_sinus_driver.node.line import Line
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.setpoints import Setpoints
@@ -57,12 +56,6 @@ from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.settings import understood
 from nfo_sinus_driver.node.tuning import TuningServices
 
-#: How often autostart looks whether it should try, s.
-_AUTOSTART_PERIOD = 0.25
-#: How long it rests after a try that failed, at first and at last, s: meanwhile a person may have
-#: the lifecycle, and the drives that do answer have the bus.
-_AUTOSTART_REST = 1.0
-_AUTOSTART_LONGEST_REST = 4.0
 #: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 #: What identifies a drive or how it is commanded cannot change under way.
@@ -97,10 +90,11 @@ class DriveNode(LifecycleNodeMixin, Node):
     def __init__(self, name: str, line: Line) -> None:
         # parameters have the default group, so lifecycle gets one of its own: neither may wait
         # for the other, and commands for none of them
-        lifecycle_group = MutuallyExclusiveCallbackGroup()
         Node.__init__(self, name)
-        LifecycleNodeMixin.__init__(self, callback_group=lifecycle_group)
-        refuse_what_cannot_be(self)
+        LifecycleNodeMixin.__init__(self, callback_group=MutuallyExclusiveCallbackGroup())
+        # autostart changes the state, too, and from a thread of its own
+        self._in_transition = threading.Lock()
+        answer_transitions(self, self._in_transition)
         self._line = line
         values = declare(self, DRIVE_SETTINGS)
         if not values['gear_ratio']:
@@ -123,24 +117,30 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._setpoints = Setpoints(self, line, joint)
         ErrorLogServices(self, self._commands, self._reporter.stamp)
         self._tuning = TuningServices(self, self._reporter.stamp)
-        self._autostart_wanted = self._autostart_tries = bool(values['autostart'])
-        self._autostarting = False
+        self._autostart_wanted = bool(values['autostart'])
+        self._autostart = Autostart(name, self._try_to_start)
         self._autostart_complaint = ''
-        self._autostart_rest = 0.0
-        self._autostart_at = 0.0
         self._barred = False
-        self._autostart_timer = self.create_timer(
-            _AUTOSTART_PERIOD,
-            self._autostart,
-            callback_group=lifecycle_group,
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
+
+    def start(self) -> None:
+        """Look for the drive, if that was wanted."""
+        if self._autostart_wanted:
+            self._autostart.start()
+
+    def join(self, timeout: float) -> None:
+        """Wait for what :meth:`start` began, but not for ever (s)."""
+        self._autostart.join(timeout)
 
     @property
     def state(self) -> str:
         """The lifecycle state's label, such as ``active``."""
         label: str = self._state_machine.current_state[1]
         return label
+
+    @property
+    def is_silent(self) -> bool:
+        """Its drive does not respond, although somebody has configured the node."""
+        return self.state != 'unconfigured' and not self._drive.snapshot.connected
 
     def why_not_active(self) -> str:
         """Return why the node is not active, and what to do."""
@@ -157,7 +157,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         :param patience: how long the drive may take to confirm it, s.
         """
         self._barred = True
-        self._autostart_tries = False
+        self._autostart.give_up()
         self._setpoints.be_quiet(True)
         return self._drive.stop_for_good(patience)
 
@@ -193,7 +193,7 @@ class DriveNode(LifecycleNodeMixin, Node):
                 ):
                     self._drive.require_standing().result()
                 self._drive = Drive(self._line.bus, self._concrete, self._reporter)
-            self._drive.connect(patient=not self._autostarting, parameters=True).result()
+            self._drive.connect(patient=not self._autostart.trying, parameters=True).result()
         except (DriveError, ValueError) as error:
             self._complain_of_start(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -241,7 +241,6 @@ class DriveNode(LifecycleNodeMixin, Node):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop the motor and give control back."""
         self._note_person()
-        self._autostart_timer.cancel()
         if self._drive.identity is not None:
             self._stop_for('shut down', self._drive.stop)
             self._stop_for('shut down', self._disconnect)
@@ -282,33 +281,24 @@ class DriveNode(LifecycleNodeMixin, Node):
         else:
             self.get_logger().info(f'{what}: {answer}' if answer else what)
 
-    def _autostart(self) -> None:
-        if not self._autostart_tries:
-            self._autostart_timer.cancel()
-            return
-        if time.monotonic() < self._autostart_at:
-            return
-        self._autostarting = True
-        try:
-            if self.state == 'unconfigured':
+    def _try_to_start(self) -> bool:
+        """Configure and activate; return whether the node is active."""
+        with self._in_transition:
+            # meanwhile somebody else may have taken the lifecycle over
+            if not self._autostart.over and self.state == 'unconfigured':
                 self.trigger_configure()
-            if self.state == 'inactive':
+            if not self._autostart.over and self.state == 'inactive':
                 self.trigger_activate()
-                self._autostart_tries = False
-        finally:
-            self._autostarting = False
-            rest = self._autostart_rest + _AUTOSTART_REST
-            self._autostart_rest = min(rest, _AUTOSTART_LONGEST_REST)
-            self._autostart_at = time.monotonic() + self._autostart_rest
+            return self.state == 'active'
 
     def _note_person(self) -> None:
-        """Leave the lifecycle to a person once a person took a hand in it."""
-        if not self._autostarting:
-            self._autostart_tries = False
+        """Leave the lifecycle to an operator once an operator took a hand in it."""
+        if not self._autostart.trying:
+            self._autostart.give_up()
 
     def _complain_of_start(self, text: str) -> None:
         """Log why the drive cannot be configured, once for each reason."""
-        if not self._autostarting:
+        if not self._autostart.trying:
             self.get_logger().error(text)
         elif self._line.bus.port_error is not None:
             # the bus node says so already, for all its drives

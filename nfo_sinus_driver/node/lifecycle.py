@@ -16,16 +16,20 @@
 
 from __future__ import annotations
 
+import threading
+
 from lifecycle_msgs.srv import ChangeState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin
 
 
-def refuse_what_cannot_be(node: LifecycleNodeMixin) -> None:
+def answer_transitions(node: LifecycleNodeMixin, in_transition: threading.Lock) -> None:
     """
-    Have ``~/change_state`` answer a transition that the node's state does not have.
+    Have ``~/change_state`` wait for others, and answer also what the node's state does not have.
 
     rclpy raises an error then and never answers, and nav2's lifecycle manager would wait for ever.
+
+    :param in_transition: held by whoever changes the state of the node.
     """
     service = node._service_change_state
     change = service.callback
@@ -34,7 +38,8 @@ def refuse_what_cannot_be(node: LifecycleNodeMixin) -> None:
         request: ChangeState.Request, response: ChangeState.Response
     ) -> ChangeState.Response:
         try:
-            return change(request, response)
+            with in_transition:
+                return change(request, response)
         except rclpy_implementation.RCLError:
             # what is wrong has been logged by rcl
             response.success = False

@@ -23,16 +23,13 @@ from __future__ import annotations
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import ctypes
-import logging
 import sys
-import threading
 import time
 import traceback
 
 import rclpy
 from rclpy.exceptions import InvalidNodeNameException
 from rclpy.exceptions import ParameterException
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
@@ -44,6 +41,8 @@ from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.executor import NodeExecutor
+from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.output import Output
 from nfo_sinus_driver.node.output import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
@@ -72,9 +71,6 @@ _LAST_CALLBACK = 2.0
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
-_log = logging.getLogger(__name__)
-
-
 class DriverProcess:
     """The nodes of one bus, spun until somebody ends them."""
 
@@ -95,12 +91,10 @@ class DriverProcess:
                 raise ValueError(f'{name}: {error}') from error
         self._drives = line.drives
         self._warn_of_unknown_names(arguments)
-        threads = _GROUPS_OF_A_DRIVE * len(names) + _GROUPS_OF_THE_BUS
-        self._executor = MultiThreadedExecutor(threads)
-        for node in (self._bus_node, *self._drives):
-            self._executor.add_node(node)
-        self._spinning = True
-        self._thread = threading.Thread(target=self._spin, name='executor', daemon=True)
+        self._executors = [
+            NodeExecutor(self._bus_node, _GROUPS_OF_THE_BUS),
+            *(NodeExecutor(node, _GROUPS_OF_A_DRIVE) for node in self._drives),
+        ]
 
     def _warn_of_unknown_names(self, arguments: list[str]) -> None:
         nodes = (self._bus_node, *self._drives)
@@ -112,13 +106,17 @@ class DriverProcess:
         """Open the port and let the nodes work."""
         self._bus_node.start()
         self._bus_node.line.listener.start()
-        self._thread.start()
+        for executor in self._executors:
+            executor.start()
+        for node in self._drives:
+            node.start()
 
     @property
     def alive(self) -> bool:
         """The nodes and the bus still work."""
         line = self._bus_node.line
-        return self._thread.is_alive() and line.bus.alive and line.listener.alive
+        parts = (line.bus, line.outbox, line.listener, *self._executors)
+        return all(part.alive for part in parts)
 
     def stop(self, why: str) -> bool:
         """
@@ -132,19 +130,10 @@ class DriverProcess:
         self._bus_node.line.bus.close()
         self._bus_node.line.outbox.close()
         self._bus_node.line.listener.close(_LAST_CALLBACK)
-        self._spinning = False
-        self._executor.wake()
-        self._thread.join(_LAST_CALLBACK)
-        _await_callbacks(self._executor)
+        end_all(self._executors, _LAST_CALLBACK)
+        for node in self._drives:
+            node.join(_LAST_CALLBACK)
         return confirmed
-
-    def _spin(self) -> None:
-        while self._spinning:
-            try:
-                self._executor.spin_once(timeout_sec=1.0)
-            except Exception:
-                # a mistake in one callback must not take the others with it
-                _log.exception('error in a callback; the driver goes on')
 
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
@@ -173,14 +162,6 @@ class DriverProcess:
     def _may_be_there(self, node: DriveNode) -> bool:
         """Tell whether there may be a motor: one that never answered was never started by us."""
         return node.drive.heard or self._bus_node.line.bus.port_error is None
-
-
-def _await_callbacks(executor: MultiThreadedExecutor) -> None:
-    """Let callbacks end before what they use is destroyed, but not for ever."""
-    # rclpy has no other way to wait for them
-    waiter = threading.Thread(target=executor._executor.shutdown, daemon=True)
-    waiter.start()
-    waiter.join(_LAST_CALLBACK)
 
 
 def _time_left(node: DriveNode, begun: float) -> float:

@@ -142,7 +142,7 @@ def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
 def bus_statistics(
     statistics: Statistics, silent_drives: list[str], stamp: Time
 ) -> BusStatistics:
-    """Return the BusStatistics message of a line."""
+    """Return the BusStatistics message of a line, or of one drive."""
     return BusStatistics(
         header=Header(stamp=stamp),
         utilisation=statistics.utilisation,
@@ -158,4 +158,5 @@ def bus_statistics(
         round_trip_p99=statistics.round_trip_p99,
         round_trip_max=statistics.round_trip_max,
         silent_drives=silent_drives,
+        round_trip_median=statistics.round_trip_median,
     )

@@ -12,14 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is waiting to be published: one thread sends it, so that the bus never waits for ROS."""
+"""What is to be published, soon or by the clock: a thread does it, so that no bus waits for ROS."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
 import logging
+import math
 import threading
+import time
+
+from nfo_sinus_driver.node.schedule import Schedule
 
 _log = logging.getLogger(__name__)
 
@@ -28,10 +32,15 @@ _MOST_WAITING = 1000
 
 
 class Outbox:
-    """Runs functions in the order in which they were put in, on a thread of its own."""
+    """
+    Runs functions on a thread of its own: in the order in which they were put in, or by the clock.
+
+    The clock is the steady one of this machine, whatever time the nodes go by.
+    """
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque(maxlen=_MOST_WAITING)
+        self._schedule = Schedule()
         self._something = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='outbox', daemon=True)
@@ -40,10 +49,19 @@ class Outbox:
         """Start the thread."""
         self._thread.start()
 
+    @property
+    def alive(self) -> bool:
+        """The thread works."""
+        return self._thread.is_alive()
+
     def put(self, function: Callable[[], None]) -> None:
         """Have a function run soon, from any thread."""
         self._waiting.append(function)
         self._something.set()
+
+    def put_every(self, period: float, function: Callable[[], None]) -> None:
+        """Have a function run once in every period, s; from any thread."""
+        self.put(lambda: self._schedule.add(time.monotonic(), period, function))
 
     def close(self, timeout: float = 2.0) -> None:
         """Send what is waiting, then end."""
@@ -54,14 +72,24 @@ class Outbox:
 
     def _work(self) -> None:
         while True:
-            self._something.wait()
+            self._something.wait(self._time_to_spare())
             self._something.clear()
             while self._waiting:
-                function = self._waiting.popleft()
-                try:
-                    function()
-                except Exception:
-                    # one message that cannot be sent must not silence the others
-                    _log.exception('a message could not be published')
+                _run(self._waiting.popleft())
             if self._closing:
                 return
+            if (function := self._schedule.take_due(time.monotonic())) is not None:
+                _run(function)
+
+    def _time_to_spare(self) -> float | None:
+        """Return for how long nothing is due by the clock, s; ``None`` is for ever."""
+        moment = self._schedule.next_moment
+        return None if moment == math.inf else max(0.0, moment - time.monotonic())
+
+
+def _run(function: Callable[[], None]) -> None:
+    try:
+        function()
+    except Exception:
+        # one message that cannot be sent must not silence the others
+        _log.exception('a message could not be published')

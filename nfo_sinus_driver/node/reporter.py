@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
+from nfo_sinus_msgs.msg import BusStatistics
 from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
@@ -71,12 +71,15 @@ class Reporter:
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._drive: Callable[[], Drive] | None = None
         self._last_inv_st: tuple[int, Kind] | None = None
+        #: When what was published last was measured.
+        self._frequency_at = self._speed_at = -math.inf
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
         # these flow from the start, whatever the lifecycle says
         self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
         self._inv_st = node.create_publisher(InvSt, '~/inv_st', LATCHED)
         self._log_entries = node.create_publisher(ErrorLogEntry, '~/error_log_entry', KEPT)
+        self._statistics = node.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self._speed = create(Float32, '~/actual_speed', RELIABLE)
         self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
@@ -86,12 +89,7 @@ class Reporter:
     def start(self, drive: Callable[[], Drive]) -> None:
         """Begin with what is told once a second."""
         self._drive = drive
-        self._node.create_timer(
-            _PERIOD,
-            lambda: self._line.outbox.put(self._tell_regularly),
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=self._steady,
-        )
+        self._line.outbox.put_every(_PERIOD, self._tell_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
 
@@ -147,8 +145,13 @@ class Reporter:
         self._diagnose(snapshot, on_change=True)
         if snapshot.status is None:
             return
-        self._frequency.publish(Float32(data=snapshot.frequency))
-        self._speed.publish(Float32(data=snapshot.speed))
+        # what was measured anew; a full line has time for one of the two with some polls only
+        if snapshot.frequency_at > self._frequency_at:
+            self._frequency_at = snapshot.frequency_at
+            self._frequency.publish(Float32(data=snapshot.frequency))
+        if snapshot.speed_at > self._speed_at:
+            self._speed_at = snapshot.speed_at
+            self._speed.publish(Float32(data=snapshot.speed))
         self._joint_states.publish(self._joint.state(snapshot, stamp, frame_id))
         inv_st = (snapshot.status.code, snapshot.kind)
         if inv_st != self._last_inv_st:
@@ -170,24 +173,38 @@ class Reporter:
             stamp = self.stamp(now)
             self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id()))
         self._diagnose(snapshot, on_change=False)
+        self._tell_statistics()
+
+    def _tell_statistics(self) -> None:
+        assert self._drive is not None
+        silent = [self._node.get_name()] if self._node.is_silent else []
+        stamp = self._node.get_clock().now().to_msg()
+        statistics = self._drive().statistics
+        self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
 
     def _diagnose(self, snapshot: Snapshot, *, on_change: bool) -> None:
         assert self._drive is not None
         drive = self._drive()
+        diagnosis = diagnostics.drive_verdict(
+            snapshot,
+            lifecycle_state=self._node.state,
+            stop_overdue=drive.stop_overdue,
+            drift=drive.parameters.drift,
+        )
+        if on_change and diagnosis == self._last_diagnosis:
+            return
+        self._last_diagnosis = diagnosis
         status = diagnostics.drive_status(
             self._node.get_fully_qualified_name().lstrip('/'),
+            diagnosis,
             snapshot,
             lifecycle_state=self._node.state,
             address=drive.settings.address,
             identity=drive.identity,
-            stop_overdue=drive.stop_overdue,
             last_error=drive.last_error,
             parameters=drive.parameters.progress,
             drift=drive.parameters.drift,
+            statistics=drive.statistics,
         )
-        diagnosis = (status.level, status.message)
-        if on_change and diagnosis == self._last_diagnosis:
-            return
-        self._last_diagnosis = diagnosis
         stamp = self._node.get_clock().now().to_msg()
         self._diagnostics.publish(diagnostics.array(status, stamp))

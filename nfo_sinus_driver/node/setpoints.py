@@ -12,19 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The set-points of one drive, from three topics: the newest valid one counts, wherever it came."""
+"""
+The set-points of one drive, from three topics, and those for all drives of a line from one: the
+newest valid one counts, wherever it came.
+"""
 
 from __future__ import annotations
 
 import math
+import time
 from typing import TYPE_CHECKING
 
 from nfo_sinus_msgs.msg import Setpoint
+from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive.setpoint_all import SetpointAll
+from nfo_sinus_driver.drive.setpoint_all import Told
 from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.line import NEWEST
 from nfo_sinus_driver.node.line import Line
@@ -120,3 +127,37 @@ class Setpoints:
 
     def _ignore(self, text: str) -> None:
         self._node.get_logger().warning(text, throttle_duration_sec=_TELL_PERIOD)
+
+
+class SetpointsForAll:
+    """Hands set-points for all drives of a line to them; why nobody follows them is told."""
+
+    def __init__(self, node: Node, line: Line) -> None:
+        self._line = line
+        self._log = node.get_logger()
+        self._told = Told()
+        self._told_at = -math.inf
+        self._all = SetpointAll(
+            line.bus,
+            lambda: {drive.get_name(): drive.drive.setpoint for drive in line.drives},
+            self._on_told,
+        )
+        line.listener.listen(node, Float32, '~/setpoint_all', self._on_setpoint, NEWEST)
+
+    def _on_setpoint(self, message: Float32) -> None:
+        if math.isfinite(message.data):
+            self._all.request(message.data)
+        else:
+            text = f'setpoint_all {message.data} ignored: it is not a finite number'
+            self._log.warning(text, throttle_duration_sec=_TELL_PERIOD)
+
+    def _on_told(self, told: Told) -> None:
+        """Say on the bus what has changed; a refusal again and again, but not with each request."""
+        again = told.refused and time.monotonic() - self._told_at > _TELL_PERIOD
+        if told == self._told and not again:
+            return
+        self._told, self._told_at = told, time.monotonic()
+        if told.refused:
+            self._line.say(self._log.warning, f'setpoint_all refused: {told.refused}')
+        elif told.limited:
+            self._line.say(self._log.warning, f'setpoint_all {told.limited}')

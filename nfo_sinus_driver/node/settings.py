@@ -203,6 +203,14 @@ DRIVE_SETTINGS = (
         1000,
         unit='Hz',
     ),
+    Setting(
+        'idle_poll_rate',
+        0.0,
+        'As poll_rate, but while the motor stands and is not enabled, Hz; 0: as poll_rate',
+        0,
+        1000,
+        unit='Hz',
+    ),
     Setting('telemetry_rate', 2.0, 'Measured values, Hz; 0: off', 0, 100, unit='Hz'),
     Setting(
         'lost_after',

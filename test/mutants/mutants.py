@@ -38,8 +38,13 @@ _MAIN = 'nfo_sinus_driver/node/main.py'
 _SIGNALS = 'nfo_sinus_driver/signals.py'
 _WITHDRAWAL = 'nfo_sinus_driver/drive/withdrawal.py'
 _CONTROL = 'nfo_sinus_driver/drive/drive_control.py'
+_REFERENCE = 'nfo_sinus_driver/drive/reference.py'
+_ERRAND = 'nfo_sinus_driver/drive/errand.py'
 _ANY_ORDER = 'test/unit/drive/test_any_order.py'
 _STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
+_CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
+_TUNING_BEGINS = ('test/unit/drive/test_tuning_begins.py', '-k', 'any_moment')
+_EVERY_WAY = ('test/unit/drive/test_errands_every_way.py', '-k', 'terminals_keep')
 _NO_TURN = ('test/unit/drive/test_no_turn_at_acknowledge.py',)
 _G2_SCMD = (_ANY_ORDER, '-k', 'G2ModeScmd')
 _G2_CONTROL = (_ANY_ORDER, '-k', 'G2DriveControl')
@@ -72,8 +77,8 @@ MUTANTS = (
         1,
         'polling acknowledges faults',
         'nfo_sinus_driver/drive/inverter.py',
-        "read_number('fieldbus.inv_st', priority, once=once",
-        "read_number('fieldbus.inv_st_with_ack', priority, once=once",
+        "read_at('fieldbus.inv_st', priority, once=once",
+        "read_at('fieldbus.inv_st_with_ack', priority, once=once",
         (_TRACE,),
     ),
     Mutant(
@@ -191,8 +196,8 @@ MUTANTS = (
     Mutant(
         2,
         'no set-point 0 before a run command',
-        _MOTION,
-        '        await self._method.zero_setpoint(control_mode, Priority.SERVICE)\n',
+        _REFERENCE,
+        '        await self.write_zero(priority, once=False)\n',
         '',
         (_TRACE,),
     ),
@@ -449,9 +454,9 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: no set-point 0 before a run command',
-        _MOTION,
-        '            await self._method.zero_setpoint(control_mode, Priority.SERVICE)\n',
-        '            pass\n',
+        _REFERENCE,
+        '        await self.write_zero(priority, once=False)\n',
+        '',
         _G2_CONTROL,
     ),
     Mutant(
@@ -547,16 +552,16 @@ MUTANTS = (
         7,
         'in any order: the status of a fault is not told',
         _WATCH,
-        '        self._publish(seen, frequency',
-        '        seen.faulted or self._publish(seen, frequency',
+        '        self._publish(seen)',
+        '        seen.faulted or self._publish(seen)',
         (_ANY_ORDER, '-k', 'OptimalMonitor'),
     ),
     Mutant(
         1,
         'in any order: polling acknowledges faults',
         'nfo_sinus_driver/drive/inverter.py',
-        "read_number('fieldbus.inv_st', priority, once=once",
-        "read_number('fieldbus.inv_st_with_ack', priority, once=once",
+        "read_at('fieldbus.inv_st', priority, once=once",
+        "read_at('fieldbus.inv_st_with_ack', priority, once=once",
         (_ANY_ORDER, '-k', 'G2Monitor'),
     ),
     Mutant(
@@ -623,6 +628,55 @@ MUTANTS = (
         '                await self._registers.acknowledge_and_write(key, *self._soonest)\n',
         '                await self._registers.acknowledge(key, _ACK)\n',
         _NO_TURN,
+    ),
+    Mutant(
+        2,
+        'control is taken with the set-point of an earlier session',
+        _MOTION,
+        '        if not self._inverter.settings_need_control:\n',
+        '        if False:\n',
+        _CONTROL_TAKEN,
+    ),
+    Mutant(
+        2,
+        'no stop follows MODE = Bus',
+        _METHOD,
+        '                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)\n'
+        '                return\n',
+        '                return\n',
+        _CONTROL_TAKEN,
+    ),
+    Mutant(
+        2,
+        'a tuning that waits for the line is sent after a stop',
+        _ERRAND,
+        '                    require_wanted=loan.require_wanted,\n',
+        '',
+        _TUNING_BEGINS,
+    ),
+    Mutant(
+        3,
+        'a stop is confirmed by what was seen before its reason',
+        _WITHDRAWAL,
+        '        if self._reasons > reasons:\n',
+        '        if False:\n',
+        _STOP_CONFIRMED,
+    ),
+    Mutant(
+        2,
+        'a quick stop ends what keeps others from enabling',
+        _MOTION,
+        '            self._releasing -= 1\n',
+        '            self._releasing = 0\n',
+        _STOP_CONFIRMED,
+    ),
+    Mutant(
+        2,
+        'the acknowledgement of a serial fault takes control from the terminals',
+        _METHOD,
+        '        if not elsewhere:\n',
+        '        if True:\n',
+        _EVERY_WAY,
     ),
     Mutant(
         3,

@@ -31,6 +31,7 @@ from typing import Any
 from bench import Bench
 import matplotlib.image
 from mcap.reader import make_reader
+import pytest
 from rosbags.highlevel import AnyReader
 from ways import needs
 import yaml
@@ -75,6 +76,7 @@ class Bag:
         return self.messages[f'/nfo_sinus/{topic}']
 
 
+@pytest.mark.timeout(3 * _DEMO_TIME)
 def test_the_demo_is_recorded_and_drawn(tmp_path: Path) -> None:
     began = time.time()
     # a folder that is not there yet, for the demo makes it

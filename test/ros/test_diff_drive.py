@@ -64,7 +64,9 @@ def names(parameters: dict[str, Any], prefix: str = '') -> set[str]:
 # --- the files --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('name', ['single.yaml', 'conveyor.yaml', 'diff_drive/drives.yaml'])
+@pytest.mark.parametrize(
+    'name', ['single.yaml', 'conveyor.yaml', 'conveyor_32.yaml', 'diff_drive/drives.yaml']
+)
 def test_every_parameter_of_a_file_is_one_of_ours(name: str) -> None:
     nodes = sections(_CONFIG / name)
     bus = {setting.name for setting in BUS_SETTINGS}

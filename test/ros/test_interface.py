@@ -29,6 +29,7 @@ from bench import seconds
 from bench import wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
+from nfo_sinus_msgs.msg import BusStatistics
 from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import InvSt
 from parameter_bench import Wire
@@ -53,6 +54,7 @@ _SETTINGS = {
     'control_method': 'mode_scmd',
     'autostart': True,
     'poll_rate': 0.0,
+    'idle_poll_rate': 0.0,
     'telemetry_rate': 2.0,
     'setpoint_timeout': 2.5,
     'setpoint_max': 0.0,
@@ -379,3 +381,43 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
         assert drive.state(1)['turning']
         response = left.call('stop')
         assert response.success, response.message
+
+
+def test_each_drive_tells_its_own_statistics(bench: Bench) -> None:
+    drive = bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}\n'
+        'left: {ros__parameters: {address: 1}}\n'
+        'right: {ros__parameters: {address: 2}}\n'
+    )
+    bench.driver('--params-file', str(parameters))
+    left = bench.client('/left').connected()
+    right = bench.client('/right').connected()
+    for client, name in ((left, '/left'), (right, '/right')):
+        client.listen('own statistics', BusStatistics, f'{name}/statistics', 10)
+    drive.inject('silence', 600.0, address=2)
+    lost = right.wait_for(
+        'own statistics', lambda m: m.silent_drives == ['right'] and m.timeouts > 2, 'it is lost'
+    )
+    assert lost.retries > 0 and math.isnan(lost.cycle_time)
+    seen = left.messages['own statistics'][-1].transactions
+    own = left.wait_for(
+        'own statistics', lambda m: m.transactions > seen and m.cycle_time > 0, 'left goes on'
+    )
+    assert own.silent_drives == []
+    assert own.timeouts == own.damaged == own.refused == own.reconnects == 0
+    assert 0 < own.round_trip_min <= own.round_trip_median <= own.round_trip_p99
+    assert own.round_trip_p99 <= own.round_trip_max
+    line = left.wait_for('statistics', lambda m: m.transactions > own.transactions, 'the line')
+    assert line.timeouts > 2 and line.round_trip_median > 0
+    drive.inject('silence', 0.0, address=2)
+    right.wait_for('own statistics', lambda m: m.reconnects == 1 and not m.silent_drives, 'back')
+    values = {one.key: one.value for one in _diagnosis(right, 'right: drive').values}
+    assert int(values['timeouts']) > 2
+    wait_until(lambda: _median(right) > 0, 'its round trips are in its diagnostics')
+
+
+def _median(client: Client) -> float:
+    values = {one.key: one.value for one in _diagnosis(client, 'right: drive').values}
+    return float(values['round trip median'].partition(' ')[0] or 0)

@@ -100,6 +100,9 @@ class _Judge:
         self._zero: dict[int, bool] = {}
         #: How each unit was commanded at first.
         self._methods: dict[int, str] = {}
+        #: Who was spoken to, and who of them was given a run command that nobody has removed.
+        self._known: set[int] = set()
+        self._running: set[int] = set()
 
     def complaints(self, data: bytes) -> Iterator[str]:
         """Take a request; yield what is wrong with it."""
@@ -111,17 +114,23 @@ class _Judge:
         if request is None:
             return
         places = self._places
-        unit, place, count, words = request
-        if place in places.acknowledging and words is None:
+        unit, place, count, words, source = request
+        if (place if words is None else source and source[0]) in places.acknowledging:
             yield 'reads the status that acknowledges'
-        if (place, count) not in places.whole:
-            yield f'{count} words at {place:04X}h are not exactly one parameter'
+        if source is not None and place not in places.setpoints:
+            yield 'function 23 is not for parameters other than set-points'
+        for start, size in ((place, count), *(() if source is None else (source,))):
+            if (start, size) not in places.whole:
+                yield f'{size} words at {start:04X}h are not exactly one parameter'
+        if unit != _EVERYBODY or self._protocol != 'classic':
+            self._known.add(unit)
         if words is None:
             return
         if place == places.mode and words[0] == Mode.EXT:
             yield 'MODE = 2 can start the motor'
-        if self._protocol == 'classic' and unit == _EVERYBODY and not _stops(request, places):
-            yield 'a call to everybody that is no stop'
+        if self._protocol == 'classic' and unit == _EVERYBODY:
+            yield from self._call(request)
+            return
         if place == places.mask:
             yield from _wrong_control_word(words[1])
         if place == places.control:
@@ -135,6 +144,21 @@ class _Judge:
             if not self._zero.get(unit):
                 yield 'a run command without set-point 0 before it'
             self._zero[unit] = False
+            self._running.add(unit)
+        elif place in (places.command, places.control, places.mode):
+            self._running.discard(unit)
+
+    def _call(self, request: Request) -> Iterator[str]:
+        """Judge what is said to everybody: a stop, or a set-point where all have been enabled."""
+        places, words = self._places, request.words
+        if _stops(request, places):
+            self._running.clear()
+        elif request.place not in places.setpoints:
+            yield 'a call to everybody that is neither a stop nor a set-point'
+        elif self._known - self._running:
+            yield f'a set-point for all, but {sorted(self._known - self._running)} are not enabled'
+        else:
+            self._zero.update(dict.fromkeys(self._known, words == (0,)))
 
 
 def _stops(request: Request, places: _Places) -> bool:

@@ -28,6 +28,7 @@ WITH_GAP = frozenset(('modbus_rtu',))
 _READ = 3
 _WRITE_ONE = 6
 _WRITE_SEVERAL = 16
+_WRITE_AND_READ = 23
 #: Who are you: function and data [M0 §6.2.4].
 _REPORT_SLAVE_ID = bytes((17,))
 _READ_DEVICE = frozenset(
@@ -43,12 +44,14 @@ class Request(NamedTuple):
 
     :ivar place: the register or the Classic id of the first word.
     :ivar words: what is written, ``None`` for a read.
+    :ivar source: place and count of what is read in the same transaction as the write.
     """
 
     unit: int
     place: int
     count: int
     words: tuple[int, ...] | None
+    source: tuple[int, int] | None = None
 
 
 def understand(data: bytes, protocol: str) -> Request | None:
@@ -97,8 +100,10 @@ def _of_message(message: bytes) -> Request | None:
     if message[1:] == _REPORT_SLAVE_ID or message[1:] in _READ_DEVICE:
         return None
     unit, function = message[:2]
-    if function not in (_READ, _WRITE_ONE, _WRITE_SEVERAL):
+    if function not in (_READ, _WRITE_ONE, _WRITE_SEVERAL, _WRITE_AND_READ):
         raise ValueError(f'function {function} is not for parameters')
+    if function == _WRITE_AND_READ:
+        return _of_both(unit, message)
     register, second = struct.unpack('>HH', message[2:6])
     if function == _READ:
         return Request(unit, register, second, None)
@@ -106,6 +111,12 @@ def _of_message(message: bytes) -> Request | None:
         return Request(unit, register, 1, (second,))
     words = struct.unpack(f'>{second}H', message[7 : 7 + 2 * second])
     return Request(unit, register, second, words)
+
+
+def _of_both(unit: int, message: bytes) -> Request:
+    source, wanted, register, count = struct.unpack('>4H', message[2:10])
+    words = struct.unpack(f'>{count}H', message[11 : 11 + 2 * count])
+    return Request(unit, register, count, words, (source, wanted))
 
 
 def _of_classic(data: bytes) -> Request:

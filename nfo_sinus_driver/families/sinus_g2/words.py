@@ -23,6 +23,8 @@ from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusWord
 
 TITLE = 'NFO Sinus G2'
+#: It has Modbus function 23 ([M0 §6.2.3], [C57]).
+WRITES_AND_READS = True
 
 
 class Mode(enum.IntEnum):

@@ -48,11 +48,16 @@ def register(number: int, words: int = 1) -> Address:
 
 
 class Done(NamedTuple):
-    """One transaction that the link saw; ``words`` is ``None`` for a read."""
+    """
+    One transaction that the link saw; ``words`` is ``None`` for a read.
+
+    :ivar source: what was read in the same transaction as the write.
+    """
 
     unit: int
     number: int
     words: Words | None
+    source: int | None = None
 
 
 class FakeLink:
@@ -112,6 +117,11 @@ class FakeLink:
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
         return self._transact(Done(unit, address.numbers[0], words))
+
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        return self._transact(Done(unit, address.numbers[0], words, source.numbers[0]))
 
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words

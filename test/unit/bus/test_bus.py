@@ -1051,7 +1051,7 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
     bus.start()
     for _ in range(6):  # one of them is not ready at first and asked again
         wait_until(ask(bus, 1, Priority.POLL).done)
-    bus.call(bus.recorder.retry)
+    bus.call(lambda: bus.recorder.retry(1))
     bus.call(lambda: bus.recorder.cycle(1, 0.3))
     bus.call(lambda: bus.recorder.cycle(2, 0.5))
     bus.call(lambda: bus.recorder.cycle(1, 0.2))

@@ -66,3 +66,25 @@ def test_a_port_that_is_gone_says_nothing_of_who_is_behind_it() -> None:
     silences = Silences()
     silences.note(1, 10.0, PortError())
     assert not silences.is_silent(1)
+
+
+def test_who_is_missing_is_asked_seldom_as_long_as_others_answer() -> None:
+    silences = Silences()
+    for unit in (1, 2, 3):
+        silences.note(unit, 10.0, None)
+    silences.note(1, 11.0, NoAnswer(), 0.2)
+    assert not silences.is_missing(1, 12.9)
+    assert silences.is_missing(1, 13.0)
+    # one lost answer, or one after a short silence, costs no pause
+    assert silences.missing_from <= 11.0
+    silences.note(2, 13.0, None)
+    silences.note(1, 13.2, NoAnswer(), 0.2)
+    assert silences.is_missing(1, 13.2)
+    # the others keep nine tenths of the time at least
+    assert silences.missing_from >= 13.2 + 9 * 0.2
+    # and where nobody answers there is nobody to spare
+    silences.note(2, 13.4, NoAnswer(), 0.2)
+    silences.note(3, 13.6, NoAnswer(), 0.2)
+    assert silences.missing_from <= 15.0
+    silences.note(1, 16.0, None)
+    assert not silences.is_missing(1, 16.0)

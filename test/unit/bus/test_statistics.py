@@ -24,6 +24,10 @@ from types import SimpleNamespace
 import pytest
 
 from nfo_sinus_driver import statistics as module
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.statistics import Recorder
 
 
@@ -41,6 +45,7 @@ def test_nothing_measured_yet(clock: SimpleNamespace) -> None:
         figures.cycle_time,
         figures.round_trip_min,
         figures.round_trip_mean,
+        figures.round_trip_median,
         figures.round_trip_p99,
         figures.round_trip_max,
     )
@@ -53,27 +58,28 @@ def test_nothing_measured_yet(clock: SimpleNamespace) -> None:
 def test_round_trips(clock: SimpleNamespace, count: int, p99: float) -> None:
     recorder = Recorder()
     for number in reversed(range(count)):
-        recorder.answered(number + 1.0)
+        recorder.transaction(1, clock.now, number + 1.0, None)
     figures = recorder.statistics()
     assert figures.round_trip_min == 1.0
     assert figures.round_trip_max == count
     assert figures.round_trip_mean == pytest.approx((count + 1) / 2)
+    assert figures.round_trip_median == math.ceil(count / 2)
     assert figures.round_trip_p99 == p99
 
 
 def test_old_round_trips_are_forgotten(clock: SimpleNamespace) -> None:
     recorder = Recorder()
-    recorder.answered(99.0)
+    recorder.transaction(1, clock.now, 99.0, None)
     for _ in range(1000):
-        recorder.answered(1.0)
+        recorder.transaction(1, clock.now, 1.0, None)
     assert recorder.statistics().round_trip_max == 1.0
 
 
 def test_utilisation_is_that_of_the_last_two_seconds(clock: SimpleNamespace) -> None:
     recorder = Recorder()
-    recorder.busy(clock.now, 0.5)
+    recorder.transaction(1, clock.now, 0.5, NoAnswer())
     clock.now += 1.0
-    recorder.busy(clock.now, 0.3)
+    recorder.transaction(2, clock.now, 0.3, None)
     assert recorder.statistics().utilisation == pytest.approx(0.4)
     # the first one is over; nothing new has come in meanwhile
     clock.now += 1.5
@@ -86,7 +92,7 @@ def test_utilisation_is_that_of_the_last_two_seconds(clock: SimpleNamespace) -> 
 def test_utilisation_is_never_more_than_all(clock: SimpleNamespace) -> None:
     recorder = Recorder()
     for _ in range(3):
-        recorder.busy(clock.now, 1.0)
+        recorder.transaction(1, clock.now, 1.0, None)
     assert recorder.statistics().utilisation == 1.0
 
 
@@ -122,8 +128,7 @@ def test_read_while_it_is_written() -> None:
         number = 0
         while not ended.is_set():
             number += 1
-            recorder.busy(number * 0.01, 0.001)
-            recorder.answered(0.001)
+            recorder.transaction(number % 50, number * 0.01, 0.001, None)
             recorder.cycle(number % 50, 0.1)
             recorder.forget_cycle((number + 25) % 50)
 
@@ -131,6 +136,64 @@ def test_read_while_it_is_written() -> None:
     worker.start()
     for _ in range(300):
         recorder.statistics()
+        recorder.statistics(7)
     ended.set()
     worker.join()
     assert recorder.statistics().transactions > 0
+
+
+def test_each_unit_has_its_own_figures(clock: SimpleNamespace) -> None:
+    recorder = Recorder()
+    for unit, seconds, error in (
+        (1, 0.01, None),
+        (1, 0.03, None),
+        (2, 0.2, NoAnswer()),
+        (2, 0.05, DamagedAnswer()),
+        (2, 0.02, Refused(1)),
+        (2, 0.04, None),
+    ):
+        recorder.transaction(unit, clock.now, seconds, error)
+    recorder.retry(2)
+    recorder.cycle(1, 0.1)
+    recorder.cycle(2, 0.3)
+    line, first, second = (recorder.statistics(unit) for unit in (None, 1, 2))
+    assert (line.transactions, first.transactions, second.transactions) == (6, 2, 4)
+    assert (second.timeouts, second.damaged, second.refused, second.retries) == (1, 1, 1, 1)
+    assert (first.timeouts, first.damaged, first.refused, first.retries) == (0, 0, 0, 0)
+    assert (line.timeouts, line.damaged, line.refused, line.retries) == (1, 1, 1, 1)
+    assert first.utilisation == pytest.approx(0.02)
+    assert second.utilisation == pytest.approx(0.155)
+    assert line.utilisation == pytest.approx(0.175)
+    assert (line.cycle_time, first.cycle_time, second.cycle_time) == (0.3, 0.1, 0.3)
+    # a refusal is an answer, too
+    assert (second.round_trip_min, second.round_trip_max) == (0.02, 0.04)
+    assert (line.round_trip_min, line.round_trip_max) == (0.01, 0.04)
+
+
+def test_a_unit_that_was_connected_to_again_has_reconnects(clock: SimpleNamespace) -> None:
+    recorder = Recorder()
+    for unit in (1, 2, 2, 2):
+        recorder.connected(unit)
+    found = [recorder.statistics(unit).reconnects for unit in (1, 2, 3, None)]
+    assert found == [0, 2, 0, 0]
+
+
+def test_who_only_asks_leaves_no_trace(clock: SimpleNamespace) -> None:
+    recorder = Recorder()
+    assert recorder.statistics(9).transactions == 0
+    assert math.isnan(recorder.statistics(9).round_trip_median)
+    recorder.forget_cycle(9)
+    assert math.isnan(recorder.statistics().cycle_time)
+
+
+def test_what_is_kept_of_a_unit_is_bounded(clock: SimpleNamespace) -> None:
+    recorder = Recorder()
+    recorder.transaction(1, clock.now, 99.0, None)
+    for _ in range(1000):
+        recorder.transaction(1, clock.now, 1.0, LinkError())
+    # without an answer there is no round trip
+    assert recorder.statistics(1).round_trip_max == 99.0
+    for _ in range(500):
+        recorder.transaction(1, clock.now, 1.0, None)
+    assert recorder.statistics(1).round_trip_max == 1.0
+    assert recorder.statistics().round_trip_max == 99.0

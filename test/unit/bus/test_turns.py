@@ -307,6 +307,25 @@ def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
     assert turns.take() is other
 
 
+@pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE, Priority.SETPOINT])
+def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
+    kind: Priority,
+) -> None:
+    turns = Turns({2, 4}.__contains__)
+    urgent, silent = entry(kind), stop_of(2)
+    retry = Waiting(cast(Task, 'retry'), Transfer(4, Address((1,), 1), Priority.POLL))
+    for waiting in (retry, *map(entry, _BACKGROUND)):
+        turns.add(waiting)
+    # it costs so much that everybody else has a claim on the line
+    for _ in range(5):
+        turns.add(silent)
+        assert turns.take() is silent
+        turns.took(0.2)
+        turns.add(urgent)
+        assert turns.take() is urgent
+        turns.took(_READ)
+
+
 def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
     turns = Turns(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]
@@ -318,6 +337,49 @@ def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
 
 
 # --- leaving --------------------------------------------------------------------------------------
+
+
+def poll_of(unit: int) -> Waiting:
+    """A poll of one unit."""
+    return Waiting(cast(Task, 'poll'), Transfer(unit, Address((1,), 1), Priority.POLL))
+
+
+def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
+    missing, other = poll_of(7), poll_of(1)
+    turns = Turns({7}.__contains__, {7}.__contains__)
+    assert not turns.missing_wait
+    turns.add(missing)
+    turns.add(other)
+    assert turns.missing_wait
+    assert turns.take(missing=False) is other
+    assert turns.take(missing=False) is None
+    turns.add(other)
+    assert turns.take() is missing
+    assert not turns.missing_wait
+
+
+def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() -> None:
+    silent: set[int] = {7}
+    turns = Turns(silent.__contains__, silent.__contains__)
+    first, again, other = stop_of(7), stop_of(7), stop_of(2)
+    turns.add(first)
+    assert turns.take(missing=False) is first
+    turns.took(0.2)
+    turns.add(again)
+    turns.add(other)
+    assert turns.take(missing=False) is other
+    turns.took(_READ)
+    assert turns.take(missing=False) is None
+    assert turns.take() is again
+    turns.took(0.2)
+    # it has been back meanwhile: this stop is a first one again
+    silent.clear()
+    turns.add(poll_of(7))
+    assert turns.take(missing=False) is not None
+    turns.took(_READ)
+    silent.add(7)
+    turns.add(again)
+    assert turns.take(missing=False) is again
 
 
 def test_what_a_task_waits_for_can_be_withdrawn() -> None:

@@ -128,11 +128,15 @@ class Bench:
 
     def writes(self) -> list[bytes]:
         """Every request so far that writes."""
-        lines = self._trace.read_text(encoding='utf-8').splitlines(keepends=True)
-        frames = [json.loads(line) for line in lines if line.endswith('\n')]
-        requests = [bytes.fromhex(f['hex']) for f in frames if f['direction'] == 'request']
+        requests = self.requests()
         assert requests
         return [request for request in requests if request[1] in WRITES]
+
+    def requests(self) -> list[bytes]:
+        """Every request so far."""
+        lines = self._trace.read_text(encoding='utf-8').splitlines(keepends=True)
+        frames = [json.loads(line) for line in lines if line.endswith('\n')]
+        return [bytes.fromhex(f['hex']) for f in frames if f['direction'] == 'request']
 
     def on_write(self, key: str, act: Callable[[], None], address: int = 1) -> None:
         """Let something happen just before the bus writes a parameter, every time."""

@@ -16,16 +16,21 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 import json
+from pathlib import Path
 import signal
 
 from cli_bench import BACKGROUND
 from cli_bench import Bench
 from cli_bench import Done
 import pytest
+import yaml
 
 from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.cli import scan
+from nfo_sinus_driver.cli.trouble import Trouble
 
 Nfo = Callable[..., Done]
 G2 = load_model('sinus_g2')
@@ -208,6 +213,61 @@ def test_scan_finds_nobody(nfo: Nfo) -> None:
     assert 'nobody answers' in done.err
 
 
+def test_scan_writes_a_parameter_file_for_the_driver(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    file = tmp_path / 'line.yaml'
+    arguments = ('scan', '--addresses', '1-3', '--params', file)
+    done = nfo(*arguments, '--response-timeout', 0.5)
+    assert done.status == 0, done.err
+    assert f'--params-file {file}' in done.err
+    written = yaml.safe_load(file.read_text())
+    assert written == {
+        '/**/nfo_sinus_bus': {
+            'ros__parameters': {
+                'port': bench.simulator.port,
+                'protocol': 'modbus_rtu',
+                'baud_rate': 19200,
+                'char_format': '8E1',
+                'response_timeout': 0.5,
+                'drives': ['drive_1', 'drive_2'],
+            }
+        },
+        '/**/drive_1': {'ros__parameters': {'address': 1, 'model': 'sinus_g2'}},
+        '/**/drive_2': {'ros__parameters': {'address': 2, 'model': 'sinus_g2'}},
+    }
+    assert '# NFO Sinus 1.50/400, firmware 4.38 / 4018, serial NFO1001\n' in file.read_text()
+    # it may have been edited since
+    file.write_text('mine')
+    frames = len(bench.requests())
+    again = nfo(*arguments)
+    assert again.status == 1 and 'exists already' in again.err
+    assert file.read_text() == 'mine' and len(bench.requests()) == frames
+    assert nfo(*arguments, '--force', '--response-timeout', 0.5).status == 0
+    assert 'drive_2' in file.read_text()
+    assert bench.writes() == []
+
+
+def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
+    done = nfo('scan', '--addresses', '1', '--params', '-', '--response-timeout', 0.5)
+    assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
+    assert 'NFO1001' in done.err
+
+
+def test_scan_writes_no_file_of_drives_that_make_no_line(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    file = tmp_path / 'line.yaml'
+    done = nfo('scan', '--addresses', '7', '--params', file, '--response-timeout', 0.02)
+    assert done.status == 1 and not file.exists()
+    found = {1: {'line': '19200 8E1'}, 2: {'line': '9600 8E1'}}
+    options = argparse.Namespace(params=str(file))
+    with pytest.raises(Trouble, match='several') as raised:
+        scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
+    assert '2: 9600 8E1' in str(raised.value)
+    assert not file.exists()
+
+
 def test_scan_by_default_asks_all(nfo: Nfo) -> None:
     done = nfo('scan', '--response-timeout', 0.01, '--json')
     # some may have been too slow for it
@@ -224,9 +284,48 @@ def test_monitor(nfo: Nfo, bench: Bench) -> None:
     lines = done.out.splitlines()
     assert len(lines) == 3
     assert all('31 ' in line and ' Hz ' in line for line in lines)
+    head, line = done.err.splitlines()
+    names = ('used', 'cycle', 'min', 'median', 'p99', 'max')
+    assert [head.index(name) for name in names] == sorted(head.index(name) for name in names)
+    cells = line.split()
+    assert cells[0] == 'line' and cells[2] == '%' and float(cells[3]) > 0.0
+    least, median, p99, most = map(float, cells[4:8])
+    assert 0.0 < least <= median <= p99 <= most
+    assert int(cells[8]) > 20 and cells[9:] == ['0', '0', '0', '0']
     assert bench.writes() == []
     assert bench.drive().ack_reads == 0
     assert bench.drive().motor.driven
+
+
+def test_monitor_of_several_drives_tells_of_each_and_of_the_line(nfo: Nfo, bench: Bench) -> None:
+    done = nfo('monitor', '--addresses', '1,2', '--count', 3, '--period', 0.05)
+    assert done.status == 0
+    assert [line.split()[1] for line in done.out.splitlines()] == ['1', '2'] * 3
+    _, line, first, second = done.err.splitlines()
+    assert (first.split()[:2], second.split()[:2]) == (['drive', '1'], ['drive', '2'])
+    requests = [int(row.split()[-5]) for row in (line, first, second)]
+    assert requests[0] == requests[1] + requests[2] and min(requests) > 20
+    done = nfo('monitor', '--addresses', '1,2', '--count', 2, '--period', 0.05, '--json')
+    told = [json.loads(text) for text in done.out.splitlines()]
+    assert [one['address'] for one in told] == [1, 2] * 2
+    assert told[0]['statistics']['cycle_time'] is None
+    assert told[2]['statistics']['cycle_time'] > 0.0
+    assert told[2]['statistics']['round_trip_median'] > 0.0
+    assert done.err == ''
+
+
+def test_monitor_tells_which_of_several_drives_is_missing(nfo: Nfo, bench: Bench) -> None:
+    bench.simulator.inject('silence', 60, address=2)
+    done = nfo(
+        'monitor', '--addresses', '1,2', '--count', 2, '--period', 0.01,
+        '--response-timeout', 0.3, '--json',
+    )  # fmt: skip
+    assert done.status == 1
+    told = [json.loads(text) for text in done.out.splitlines()]
+    assert [(one['address'], one['connected']) for one in told] == [(1, True), (2, False)] * 2
+    assert told[1]['statistics']['timeouts'] == 3
+    assert told[1]['statistics']['retries'] == 2
+    assert told[1]['statistics']['round_trip_min'] is None
 
 
 def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
@@ -253,14 +352,15 @@ def test_monitor_ends_with_ctrl_c(bench: Bench, through: tuple[str, ...]) -> Non
     assert 'Hz' in process.stdout.readline()
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert said == ''
+    head, line = said.splitlines()
+    assert 'median' in head and line.startswith('line ')
     assert process.returncode == 0
 
 
 def test_monitor_is_one_line_on_a_terminal(bench: Bench) -> None:
     done = bench.on_terminal('monitor', '--count', 3, '--period', 0.05)
     assert done.status == 0
-    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 1
+    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 3
 
 
 # --- the port -------------------------------------------------------------------------------------

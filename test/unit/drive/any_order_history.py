@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
+import itertools
 import math
 from typing import Any
 
@@ -53,8 +54,13 @@ FOUND = 5.0
 #: How much longer everything may take while answers are spoiled by chance, s.
 NOISY = 2.0
 
+#: A stop that a fault keeps a drive from taking is not repeated within this, s.
+REFUSED = 0.3
+
 #: By these the bus has control.
 BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
+#: The function that reads, and where InvSt stands [M0 §7], [M1].
+READ, INV_ST = 3, 0x02A5
 #: Bit 0 of the control word [M0 table 14].
 SWITCH_ON = 1 << 0
 
@@ -69,6 +75,8 @@ class Command:
     name: str
     future: Future[Any]
     at: float
+    #: How many frames had been sent by then.
+    frames: int
     #: The line was whole and the drive known when it was given, and has been since.
     undisturbed: bool
     #: A stop was on its way when it was given.
@@ -110,6 +118,10 @@ class History:
         self._ended_by_fault: float | None = None
         self._acknowledged = 0
         self._stop_due: int | None = None
+        #: When a stop was last written, taken or refused.
+        self._stop_tried_at = -math.inf
+        #: When the drive was last seen to tune.
+        self._tuned_at = -math.inf
 
     # --- what the test tells ----------------------------------------------------------------------
 
@@ -120,8 +132,10 @@ class History:
     def command(self, name: str, future: Future[Any]) -> None:
         """Take note of a command that was given."""
         undisturbed = self._steady
-        overruled = any(one.name in STOPS and not one.future.done() for one in self._commands)
-        self._commands.append(Command(name, future, self.now, undisturbed, overruled))
+        stops = [one for one in self._commands if one.name in STOPS and not one.future.done()]
+        overruled = any(not self._may_be_confirmed(one) for one in stops)
+        frames = len(self._rig.link.frames)
+        self._commands.append(Command(name, future, self.now, frames, undisturbed, overruled))
         if name == 'enable':
             if self.enabled_at is None and not overruled:
                 self.enabled_at = self.now
@@ -129,7 +143,8 @@ class History:
         elif name == 'tune':
             self._ours = True
         elif name in STOPS:
-            if name != 'quick_stop' and self._steady and self.standing and not self._foreign:
+            ours = self._steady and self.standing and not self._foreign
+            if name != 'quick_stop' and ours and not self._refused_just_now:
                 self._stop_due = len(self._rig.link.frames)
             self.lose(CARRIED_OUT)
         elif name == 'acknowledge':
@@ -138,6 +153,17 @@ class History:
             self.active = False
         if name == 'disconnect':
             self.watched = False
+
+    def _may_be_confirmed(self, stop: Command) -> bool:
+        """Tell whether the status was read since a stop was written that has no answer yet."""
+        sent = [bytes.fromhex(frame['hex']) for frame in self._rig.link.frames[stop.frames :]]
+        after = itertools.dropwhile(lambda frame: frame[1] == READ, sent)
+        return any(int.from_bytes(frame[2:4], 'big') == INV_ST for frame in after)
+
+    @property
+    def _refused_just_now(self) -> bool:
+        """A fault has just kept the drive from taking a stop: none is due again so soon."""
+        return bool(self._far.faults) and self.now - self._stop_tried_at < REFUSED
 
     def connected(self) -> None:
         """Take note that the driver looks after the drive from now on, or tries to."""
@@ -306,9 +332,11 @@ class History:
             self._forgive_fault()
         self._conditions = conditions
         enabled_at = self.enabled_at
-        # what happens before the run command is given does not end an enabling; nor does a RUN
-        # input that is lost, for a G2 does not tell it from a start that is yet to come
-        unmoved = not self._stood or ended == [False, False, True, False]
+        # what happens before the run command is given does not end an enabling, and what another
+        # master gave is none; nor does a RUN input that is lost, for a G2 does not tell it from a
+        # start that is yet to come
+        given = self._stood and not self._foreign
+        unmoved = not given or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
             self.lose(self.noticed)
         if ended[0]:

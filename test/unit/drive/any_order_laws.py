@@ -56,6 +56,8 @@ POWERED = 2
 
 #: Registers of one word or two [M0 §7], [M1].
 MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
+#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
+SETPOINTS = (0x03FC, 0x025C, 0x0408, 0x0410)
 MODE_STOP, MODE_BUS = 1, 3
 RUN_FIELDBUS = 0x101
 FORWARD, REVERSE = 1 << 3, 1 << 13
@@ -211,6 +213,8 @@ class Laws(History):
     def _judge_commands(self) -> None:
         if self._commands:
             self._commanded_at = self.now
+        if self.tuning:
+            self._tuned_at = self.now
         for command in tuple(self._commands):
             if command.future.done():
                 self._commands.remove(command)
@@ -234,7 +238,9 @@ class Laws(History):
                 raise Broken(f'{command.name} is answered although it runs')
             if error is None and self.tuning:
                 raise Broken(f'{command.name} is answered although it tunes')
-            local = not self.by_bus or bool(self._far.faults) or self.tuning
+            # a tuning that has just ended may have refused what came before its end
+            tuned = self._tuned_at >= command.at
+            local = not self.by_bus or bool(self._far.faults) or tuned
             if error is not None and untouched and command.undisturbed and not local:
                 raise Broken(f'{command.name} failed for no reason: {error}')
 
@@ -276,16 +282,20 @@ class Laws(History):
 
     def _note_stop(self, register: int, word: int) -> None:
         """Let a stop go ahead of everything but what it has to read itself."""
-        if self._stop_due is None:
-            return
         stops = (
             (register == SCMD and word == 0)
             or (register == MODE and word == MODE_STOP)
             or (register in (CONTROL, MASK) and not word & SWITCH_ON)
+            # a stop that a fault keeps the drive from taking goes on with the set-point
+            or (register in SETPOINTS and not word and bool(self._far.faults))
         )
-        before = len(self._rig.link.frames) - self._stop_due
+        due = self._stop_due
         if stops:
             self._stop_due = None
+            self._stop_tried_at = self.now
+        if due is None:
+            return
+        before = len(self._rig.link.frames) - due
         most = 2 if self._optimal and self._method == 'drive_control' else 1
         if before > most:
             raise Broken(f'{before} transactions went ahead of a stop')

@@ -213,6 +213,22 @@ class DirectLink:
         self._exchange(request, 8, carry_out)
         return Reply((), self._rig.clock.now)
 
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        register, count, size = address.numbers[0], source.words, len(words)
+        head = struct.pack(
+            '>BB4HB', unit, 23, source.numbers[0], count, register, size, 2 * size
+        )
+        request = head + struct.pack(f'>{size}H', *words)
+        self._rig.judge(lambda: self._rig.wrote(register, words))
+        told = self._exchange(
+            request,
+            5 + 2 * count,
+            lambda far: far.write_and_read(register, words, source.numbers[0], count),
+        )
+        return Reply(told, self._rig.clock.now)
+
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words
     ) -> Reply:

@@ -24,6 +24,8 @@ from typing import Any
 
 from drive_rig import MakeRig
 from drive_rig import Rig
+from line_rig import LineRig
+from line_rig import MakeLine
 import pytest
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
@@ -95,6 +97,24 @@ def make_virtual() -> Iterator[MakeVirtual]:
     ) -> VirtualRig:
         end()
         rigs.append(VirtualRig(parameters, variant, **settings))
+        return rigs[-1]
+
+    yield make
+    end()
+
+
+@pytest.fixture
+def make_line() -> Iterator[MakeLine]:
+    """Makes a line of several drives, as often as it is asked for; the one before ends."""
+    rigs: list[LineRig] = []
+
+    def end() -> None:
+        while rigs:
+            rigs.pop().close()
+
+    def make(count: int, **settings: Any) -> LineRig:
+        end()
+        rigs.append(LineRig(count, **settings))
         return rigs[-1]
 
     yield make

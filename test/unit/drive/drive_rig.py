@@ -118,6 +118,12 @@ class Tap:
         self.before(address.numbers[0], words)
         return self._link.write(unit, address, words)
 
+    def write_and_read(
+        self, unit: int, address: Address, words: Words, source: Address
+    ) -> Reply:
+        self.before(address.numbers[0], words)
+        return self._link.write_and_read(unit, address, words, source)
+
     def read_then_write(
         self, unit: int, source: Address, address: Address, words: Words
     ) -> Reply:

@@ -187,6 +187,9 @@ class AnyOrder(RuleBasedStateMachine):
 
     def until_noticed(self) -> None:
         """Let what has happened last be noticed, if it can be."""
+        # a drive without power answers nobody, and is not seen before it has started
+        while not self.rig.far.listening and self.rig.link.whole:
+            self.rig.pass_time(0.1)
         self.rig.pass_time(self.laws.noticed)
 
     # --- commands ---------------------------------------------------------------------------------

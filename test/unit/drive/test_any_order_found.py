@@ -31,6 +31,7 @@ from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
 
@@ -100,11 +101,14 @@ def test_a_serial_fault_that_stands_keeps_nobody_from_acknowledging_it(
     assert rig.said('drive_timeout cannot be set yet', Severity.WARNING)
     assert 'Sio Fail stands' in rig.answer(rig.drive.enable())
     assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
-    writes: list[int] = []
-    rig.wrote = lambda register, words: writes.append(register)
+    writes: list[tuple[int, Words]] = []
+    rig.wrote = lambda register, words: writes.append((register, words))
     assert 'enabled' in rig.answer(rig.drive.enable())
     # the bus has control by then, for older firmware takes it only so [C100]; nothing runs yet
-    assert writes[:2] == [MODE, rig.register('serial.sio_tot')]
+    registers = [register for register, _ in writes]
+    before = writes[: registers.index(rig.register('serial.sio_tot'))]
+    assert (MODE, (Mode.BUS,)) in before
+    assert (SCMD, (RUN,)) not in before
     assert rig.far.peek('serial.sio_tot') == 1.5
     # and once is enough
     rig.answer(rig.drive.stop())
@@ -206,5 +210,21 @@ def test_an_enable_that_comes_with_a_quick_stop_is_refused(machine: type[AnyOrde
         for refused in (enable, later):
             assert 'a stop is on its way' in state.rig.answer(refused)
         assert not state.rig.drive.armed
+    finally:
+        state.rig.close()
+
+
+def test_a_clean_up_while_a_fault_is_being_acknowledged_stops_first() -> None:
+    state = G2DriveControl()
+    state.begin(keeps=True, refuses='scmd')
+    try:
+        # the acknowledgement has disarmed, and waits until the reaction to the fault is over
+        state.fault_in_a_ride_acknowledged(between=0.0, code=5, wait=0.02)
+        frames = len(state.rig.link.frames)
+        state.rig.drive.disconnect(1.0)
+        state.rig.pass_time(0.05)
+        sent = [bytes.fromhex(frame['hex']) for frame in state.rig.link.frames[frames:]]
+        # the transaction that was on the line, and then the run bits
+        assert [frame[1] for frame in sent[:2]].count(16) == 1, sent
     finally:
         state.rig.close()

@@ -33,6 +33,7 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.faults import LogEntry
@@ -180,6 +181,32 @@ def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
             rig.far.trip(5, cause_present=True)
         wait_until(lambda: not rig.drive.armed)
         assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+    finally:
+        rig.stop()
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+@pytest.mark.parametrize('name', ['modbus_rtu', 'classic_v2', 'classic_v5'])
+def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(
+    name: str, method: str
+) -> None:
+    if (name, method) == ('classic_v5', 'drive_control'):
+        pytest.skip('it has no control word')
+    rig = Rig(WAYS[name], method)
+    rig.start()
+    try:
+        with rig.simulator.lock:
+            rig.far.set_run_input(False)
+            rig.far.trip(14)
+            rig.far.press_ext()
+        if name == 'modbus_rtu':
+            # the one way that is left would take it from them
+            assert 'keypad or terminals have control' in rig.refused(rig.drive.acknowledge())
+            assert rig.far.faults
+        else:
+            assert 'acknowledged 14 Sio Fail' in rig.drive.acknowledge().result(PATIENCE)
+            assert not rig.far.faults
+        assert rig.far.runner.mode == Mode.EXT
     finally:
         rig.stop()
 

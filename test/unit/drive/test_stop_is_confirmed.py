@@ -141,6 +141,32 @@ def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
         rig.send(None)
 
 
+def test_an_enable_is_refused_until_every_quick_stop_has_ended(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual()
+    rig.ride()
+    stops: list[Future[str]] = [rig.drive.quick_stop()]
+    releases = itertools.count()
+
+    def be_busy_with_the_second(register: int, words: Words | None) -> None:
+        if (register, words) == (MODE, (Mode.STOP,)):
+            number = next(releases)
+            if not number:
+                stops.append(rig.drive.quick_stop())
+            elif number < 5:
+                rig.elapse(0.004)
+                raise Refused(Refused.BUSY)
+
+    rig.before = be_busy_with_the_second
+    first = rig.answer(stops[0])
+    assert first == 'released: the motor coasts'
+    assert not stops[1].done()
+    enable = rig.answer(rig.drive.enable())
+    assert not stops[1].done()
+    assert 'a stop is on its way' in enable
+    rig.answer(stops[1])
+    assert 'enabled' in rig.answer(rig.drive.enable())
+
+
 def test_an_enable_may_follow_as_soon_as_a_stop_is_answered(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     for stop in (rig.drive.stop, rig.drive.quick_stop):
@@ -223,6 +249,24 @@ def test_callers_who_were_answered_are_forgotten(make_virtual: MakeVirtual) -> N
     for _ in range(5):
         assert not answered(rig, rig.drive.stop())
     assert not rig.drive._motion._withdrawal._task.joiners
+
+
+def test_what_was_seen_before_a_new_reason_to_stop_confirms_nothing(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.ride()
+    begun = len(rig.written(SCMD))
+
+    def know_better(register: int, words: Words | None) -> None:
+        if words is None and len(rig.written(SCMD)) > begun:
+            # it is being looked whether the drive stops
+            rig.before = lambda *_: None
+            rig.drive._motion.taking_back.begin_anew()
+
+    rig.before = know_better
+    rig.answer(rig.drive.stop())
+    assert rig.written(SCMD)[begun:] == [Scmd.STOP, Scmd.STOP]
 
 
 def test_many_callers_share_one_stop(make_virtual: MakeVirtual) -> None:

@@ -77,7 +77,8 @@ def run(rig: Rig, reference: str, code: int, frequency: float) -> None:
         rig.far.memory.put(rig.far.runner.setpoint_key, 333)
     assert rig.enable().startswith('enabled')
     assert rig.writes(MODE) == [Mode.BUS]
-    assert rig.writes(SCMD) == [code]
+    # nothing that stood there from before, and then this
+    assert rig.writes(SCMD) == [Scmd.STOP, code]
     if reference == 'fieldbus':
         # what stood there before does not count
         assert rig.far.memory.raw(rig.far.runner.setpoint_key) == 0
@@ -87,7 +88,7 @@ def run(rig: Rig, reference: str, code: int, frequency: float) -> None:
             rig.drive.set_setpoint(12.5)
     rig.wait_for_frequency(frequency)
     assert rig.drive.stop().result(PATIENCE) == 'stopping: it ramps down'
-    assert rig.writes(SCMD)[:2] == [code, Scmd.STOP]
+    assert rig.writes(SCMD)[:3] == [Scmd.STOP, code, Scmd.STOP]
     rig.wait_until_still()
 
 
@@ -125,7 +126,7 @@ def test_scmd_tunes(rig: Rig, procedure: Procedure) -> None:
     result = tuning.result(PATIENCE)
     code, shown = TUNES[procedure]
     assert result.success and shown in result.text
-    assert rig.writes(SCMD)[0] == code
+    assert rig.writes(SCMD)[:2] == [Scmd.STOP, code]
 
 
 def test_scmd_800_erases_the_error_log(rig: Rig) -> None:

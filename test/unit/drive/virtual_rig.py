@@ -21,6 +21,7 @@ from typing import Any
 
 import any_order_rig
 from support.variants import hardest
+from support.wire import understand
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
@@ -41,6 +42,7 @@ class VirtualRig(any_order_rig.Rig):
 
     :ivar before: called with each request, register and words, ``None`` if it reads; what it
         raises is the answer.
+    :ivar before_both: called with each that writes and reads (function 23), what it writes.
     """
 
     def __init__(
@@ -51,10 +53,13 @@ class VirtualRig(any_order_rig.Rig):
     ) -> None:
         parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
         settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
-        far = SimulatedDrive(settings=parameters, variant=variant or hardest())
+        model = settings.setdefault('model', 'sinus_g2')
+        far = SimulatedDrive(model, settings=parameters, variant=variant or hardest(model))
         super().__init__(far, DriveSettings(**settings))
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
+        self.before_both: Callable[[int, Words], None] = lambda *what: self.before(*what)
         read, write = self.link.read, self.link.write
+        write_and_read = self.link.write_and_read
 
         def meet_read(unit: int, address: Address) -> Reply:
             self.before(address.numbers[0], None)
@@ -64,7 +69,14 @@ class VirtualRig(any_order_rig.Rig):
             self.before(address.numbers[0], words)
             return write(unit, address, words)
 
+        def meet_write_and_read(
+            unit: int, address: Address, words: Words, source: Address
+        ) -> Reply:
+            self.before_both(address.numbers[0], words)
+            return write_and_read(unit, address, words, source)
+
         self.link.read, self.link.write = meet_read, meet_write
+        self.link.write_and_read = meet_write_and_read  # type: ignore[method-assign]
 
     def connect(self) -> str:
         """Connect and activate."""
@@ -100,9 +112,12 @@ class VirtualRig(any_order_rig.Rig):
 
     def written(self, register: int) -> list[int]:
         """Return what was written to a register of one word, in order."""
-        head = f'{register:04x}'
-        frames = [frame['hex'] for frame in self.link.frames]
-        return [int(frame[8:12], 16) for frame in frames if frame[2:8] == f'06{head}']
+        requests = [understand(bytes.fromhex(one['hex']), 'modbus_rtu') for one in self.link.frames]
+        return [
+            one.words[0]
+            for one in requests
+            if one is not None and one.words is not None and one.place == register
+        ]
 
     def said(self, part: str, severity: Severity | None = None) -> bool:
         """Whether an event says this."""

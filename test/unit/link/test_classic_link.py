@@ -239,11 +239,29 @@ def test_broadcast_awaits_no_answer() -> None:
     bench = Bench()
     start = bench.wire.now
     assert bench.write(Address((MODE,), 1), 1, unit=95).words == ()
-    assert bench.wire.now == start
     assert bench.wire.sent[0][1].startswith(b'\x04\x7f\x02E0029=0001')
     assert bench.read(A).words == bench.answer_of(1)
     # the drives have had time to obey
     assert bench.wire.sent[1][0] - start > 15 * SETTINGS.char_time + 0.09
+
+
+def test_drives_that_answer_fast_need_little_time_for_a_broadcast() -> None:
+    bench = Bench()
+    for number in range(300):
+        bench.read(A if number % 2 else B)
+    start = bench.wire.now
+    bench.write(Address((MODE,), 1), 1, unit=95)
+    bench.read(A)
+    assert bench.wire.sent[-1][0] - start < 15 * SETTINGS.char_time + 0.01
+    # one that took long lately needs it, but none needs longer than all drives may
+    for delay in (0.2, 0.95):
+        bench = Bench(*[Fate()] * 300, Fate(delay))
+        for number in range(301):
+            bench.read(A if number % 2 else B)
+        start = bench.wire.now
+        bench.write(Address((MODE,), 1), 1, unit=95)
+        pause = bench.wire.now - start - 15 * SETTINGS.char_time
+        assert min(2 * delay * TIMEOUT, 0.1) - 0.001 <= pause <= 0.101
 
 
 def test_nobody_reads_a_broadcast() -> None:

@@ -311,14 +311,34 @@ def test_what_was_not_sent_was_not_done() -> None:
     assert bench.wire.sent == []
 
 
-def test_a_write_and_read_whose_probe_was_lost_was_not_done() -> None:
+def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
     bench = Bench()
     bench.wire.far_end = lambda frame, end: None
-    with bench.wire.time():
-        for done in (True, False):
-            with pytest.raises(NoAnswer) as raised:
-                bench.link.write_and_read(UNIT, A, (7,), B)
-            assert raised.value.maybe_done is done
+    bench.expect(NoAnswer, lambda: bench.write_and_read(A, (7,), B))
+
+    def answer(frame: bytes, end: float) -> None:
+        message = bytes((UNIT, 23, 2, 0, 5))
+        told = frame if frame[1] == 6 else message + opinion.crc(message)
+        bench.wire.arrive(end, told)
+
+    bench.wire.far_end = answer
+    before = bench.wire.now
+    assert bench.write_and_read(A, (8,), B).words == ()
+    assert bench.wire.now < before + 0.1
+    # what was late has come before the answer to that
+    assert bench.write_and_read(A, (9,), B).words == (5,)
+    assert [frame[1] for _, frame in bench.wire.sent] == [23, 6, 23]
+
+
+def test_a_write_and_read_goes_out_at_once_on_a_line_that_is_never_silent() -> None:
+    bench = Bench()
+    bench.wire.far_end = lambda frame, end: None
+    babble(bench.wire, 0x55, SETTINGS.frame_gap / 2)
+    before = bench.wire.now
+    with contextlib.suppress(DamagedAnswer), bench.wire.time():
+        bench.link.write_and_read(UNIT, A, (7,), B)
+    assert bench.wire.sent
+    assert bench.wire.sent[0][0] < before + 0.1
 
 
 @pytest.mark.parametrize('lost', range(6))

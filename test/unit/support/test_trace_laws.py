@@ -95,6 +95,9 @@ def test_a_good_ride_has_nothing_to_complain_of(protocol: str) -> None:
         (['01 11 00'], 'not for parameters'),
         (['01 08 0001 0000'], 'not for parameters'),
         (['01 17 0400 0001 0294 0001 02 0003'], 'not for parameters'),
+        (['01 17 02A4 0001 03FC 0001 02 0064'], 'acknowledges'),
+        (['01 17 0258 0001 03FC 0001 02 0064'], 'not exactly one parameter'),
+        ([_ZERO, '01 17 0258 0002 03FC 0001 02 0064', _RUN], 'without set-point 0'),
         ([_ZERO, *_WHO, _RUN, *_WHO, _RUN], 'without set-point 0'),
     ],
 )
@@ -117,12 +120,18 @@ def test_only_modbus_rtu_has_a_gap() -> None:
 
 #: Ids of Classic [M0 table 3].
 _MODE_ID, _SCMD, _SETPOINT, _CONTROL = 0x0029, 0x00AD, 0x001E, 0x007C
+_BOTH_RUN = [
+    _classic(unit, number, word)
+    for unit in (1, 2)
+    for number, word in ((_SETPOINT, 0), (_SCMD, 0x101))
+]
 _CLASSIC_GOOD = [
     _classic(1, 0x00E9),
     _classic(1, _MODE_ID, 3),
     _classic(1, _SETPOINT, 0),
     _classic(1, _SCMD, 0x101),
     _classic(1, _SETPOINT, 0x64),
+    _classic(95, _SETPOINT, 0x64),
     _classic(1, _SCMD, 0),
     _classic(95, _MODE_ID, 1),
     _classic(0, 0x00E9),
@@ -146,8 +155,11 @@ def test_a_good_ride_over_classic_has_nothing_to_complain_of() -> None:
         ([_classic(1, _SETPOINT, 1), _classic(1, _SCMD, 0x101)], 'without set-point 0'),
         ([*_CLASSIC_GOOD, _classic(1, _SCMD, 0x101)], 'without set-point 0'),
         ([_classic(1, _CONTROL, 0x2008)], 'both directions'),
-        ([_classic(95, _MODE_ID, 3)], 'no stop'),
-        ([_classic(95, _SCMD, 0)], 'no stop'),
+        ([_classic(95, _MODE_ID, 3)], 'neither a stop nor a set-point'),
+        ([_classic(95, _SCMD, 0)], 'neither a stop nor a set-point'),
+        ([*_BOTH_RUN, _classic(3, 0x00E9), _classic(95, _SETPOINT, 1)], '[3] are not enabled'),
+        ([*_BOTH_RUN, _classic(2, _SCMD, 0), _classic(95, _SETPOINT, 1)], '[2] are not enabled'),
+        ([*_BOTH_RUN, _classic(95, _SETPOINT, 1), _classic(1, _SCMD, 0x101)], 'without set-point'),
     ],
 )
 def test_a_bad_ride_over_classic_is_found_out(bad: list[dict], complaint: str) -> None:

@@ -1,0 +1,91 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One row of a table: what was measured, where, and what was aimed at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import replace
+import statistics
+
+Figures = dict[str, float]
+
+#: What counts in every run, so that a median would hide it.
+_NEVER = ('short_gaps', 'lost')
+_SUMMED = (*_NEVER, 'events')
+#: The longest that any event of any run took.
+_WORST = ('longest', 'longest_ratio', 'beyond', 'polls')
+
+
+@dataclass(frozen=True)
+class Effort:
+    """
+    How much is measured in one run.
+
+    :ivar window: how long cycles are watched at least, s.
+    :ivar rounds: how many cycles a window has at least.
+    :ivar setpoints: how many set-points are published.
+    :ivar stops: how many drives are stopped by their service on a line of many.
+    :ivar events: how many of each kind have to stop a motor.
+    """
+
+    window: float
+    rounds: int
+    setpoints: int
+    stops: int
+    events: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """
+    One row.
+
+    :ivar table: which tables it stands in; :mod:`page` knows them.
+    :ivar aims: the most that is aimed at, by the name of the figure.
+    """
+
+    table: str
+    what: str
+    baud_rate: int
+    drives: int
+    figures: Figures
+    aims: Figures = field(default_factory=dict)
+
+
+def merged(rows: Sequence[Row]) -> Row:
+    """Return one row for the same row of several runs."""
+    names = dict.fromkeys(name for row in rows for name in row.figures)
+    figures = {
+        name: _merging(name)([row.figures[name] for row in rows if name in row.figures])
+        for name in names
+    }
+    return replace(rows[0], figures=figures)
+
+
+def blamed(rows: Sequence[Row]) -> Row:
+    """Return the last of some rows, with what should never happen and did in the others."""
+    figures = dict(rows[-1].figures)
+    for name in figures.keys() & set(_NEVER):
+        figures[name] = sum(row.figures[name] for row in rows)
+    return replace(rows[-1], figures=figures)
+
+
+def _merging(name: str) -> Callable[[list[float]], float]:
+    if name in _SUMMED:
+        return sum
+    return max if name in _WORST else statistics.median

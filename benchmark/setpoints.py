@@ -1,0 +1,159 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Enabled drives: their cycle, how soon a set-point is on the line, and how soon a stop is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import json
+import statistics
+import subprocess
+from typing import Any
+
+from driver_rig import DriverRig
+from rig import Window
+from row import Effort
+from row import Figures
+from row import Row
+import speed
+import trace_file
+from trace_file import Frame
+
+from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+
+BAUD_RATE = 57600
+DRIVES = (1, 8, 32)
+_MODEL = load_model('sinus_g2')
+_SETPOINT, _SCMD = (
+    _MODEL[key].place(Protocol.MODBUS).address for key in ('status.frq_set', 'fieldbus.scmd')
+)
+#: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real
+#: conveyor; a machine that is busy elsewhere stops no motor.
+_SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 5.0, 'lost_after': 4.0}
+#: One drive that is rarely asked for anything.
+_IDLE = {'poll_rate': 1.0, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
+#: A set-point that is not on the line by then was replaced by a newer one, s.
+_LOST = 1.5
+#: Of the 99th percentile with eight drives, ms; with more, the longest read of a poll beside it.
+_MOST = 10.0
+_TRANSACTION = 6.75
+
+
+def measure_idle(effort: Effort) -> list[Row]:
+    """Return the row of set-points on a line that is idle."""
+    with DriverRig(BAUD_RATE, 1, **_IDLE) as rig:
+        rig.listener.enable_all()
+        figures = _to_wire(rig, effort.setpoints)
+    aims = {'time': 1.0, 'short_gaps': 0.0}
+    return [Row('event', 'set-point to wire, idle', BAUD_RATE, 1, figures, aims)]
+
+
+def measure(drives: int, effort: Effort) -> list[Row]:
+    """Return the rows of a line with enabled drives that is full."""
+    with DriverRig(BAUD_RATE, drives, **_SETTINGS) as rig:
+        rig.listener.enable_all()
+        steady = rig.start_script('publisher.py', '0', *rig.names)
+        rig.wait_for(lambda: _all_follow(rig), steady)
+        rows = [_unchanged(rig, effort), _stops(rig, effort.stops)]
+        rig.end(steady)
+        rig.listener.enable_all()
+        rows.append(_saturated(rig, effort.setpoints))
+    return rows
+
+
+def _all_follow(rig: DriverRig) -> bool:
+    written = trace_file.writes(rig.frames(), _SETPOINT)
+    return len({unit for _, unit, word in written if word}) == rig.drives
+
+
+def _unchanged(rig: DriverRig, effort: Effort) -> Row:
+    """Measure the cycle while the same set-points come again and again."""
+    window = speed.watch(rig, rig.driver, effort)
+    figures = speed.cycles(window, rig)
+    plain = 1e3 * rig.drives * speed.plain_cycle(rig.line)
+    figures.update(plain=plain, plain_ratio=figures['time'] / plain)
+    aims = {'ratio': 1.05, 'plain_ratio': 0.6}
+    return Row('enabled', 'enabled, same set-points', BAUD_RATE, rig.drives, figures, aims)
+
+
+def _saturated(rig: DriverRig, count: int) -> Row:
+    most = _MOST if rig.drives <= 8 else _MOST + _TRANSACTION
+    figures = _to_wire(rig, count)
+    aims = {'p99': most, 'short_gaps': 0.0}
+    return Row('event', 'set-point to wire, saturated', BAUD_RATE, rig.drives, figures, aims)
+
+
+def _stops(rig: DriverRig, count: int) -> Row:
+    """Measure from the call of a stop to its command on the line."""
+    called, window = _done_by(rig, 'stopper.py', count)
+    stops: dict[int, list[float]] = {}
+    for at, unit, word in trace_file.writes(window.frames, _SCMD):
+        if word == Scmd.STOP:
+            stops.setdefault(unit, []).append(at)
+    delays = [next(at for at in stops[drive + 1] if at >= call) - call for call, drive in called]
+    figures = _delay_figures(delays, window, rig)
+    return Row('event', 'service stop', BAUD_RATE, rig.drives, figures, {'beyond': 3.0})
+
+
+def _to_wire(rig: DriverRig, count: int) -> Figures:
+    published, window = _done_by(rig, 'publisher.py', count)
+    delays, lost = _delays(published, window.frames)
+    return {
+        **_delay_figures(delays, window, rig),
+        'short_gaps': trace_file.short_gaps(rig.frames(), rig.line),
+        'lost': lost,
+    }
+
+
+def _done_by(rig: DriverRig, script: str, count: int) -> tuple[list[Any], Window]:
+    """Let another process do something; return what it says of it, and what happened meanwhile."""
+    process = rig.start_script(script, str(count), *rig.names, stdout=subprocess.PIPE)
+    watched_since = rig.begin_watch(rig.driver)
+    assert process.stdout is not None
+    output = process.stdout.readline()
+    if not output:
+        raise RuntimeError(f'{script} failed:\n{rig.log}')
+    window = watched_since()
+    rig.end(process)
+    return json.loads(output), window
+
+
+def _delay_figures(delays: Sequence[float], window: Window, rig: DriverRig) -> Figures:
+    limit = trace_file.longest_transaction(window.frames, rig.line)
+    return {
+        'events': len(delays),
+        'time': 1e3 * statistics.median(delays),
+        'p99': 1e3 * trace_file.percentile(delays, 99),
+        'longest': 1e3 * max(delays),
+        'limit': 1e3 * limit,
+        'beyond': 1e3 * (max(delays) - limit),
+        **window.figures(),
+    }
+
+
+def _delays(
+    published: Sequence[tuple[float, int, float]], frames: list[Frame]
+) -> tuple[list[float], int]:
+    """Return how long each set-point took to the line (s), and how many did not come there."""
+    written: dict[tuple[int, int], list[float]] = {}
+    for at, unit, word in trace_file.writes(frames, _SETPOINT):
+        written.setdefault((unit, word), []).append(at)
+    delays = []
+    for at, drive, value in published:
+        (word,) = _MODEL['status.frq_set'].quantise(value, Protocol.MODBUS)
+        moments = written.get((drive + 1, word), ())
+        delays += [moment - at for moment in moments if at <= moment < at + _LOST][:1]
+    return delays, len(published) - len(delays)

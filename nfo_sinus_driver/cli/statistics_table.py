@@ -1,0 +1,86 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How a line was doing, and each drive on it, for a person and for a script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import dataclasses
+import math
+
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.statistics import Statistics
+
+#: The columns: what stands above, and the width.
+_COLUMNS = (
+    ('', 7),
+    ('used', 5),
+    ('cycle', 8),
+    ('min', 7),
+    ('median', 7),
+    ('p99', 7),
+    ('max', 7),
+    ('requests', 8),
+    ('no answer', 9),
+    ('damaged', 7),
+    ('refused', 7),
+    ('repeated', 8),
+)
+
+
+def statistics_table(session: Session, addresses: Sequence[int]) -> list[str]:
+    """Return the lines of a table: the line, and each drive; round trips and cycle in ms."""
+    rows = [('line', session.statistics())]
+    if len(addresses) > 1:
+        rows += [(f'drive {address}', session.statistics(address)) for address in addresses]
+    cells = [[name for name, _ in _COLUMNS], *(_cells(name, figures) for name, figures in rows)]
+    return [_row(row) for row in cells]
+
+
+def as_facts(figures: Statistics) -> dict[str, float | int | None]:
+    """Return figures for JSON, which has no NaN; the names are those of BusStatistics."""
+    return {
+        name: None if math.isnan(value) else value
+        for name, value in dataclasses.asdict(figures).items()
+    }
+
+
+def _cells(name: str, figures: Statistics) -> list[str]:
+    times = (
+        figures.cycle_time,
+        figures.round_trip_min,
+        figures.round_trip_median,
+        figures.round_trip_p99,
+        figures.round_trip_max,
+    )
+    counts = (
+        figures.transactions,
+        figures.timeouts,
+        figures.damaged,
+        figures.refused,
+        figures.retries,
+    )
+    share = f'{100 * figures.utilisation:.0f} %'
+    return [name, share, *map(_milliseconds, times), *map(str, counts)]
+
+
+def _milliseconds(seconds: float) -> str:
+    return '-' if math.isnan(seconds) else f'{1000 * seconds:.1f}'
+
+
+def _row(cells: list[str]) -> str:
+    first, *others = zip(cells, _COLUMNS, strict=True)
+    left = f'{first[0]:<{first[1][1]}}'
+    return '  '.join((left, *(f'{cell:>{width}}' for cell, (_, width) in others)))

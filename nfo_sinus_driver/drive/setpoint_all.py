@@ -1,0 +1,142 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One set-point for all drives of a Classic line, by one broadcast [M0 §6.1.4]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+import dataclasses
+import math
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Slot
+from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.broadcast import EVERYBODY
+from nfo_sinus_driver.drive.broadcast import can_broadcast
+from nfo_sinus_driver.drive.setpoint import Request
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.link import LinkError
+
+_NO_BROADCAST = (
+    'only the Classic protocol has set-points for all drives at once: publish to ~/setpoint of each'
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Told:
+    """
+    What a person should know of set-points for all; each is ``''`` if there is nothing to say.
+
+    :ivar refused: why nobody follows them.
+    :ivar limited: that they are limited, and why.
+    """
+
+    refused: str = ''
+    limited: str = ''
+
+
+class SetpointAll:
+    """
+    What all drives of a line are to follow.
+
+    Every drive obeys a broadcast, and none confirms it. So it is sent only where all of them are
+    enabled here and it means the same to each; it is a request to each drive as one of its own, of
+    which the newest counts; and each is asked afterwards whether it took it.
+
+    :param setpoints: the set-points of all drives of the line, by name.
+    :param tell: called on the bus after each request.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        setpoints: Callable[[], Mapping[str, Setpoint]],
+        tell: Callable[[Told], None],
+    ) -> None:
+        self._bus = bus
+        self._setpoints = setpoints
+        self._tell = tell
+        self._slot = Slot(self._make, self._done)
+        #: The newest request; written by any thread, at once.
+        self._request = Request(math.nan, -math.inf)
+
+    def request(self, value: float) -> None:
+        """
+        Ask for a set-point, from any thread.
+
+        :raises ValueError: not finite.
+        """
+        if not math.isfinite(value):
+            raise ValueError(f'a set-point of {value} is no number')
+        self._request = Request(value, time.monotonic())
+        self._bus.request(self._slot)
+
+    def _make(self) -> Transfer | None:
+        setpoints = self._setpoints()
+        refused = self._why_not(setpoints)
+        if refused:
+            self._tell(Told(refused=refused))
+            return None
+        if not all(setpoint.counts(self._request) for setpoint in setpoints.values()):
+            return None
+        name, least = min(setpoints.items(), key=lambda item: item[1].most)
+        request = self._request._replace(most=least.most)
+        self._tell(Told(limited=_limited(request, name)))
+        members = tuple(setpoints.values())
+        if not all(setpoint.is_newest(request) for setpoint in members):
+            # one of them was asked for something else since: it must not be given this any more
+            for setpoint in members:
+                setpoint.follow(request)
+            return None
+        for setpoint in members:
+            setpoint.take(request)
+        address, words = members[0].words(request)
+        if not any(setpoint.needs(words) for setpoint in members):
+            return None
+        return self._bus.write(EVERYBODY, address, words, Priority.SETPOINT)
+
+    def _done(self, transfer: Transfer, error: LinkError | None) -> None:
+        for setpoint in self._setpoints().values():
+            if error is None:
+                assert transfer.words is not None
+                setpoint.was_told(transfer.words)
+            else:
+                setpoint.was_missed(error)
+
+    def _why_not(self, setpoints: Mapping[str, Setpoint]) -> str:
+        if not can_broadcast(self._bus):
+            return _NO_BROADCAST
+        for name, setpoint in setpoints.items():
+            if setpoint.why_not_shared:
+                return f'{name} {setpoint.why_not_shared}'
+        meanings = {setpoint.quantity: name for name, setpoint in setpoints.items()}
+        if len(meanings) > 1:
+            told = ', '.join(
+                f'{name}: {" ".join(quantity).strip()}' for quantity, name in meanings.items()
+            )
+            return f'it would not mean the same to all drives ({told})'
+        return ''
+
+
+def _limited(request: Request, name: str) -> str:
+    if abs(request.value) <= request.most:
+        return ''
+    return (
+        f'{request.value:g} is limited to {math.copysign(request.most, request.value):g}, '
+        f'the least that a drive allows ({name})'
+    )

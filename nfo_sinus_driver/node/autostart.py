@@ -1,0 +1,77 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Configures and activates a drive node by itself, and tries until it works."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import logging
+import threading
+
+_log = logging.getLogger(__name__)
+
+#: How long it rests after a try that failed, at first and at last, s: meanwhile an operator may
+#: have the lifecycle, and the drives that do answer have the bus.
+_REST = 1.0
+_LONGEST_REST = 4.0
+
+
+class Autostart:
+    """
+    Tries to start one drive, on a thread that ends when the drive has started.
+
+    A try waits for the bus; so every drive has a thread, and all of them are looked for at once.
+
+    :param attempt: tries once; returns whether the drive has started.
+    """
+
+    def __init__(self, name: str, attempt: Callable[[], bool]) -> None:
+        self._attempt = attempt
+        self._over = threading.Event()
+        self._thread = threading.Thread(
+            target=self._work, name=f'autostart of {name}', daemon=True
+        )
+
+    def start(self) -> None:
+        """Begin to try."""
+        self._thread.start()
+
+    @property
+    def trying(self) -> bool:
+        """This thread is the one that tries."""
+        return threading.current_thread() is self._thread
+
+    @property
+    def over(self) -> bool:
+        """It does not try any more."""
+        return self._over.is_set()
+
+    def give_up(self) -> None:
+        """Do not try any more; a try that is under way goes on."""
+        self._over.set()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end of the thread after :meth:`give_up`, but not for ever (s)."""
+        if self._thread.is_alive():
+            self._thread.join(timeout)
+
+    def _work(self) -> None:
+        rest = 0.0
+        while not self._over.wait(rest):
+            rest = min(rest + _REST, _LONGEST_REST)
+            try:
+                if self._attempt():
+                    self.give_up()
+            except Exception:
+                _log.exception('error in an autostart; it is tried again')

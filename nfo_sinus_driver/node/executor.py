@@ -1,0 +1,122 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Who serves one node: its thread sleeps until something is asked of the node, and of no other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+import logging
+import threading
+import time
+
+from rclpy.executors import ConditionReachedException
+from rclpy.executors import Executor
+from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ShutdownException
+from rclpy.executors import TimeoutException
+from rclpy.node import Node
+from rclpy.task import Task
+
+_log = logging.getLogger(__name__)
+
+#: What rclpy raises when there is nothing to run.
+_NOTHING = (
+    ConditionReachedException, ExternalShutdownException, ShutdownException, TimeoutException
+)
+
+
+class NodeExecutor(Executor):
+    """
+    Runs the callbacks of one node, each on a thread of a pool.
+
+    An executor of rclpy looks through everything of all its nodes before it waits again. This has
+    one node, so that a call to one drive costs the same however many there are, and no time-out,
+    so that nothing is looked through while nobody asks.
+
+    :param threads: how many callbacks may be waiting for something at once.
+    """
+
+    def __init__(self, node: Node, threads: int) -> None:
+        super().__init__()
+        name = f'executor of {node.get_name()}'
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix=name)
+        self._ending = False
+        self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
+        self.add_node(node)
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        """The thread works."""
+        return self._thread.is_alive()
+
+    def end(self) -> None:
+        """Begin nothing any more."""
+        self._ending = True
+        self.wake()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the end of the thread after :meth:`end`, but not for ever."""
+        self._thread.join(timeout)
+
+    def finish(self) -> None:
+        """Wait for the callbacks that run."""
+        self._pool.shutdown()
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Wait for one callback and begin it, as every executor does."""
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, self._is_ending)
+        except _NOTHING:
+            return
+        begun = threading.Event()
+        self._pool.submit(_run, task, begun)
+        # until then rclpy would hand out the same again and again
+        begun.wait()
+
+    def _is_ending(self) -> bool:
+        return self._ending
+
+    def _serve(self) -> None:
+        while not self._ending:
+            try:
+                self.spin_once()
+            except Exception:
+                _log.exception('error in an executor; it goes on')
+
+
+def _run(task: Task, begun: threading.Event) -> None:
+    begun.set()
+    task()
+    error = task.exception()
+    if error is not None:
+        # a mistake in one callback must not take the others with it
+        _log.error('error in a callback; the driver goes on', exc_info=error)
+
+
+def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
+    """Let callbacks end before what they use is destroyed, but not for ever (s)."""
+    executors = list(executors)
+    for executor in executors:
+        executor.end()
+    deadline = time.monotonic() + timeout
+    for executor in executors:
+        executor.join(max(0.0, deadline - time.monotonic()))
+    waiter = threading.Thread(target=lambda: [one.finish() for one in executors], daemon=True)
+    waiter.start()
+    waiter.join(timeout)

@@ -1,0 +1,166 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Thirty-two drives on one line: they do what one does, and cost no more than the line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import signal
+import sys
+import time
+
+from bench import A_WHILE
+from bench import PATIENCE
+from bench import Bench
+from bench import holds_for
+from bench import wait_until
+from diagnostic_msgs.msg import DiagnosticArray
+from nfo_sinus_msgs.msg import DriveStatus
+from std_msgs.msg import Float32
+from ways import needs
+
+#: By address.
+NAMES = {address: f'conveyor_{address:02}' for address in range(1, 33)}
+_COUNTING = str(Path(__file__).with_name('counting_driver.py'))
+#: So few that neither the line nor the processors are what is tested.
+_RARE = (
+    '-p', 'poll_rate:=2.0', '-p', 'telemetry_rate:=0.0', '-p', 'setpoint_timeout:=0.0',
+)
+#: For how long an idle driver is watched, s, and how often it may be woken meanwhile.
+_WATCHED = 10.0
+_WAKE_UPS = 20
+#: All parameters of all drives are read first, which takes as long as the machine makes it, s.
+_START = 3 * PATIENCE
+#: A read, and SCMD = Stop, by Modbus.
+_READ = '03'
+_STOP = '0602980000'
+
+
+class Conveyor:
+    """A driver with all these drives, and somebody who sees and commands them."""
+
+    def __init__(self, bench: Bench, through: tuple[str, ...] = ()) -> None:
+        self.simulator = bench.simulator(
+            '--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0',
+            *(f'--address={address}' for address in NAMES),
+            paced=False,
+        )
+        parameters = bench.folder / 'conveyor.yaml'
+        parameters.write_text('\n'.join((
+            f'nfo_sinus_bus: {{ros__parameters: {{drives: [{", ".join(NAMES.values())}]}}}}',
+            *(f'{name}: {{ros__parameters: {{address: {at}}}}}' for at, name in NAMES.items()),
+        )))
+        self.driver = bench.driver('--params-file', str(parameters), *_RARE, through=through)
+        self.client = bench.client('/nfo_sinus_bus')
+        self.states: dict[str, str] = {}
+        self.status: dict[int, DriveStatus] = {}
+        node = self.client.node
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+        for address, name in NAMES.items():
+            node.create_subscription(
+                DriveStatus,
+                f'/{name}/status',
+                lambda status, address=address: self.status.update({address: status}),
+                10,
+            )
+        self._setpoints = [node.create_publisher(Float32, f'/{name}/setpoint', 1)
+                           for name in NAMES.values()]
+        wait_until(
+            lambda: list(self.states.values()).count('active') == len(NAMES),
+            'all are active', timeout=_START,
+        )
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            for one in status.values:
+                if one.key == 'lifecycle state':
+                    self.states[status.name] = one.value
+
+    def all_but(self, *others: int) -> Callable[[], bool]:
+        """Return what tells whether all drives but some follow their set-point of 20 Hz."""
+        return lambda: all(
+            status.enabled and abs(status.actual - 20.0) < 1.0
+            for address, status in self.status.items()
+            if address not in others
+        )
+
+    def run(self) -> None:
+        """Enable all, and have them turn."""
+        answer = self.client.call('enable_all')
+        assert answer.success, answer.message
+        assert answer.message.count(': enabled') == len(NAMES)
+        wait_until(
+            lambda: all(one.get_subscription_count() for one in self._setpoints),
+            'somebody listens to each', period=0.1,
+        )
+        for publisher in self._setpoints:
+            publisher.publish(Float32(data=20.0))
+        wait_until(self.all_but(), 'all follow', period=0.1)
+
+    def turning(self) -> set[int]:
+        """Return whose motors turn."""
+        return {at for at in NAMES if self.simulator.state(at)['turning']}
+
+
+@needs('rtu')
+def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:
+    conveyor = Conveyor(bench)
+    conveyor.run()
+    faulty, unplugged = 7, 23
+    conveyor.simulator.inject('fault', 5, address=faulty)
+    wait_until(lambda: not conveyor.status[faulty].enabled, 'its fault has stopped it')
+    holds_for(A_WHILE, conveyor.all_but(faulty), 'the others follow')
+    conveyor.simulator.inject('silence', 3600.0, address=unplugged)
+    wait_until(lambda: not conveyor.status[unplugged].connected, 'it is lost')
+    holds_for(A_WHILE, conveyor.all_but(faulty, unplugged), 'the others follow')
+    answer = conveyor.client.call('stop_all')
+    assert not answer.success
+    assert answer.message.startswith(f'{NAMES[unplugged]}: the stop is NOT confirmed')
+    assert answer.message.count(': stopping') == len(NAMES) - 2
+    wait_until(lambda: conveyor.turning() <= {unplugged}, 'all that hear it stand', period=0.5)
+
+    conveyor.simulator.inject('silence', 0.0, address=unplugged)
+    wait_until(lambda: not conveyor.turning(), 'it is stopped as soon as it answers', period=0.5)
+    wait_until(lambda: conveyor.status[unplugged].connected, 'it is back')
+    assert conveyor.client.call(f'/{NAMES[faulty]}/fault_ack').success
+    conveyor.run()
+    before = len(bench.requests())
+    conveyor.driver.signal(signal.SIGTERM)
+    assert conveyor.driver.wait() == 0, conveyor.driver.text
+    assert not conveyor.turning()
+    requests = bench.requests()[before:]
+    stops = {address: requests.index(f'{address:02x}{_STOP}') for address in NAMES}
+    told = requests[min(stops.values()) : max(stops.values())]
+    assert not [request for request in told if request[2:4] == _READ], 'one was asked before all'
+
+
+@needs('rtu')
+def test_an_idle_process_sleeps(bench: Bench) -> None:
+    wakes = bench.folder / 'wakes'
+    conveyor = Conveyor(bench, through=(sys.executable, _COUNTING, str(wakes)))
+    counts = [0]
+
+    def settled() -> bool:
+        counts.append(wakes.stat().st_size)
+        return counts[-1] == counts[-2]
+
+    # what came by the start is over
+    wait_until(settled, 'nothing wakes it for a second', timeout=_WATCHED, period=1.0)
+    time.sleep(_WATCHED)
+    woken = wakes.stat().st_size - counts[-1]
+    assert woken < _WAKE_UPS
+    # and whoever asks wakes it all the same
+    assert conveyor.client.call(f'/{NAMES[1]}/stop').success
+    assert wakes.stat().st_size > counts[-1] + woken

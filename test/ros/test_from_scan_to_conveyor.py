@@ -1,0 +1,211 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Several drives of one line: found, started, commanded together, added and taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
+import subprocess
+import sys
+import threading
+import time
+
+from bench import A_WHILE
+from bench import PATIENCE
+from bench import Bench
+from bench import Client
+from bench import holds_for
+from bench import wait_until
+from lifecycle_msgs.msg import Transition
+import pytest
+from std_msgs.msg import Float32
+from ways import needs
+
+_COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+_ADDRESSES = ('--address', '1', '--address', '2', '--address', '3')
+_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
+_THREE = """
+nfo_sinus_bus: {{ros__parameters: {{drives: [infeed, middle, outfeed]}}}}
+infeed: {{ros__parameters: {{address: 1}}}}
+middle: {{ros__parameters: {{address: 2}}}}
+outfeed: {{ros__parameters: {{address: 3, {third}}}}}
+"""
+
+
+def start(bench: Bench, third: str = 'telemetry_rate: 2.0') -> tuple:
+    """Start three drives and the driver; return the simulator and a client of each drive."""
+    simulator = bench.simulator(*_ADDRESSES, *_QUICK)
+    parameters = bench.folder / 'three.yaml'
+    parameters.write_text(_THREE.format(third=third))
+    bench.driver('--params-file', str(parameters))
+    clients = [bench.client(name).connected() for name in ('/infeed', '/middle', '/outfeed')]
+    return simulator, clients
+
+
+def frequencies(simulator) -> list[int]:
+    return [round(simulator.state(address)['frequency']) for address in (1, 2, 3)]
+
+
+@contextlib.contextmanager
+def setpoints_for_all(client: Client, value: float) -> Iterator[None]:
+    """Publish a set-point for all drives over and over."""
+    publisher = client.node.create_publisher(Float32, '/nfo_sinus_bus/setpoint_all', 1)
+    wait_until(publisher.get_subscription_count, 'somebody listens')
+    ended = threading.Event()
+
+    def publish() -> None:
+        while not ended.wait(0.1):
+            publisher.publish(Float32(data=value))
+
+    thread = threading.Thread(target=publish, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def to_all(bench: Bench) -> list[str]:
+    """Every set-point that was told to all drives, as it stands in the frame."""
+    frames = [bytes.fromhex(frame['hex']) for frame in bench.frames()]
+    return [frame[9:13].decode() for frame in frames if frame.startswith(b'\x04\x7f\x02E001E=')]
+
+
+@pytest.mark.every_way
+@needs('classic')
+def test_one_message_moves_the_whole_line(bench: Bench) -> None:
+    simulator, clients = start(bench)
+    assert bench.client('/nfo_sinus_bus').call('enable_all').success
+    with setpoints_for_all(clients[0], 20.0):
+        wait_until(lambda: frequencies(simulator) == [20, 20, 20], 'all turn')
+        for client in clients:
+            client.wait_for('status', lambda status: status.setpoint == 20.0, 'each says so')
+        assert set(to_all(bench)) == {'00C8'}
+        holds_for(A_WHILE, lambda: frequencies(simulator) == [20, 20, 20], 'they turn on')
+        # one of them is stopped, and set-points for all are refused from then on
+        assert clients[1].call('stop').success
+        wait_until(lambda: 'setpoint_all refused: middle is not enabled' in bench.log, 'the reason')
+        told = len(to_all(bench))
+        wait_until(lambda: frequencies(simulator) == [0, 0, 0], 'the others had none since')
+        assert len(to_all(bench)) == told
+    assert bench.log.count('setpoint_all refused') <= 2
+    with setpoints_for_all(clients[0], float('nan')):
+        wait_until(lambda: 'setpoint_all nan ignored' in bench.log, 'no number')
+
+
+@pytest.mark.every_way
+@needs('classic')
+def test_no_set_point_for_all_where_one_is_only_watched(bench: Bench) -> None:
+    simulator, clients = start(bench, third='control_method: monitor')
+    assert bench.client('/nfo_sinus_bus').call('enable_all').success
+    with setpoints_for_all(clients[0], 20.0):
+        wait_until(lambda: 'setpoint_all refused: outfeed is only monitored' in bench.log, 'why')
+    assert to_all(bench) == []
+    assert simulator.state(3)['writes'] == {}
+
+
+@needs('rtu')
+def test_no_set_point_for_all_without_a_broadcast(bench: Bench) -> None:
+    simulator, clients = start(bench)
+    assert bench.client('/nfo_sinus_bus').call('enable_all').success
+    with setpoints_for_all(clients[0], 20.0):
+        wait_until(lambda: 'setpoint_all refused: only the Classic protocol' in bench.log, 'why')
+        with clients[1].setpoints(15.0):
+            wait_until(lambda: frequencies(simulator) == [0, 15, 0], 'its own does it')
+
+
+@needs('rtu', 'classic')
+def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
+    simulator = bench.simulator(*_ADDRESSES, *_QUICK)
+    file = bench.folder / 'found.yaml'
+    protocol = ('--protocol', bench.way.protocol)
+    done = subprocess.run(
+        [*_COMMAND, 'scan', '--port', bench.port, *protocol, '--addresses', '1-4',
+         '--response-timeout', '2.0', '--params', str(file)],
+        capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    bench.bare_driver('--params-file', str(file))
+    for address in (1, 2, 3):
+        client = bench.client(f'/drive_{address}').connected()
+        assert client.parameter('address') == address
+    everybody = bench.client('/nfo_sinus_bus')
+    assert everybody.call('enable_all').success
+    with bench.client('/drive_2').setpoints(20.0):
+        wait_until(lambda: frequencies(simulator) == [0, 20, 0], 'the second turns')
+    assert 'unknown' not in bench.log and 'no such parameter' not in bench.log
+
+
+@needs('rtu')
+def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
+    file = Path(__file__).resolve().parents[2] / 'config' / 'conveyor_32.yaml'
+    missing = bench.folder / 'missing'
+    bench.bare_driver('--params-file', str(file), '-p', f'port:={missing}')
+    client = bench.client('/nfo_sinus_bus')
+    names = {f'section_{number:02}: drive' for number in range(1, 33)}
+    seen: dict[str, dict[str, str]] = {}
+
+    def all_there() -> bool:
+        for message in client.messages['diagnostics']:
+            for status in message.status:
+                seen[status.name] = {one.key: one.value for one in status.values}
+        return names <= seen.keys()
+
+    wait_until(all_there, 'every drive has a node', timeout=3 * PATIENCE)
+    assert {int(seen[name]['address']) for name in names} == set(range(1, 33))
+    assert 'nobody knows' not in bench.log and 'is no parameter' not in bench.log
+
+
+@pytest.mark.every_way
+@needs('rtu')
+def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -> None:
+    simulator, (infeed, middle, outfeed) = start(bench)
+
+    def turn_on() -> bool:
+        return all(
+            client.latest('status').enabled and abs(client.latest('status').actual - 20.0) < 1.0
+            for client in (infeed, outfeed)
+        )
+
+    with infeed.run_at(20.0), outfeed.run_at(20.0), middle.run_at(20.0):
+        for _ in range(2):
+            assert middle.change_state(Transition.TRANSITION_DEACTIVATE)
+            assert turn_on()
+            assert middle.change_state(Transition.TRANSITION_CLEANUP)
+            assert middle.state() == 'unconfigured'
+            wait_until(lambda: not simulator.state(2)['driven'], 'it stands')
+            assert simulator.state(2)['source'] == 'stop'
+            asked = sum(request.startswith('02') for request in bench.requests())
+            holds_for(A_WHILE, turn_on, 'the others follow')
+            # it is left alone altogether, as one that somebody takes off the line
+            assert sum(request.startswith('02') for request in bench.requests()) == asked
+            simulator.inject('silence', 3600.0, address=2)
+            assert not middle.change_state(Transition.TRANSITION_CONFIGURE)
+            assert turn_on()
+            simulator.inject('silence', 0.0, address=2)
+            assert middle.change_state(Transition.TRANSITION_CONFIGURE)
+            assert middle.change_state(Transition.TRANSITION_ACTIVATE)
+            # its set-points flow on, and nothing turns before it is enabled
+            before = time.monotonic()
+            wait_until(lambda: time.monotonic() > before + 0.5, 'some of them')
+            assert not simulator.state(2)['turning']
+            assert middle.enable().success
+            wait_until(lambda: frequencies(simulator) == [20, 20, 20], 'all turn')
+            assert turn_on()
+    ends = [line for line in bench.log.splitlines() if 'infeed' in line or 'outfeed' in line]
+    assert not [line for line in ends if 'stopp' in line or 'lost' in line or 'no set-point' in line]

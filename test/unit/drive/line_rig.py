@@ -1,0 +1,217 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver of several drives over a real link, in virtual time, with their simulated drives."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import Future
+import contextlib
+import heapq
+import itertools
+from typing import Any
+from unittest import mock
+
+from any_order_rig import Clock
+from noise_rig import TimedNotes
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.simulator import drive as simulated
+from nfo_sinus_driver.simulator.classic import Classic
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
+
+_TURNAROUND = 0.002
+#: The longest step in which nobody looks at anything, s.
+_SLICE = 0.02
+#: How often a program sends its set-points, s.
+_SENDING_PERIOD = 0.1
+_CLASSIC_FORMAT = '7E1'
+
+
+class Line:
+    """
+    A serial port with the simulated drives behind it; whole frames come in one piece.
+
+    :ivar frames: every request, and when its last byte was sent.
+    :ivar unplugged: the addresses of the drives that nobody reaches.
+    :ivar lost: called with each request and a drive that would hear it; true: it does not.
+    """
+
+    def __init__(self, rig: LineRig, settings: LineSettings, protocol: ModbusRtu | Classic) -> None:
+        self._rig = rig
+        self._settings = settings
+        self._protocol = protocol
+        #: Frames by the moment of their last byte; those to the drives, and those from them.
+        self._coming: list[tuple[float, int, bool, bytes]] = []
+        self._order = itertools.count()
+        self.frames: list[tuple[float, bytes]] = []
+        self.unplugged: set[int] = set()
+        self.lost: Callable[[bytes, SimulatedDrive], bool] = lambda frame, far: False
+
+    def open(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self._coming.clear()
+
+    def write(self, data: bytes) -> None:
+        end = self._rig.clock.now + len(data) * self._settings.char_time
+        self.frames.append((end, data))
+        heapq.heappush(self._coming, (end, next(self._order), True, data))
+
+    def read(self, until: float) -> bytes:
+        clock = self._rig.clock
+        while self._coming and self._coming[0][0] <= max(until, clock.now):
+            at, _, to_drives, frame = heapq.heappop(self._coming)
+            clock.now = max(at, clock.now)
+            if not to_drives:
+                return frame
+            self._carry_out(frame)
+        clock.now = max(until, clock.now)
+        return b''
+
+    def _carry_out(self, frame: bytes) -> None:
+        request = self._protocol.unwrap(frame)
+        assert request is not None
+        for address, far in self._rig.fars.items():
+            if address in self.unplugged or not self._protocol.concerns(far, request):
+                continue
+            far.advance_to(self._rig.clock.now)
+            if not far.listening or self.lost(frame, far):
+                continue
+            far.heard()
+            answer = self._protocol.answer(far, request)
+            if answer:
+                begin = self._rig.clock.now + _TURNAROUND
+                end = begin + len(answer) * self._settings.char_time
+                heapq.heappush(self._coming, (end, next(self._order), False, answer))
+
+
+class LineRig:
+    """
+    The driver, the line and its drives at the addresses from 1 on.
+
+    :param settings: of every drive, as the driver has them.
+    :ivar fars: the simulated drives by address.
+    :ivar drives: the driver's, by address.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        *,
+        protocol: str = 'modbus_rtu',
+        baud: int = 57600,
+        parameters: dict[str, Any] | None = None,
+        own: dict[int, dict[str, Any]] | None = None,
+        **settings: Any,
+    ) -> None:
+        self.clock = Clock()
+        self._stack = contextlib.ExitStack()
+        self._stack.enter_context(self.clock.in_driver())
+        # the motors need not be exact here, and the time is long
+        self._stack.enter_context(mock.patch.object(simulated, '_STEP', 0.05))
+        classic = protocol == 'classic'
+        line = LineSettings(baud, _CLASSIC_FORMAT) if classic else LineSettings(baud_rate=baud)
+        self.fars = {
+            address: SimulatedDrive(
+                address=address,
+                settings={'control.accel': 0.5, 'control.retard': 0.5, **(parameters or {})},
+            )
+            for address in range(1, count + 1)
+        }
+        for far in self.fars.values():
+            far.advance_to(self.clock.now)
+        self.line = Line(self, line, Classic() if classic else ModbusRtu())
+        self.bus = Bus(ClassicLink(self.line, line) if classic else RtuLink(self.line, line))
+        self.notes = {address: TimedNotes(self.clock) for address in self.fars}
+        self.drives = {
+            address: Drive(
+                self.bus,
+                DriveSettings(**{'address': address, **settings, **(own or {}).get(address, {})}),
+                self.notes[address],
+            )
+            for address in self.fars
+        }
+        self._program: Callable[[], None] = lambda: None
+        self._program_at = 0.0
+
+    def close(self) -> None:
+        self.bus.close()
+        self._stack.close()
+
+    def connect(self) -> None:
+        """Connect to all drives and activate them."""
+        for future in [drive.connect() for drive in self.drives.values()]:
+            self.answer(future)
+        for drive in self.drives.values():
+            drive.activate()
+        self.pass_time(0.5)
+
+    def enable(self, *addresses: int) -> None:
+        """Enable some drives, or all."""
+        chosen = addresses or tuple(self.drives)
+        for future in [self.drives[address].enable() for address in chosen]:
+            assert 'enabled' in self.answer(future)
+
+    def keep(self, program: Callable[[], None]) -> None:
+        """Have a program do something again and again, as one that sends set-points."""
+        self._program, self._program_at = program, self.clock.now
+
+    def give_all(self, value: float) -> None:
+        """Give each drive a set-point of its own."""
+        for drive in self.drives.values():
+            drive.set_setpoint(value)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for all."""
+        end = self.clock.now + seconds
+        while self.clock.now < end:
+            if self.clock.now >= self._program_at:
+                self._program_at = self.clock.now + _SENDING_PERIOD
+                self._program()
+            until = min(self.bus.step(), end, self.clock.now + _SLICE)
+            self.clock.now = max(until, self.clock.now)
+        for far in self.fars.values():
+            far.advance_to(self.clock.now)
+
+    def answer(self, future: Future[Any], patience: float = 60.0) -> str:
+        """Let time pass until a command is answered; return what it says, done or not."""
+        end = self.clock.now + patience
+        while not future.done():
+            assert self.clock.now < end, 'no answer'
+            self.pass_time(_SLICE)
+        return str(future.exception() or future.result())
+
+    def polls(self, seconds: float) -> Counter[int]:
+        """Let time pass; return how many statuses of each drive were told meanwhile."""
+        before = {address: len(notes.published) for address, notes in self.notes.items()}
+        self.pass_time(seconds)
+        return Counter(
+            {
+                address: len(notes.published) - before[address]
+                for address, notes in self.notes.items()
+            }
+        )
+
+
+MakeLine = Callable[..., LineRig]

@@ -1,0 +1,141 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is done by the clock: when it becomes due, and that nothing keeps it from coming again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import threading
+import time
+
+import pytest
+
+from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.schedule import Schedule
+
+#: Far longer than anything here takes, s.
+PATIENCE = 20.0
+
+
+def due(schedule: Schedule, now: float) -> int:
+    """Run all that is due; return how much it was."""
+    count = 0
+    while (function := schedule.take_due(now)) is not None:
+        function()
+        count += 1
+    return count
+
+
+def test_nothing_is_ever_due_where_nothing_was_added() -> None:
+    schedule = Schedule()
+    assert schedule.next_moment == math.inf
+    assert schedule.take_due(1e9) is None
+
+
+def test_each_comes_once_in_its_own_period() -> None:
+    schedule = Schedule()
+    calls: list[str] = []
+    schedule.add(100.0, 1.0, lambda: calls.append('each second'))
+    schedule.add(100.0, 0.25, lambda: calls.append('often'))
+    now = 100.0
+    while now < 110.0:
+        assert schedule.next_moment > now
+        now = schedule.next_moment
+        assert due(schedule, now) >= 1
+    # the next moment was the first beyond
+    assert calls.count('each second') in (10, 11)
+    assert calls.count('often') in (40, 41)
+
+
+def test_nothing_comes_at_once_but_all_within_the_first_period() -> None:
+    schedule = Schedule()
+    for _ in range(33):
+        schedule.add(5.0, 1.0, lambda: None)
+    assert due(schedule, 5.0) == 0
+    assert due(schedule, 6.0) == 33
+
+
+def test_those_of_many_drives_do_not_come_together() -> None:
+    schedule = Schedule()
+    for _ in range(33):
+        schedule.add(0.0, 1.0, lambda: None)
+    most = 0
+    for step in range(1, 101):
+        most = max(most, due(schedule, step / 100))
+    assert most <= 2
+
+
+def test_what_is_late_comes_once_and_in_its_old_rhythm() -> None:
+    schedule = Schedule()
+    schedule.add(0.0, 1.0, lambda: None)
+    assert schedule.next_moment == pytest.approx(1.0)
+    # the machine slept
+    assert due(schedule, 61.5) == 1
+    assert schedule.next_moment == pytest.approx(62.0)
+
+
+@pytest.fixture
+def outbox() -> Iterator[Outbox]:
+    outbox = Outbox()
+    outbox.start()
+    yield outbox
+    outbox.close()
+
+
+def test_the_outbox_does_both_what_is_put_in_and_what_is_due(outbox: Outbox) -> None:
+    came = threading.Semaphore(0)
+    outbox.put_every(0.02, came.release)
+    for _ in range(5):
+        assert came.acquire(timeout=PATIENCE)
+    put = threading.Event()
+    outbox.put(put.set)
+    assert put.wait(PATIENCE)
+
+
+def test_what_raises_keeps_nothing_back(
+    outbox: Outbox, caplog: pytest.LogCaptureFixture
+) -> None:
+    came = threading.Semaphore(0)
+
+    def raises() -> None:
+        came.release()
+        raise ValueError('oops')
+
+    outbox.put_every(0.02, raises)
+    for _ in range(3):
+        assert came.acquire(timeout=PATIENCE)
+    assert outbox.alive
+    assert 'oops' in caplog.text
+
+
+def test_it_sleeps_while_there_is_nothing_to_do(outbox: Outbox) -> None:
+    ready = threading.Event()
+    outbox.put(ready.set)
+    assert ready.wait(PATIENCE)
+    clock = time.pthread_getcpuclockid(outbox._thread.ident)  # type: ignore[arg-type]
+    before = time.clock_gettime(clock)
+    time.sleep(1.0)
+    assert time.clock_gettime(clock) - before < 0.1
+
+
+def test_it_ends_with_what_is_waiting_and_without_what_is_not_due() -> None:
+    outbox = Outbox()
+    done: list[str] = []
+    outbox.put_every(3600.0, lambda: done.append('in an hour'))
+    outbox.put(lambda: done.append('waiting'))
+    outbox.start()
+    outbox.close()
+    assert not outbox.alive
+    assert done == ['waiting']
