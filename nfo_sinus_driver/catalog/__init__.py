@@ -27,7 +27,6 @@ from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
-from nfo_sinus_driver.catalog.parameter import Protocol
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Kind
@@ -37,13 +36,7 @@ from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord
 from nfo_sinus_driver.catalog.table import CatalogError
 
-#: Old names, until who uses them asks the family.
-Model = Family
-load_model = load_family
-MODELS = families()
-
 __all__ = [
-    'MODELS',
     'Access',
     'Address',
     'CatalogError',
@@ -52,10 +45,8 @@ __all__ = [
     'Family',
     'Kind',
     'Meaning',
-    'Model',
     'Number',
     'Parameter',
-    'Protocol',
     'State',
     'StatusCode',
     'StatusWord',
@@ -64,7 +55,6 @@ __all__ = [
     'codec_of',
     'families',
     'load_family',
-    'load_model',
     'to_bytes',
     'to_words',
 ]

@@ -39,13 +39,6 @@ from nfo_sinus_driver.catalog.codec import to_words
 Value = bool | int | float | str
 
 
-class Protocol(str, enum.Enum):
-    """The two ways a parameter is addressed on the drive's own serial port."""
-
-    MODBUS = 'modbus'
-    CLASSIC = 'classic'
-
-
 class Access(enum.Enum):
     """What the bus may do with a parameter."""
 
@@ -97,10 +90,6 @@ class Address:
     def numbers(self) -> tuple[int, ...]:
         """The index, and the sub-index where there is one."""
         return (self.index,) if self.sub_index is None else (self.index, self.sub_index)
-
-    # old names, until the link knows addresses
-    address = property(lambda self: self.index)
-    addresses = numbers
 
     @property
     def words(self) -> int:
@@ -175,12 +164,7 @@ class Parameter:
         """Firmware that [M2] describes has it too; asking such a drive for others is a fault."""
         return 'M2' in self.source
 
-    @functools.cached_property
-    def places(self) -> Mapping[Protocol, Address]:
-        """Where it stands on the drive's own serial port."""
-        return {p: self.addresses[p] for p in Protocol if p in self.addresses}
-
-    def place(self, protocol: str) -> Address:
+    def at(self, protocol: str) -> Address:
         """
         Return where it stands on ``protocol``.
 
@@ -189,14 +173,13 @@ class Parameter:
         try:
             return self.addresses[protocol]
         except KeyError:
-            name = protocol.value if isinstance(protocol, Protocol) else protocol
-            raise KeyError(f'{self.key} cannot be reached over {name}') from None
+            raise KeyError(f'{self.key} cannot be reached over {protocol}') from None
 
     def factor(self, protocol: str) -> Fraction:
         """Return the value of one raw count over ``protocol``, in :attr:`unit`."""
-        return self.place(protocol).factor
+        return self.at(protocol).factor
 
-    def decode(self, words: Sequence[int], protocol: str = Protocol.MODBUS) -> Value:
+    def decode(self, words: Sequence[int], protocol: str = 'modbus') -> Value:
         """
         Turn the words read from the drive into a value in :attr:`unit`.
 
@@ -205,7 +188,7 @@ class Parameter:
         :raises ValueError: not as many words as the parameter has, or a code that has no value of
             the parameter's type.
         """
-        codec, data = self.place(protocol).codec, to_bytes(words)
+        codec, data = self.at(protocol).codec, to_bytes(words)
         if isinstance(codec, Text):
             return codec.decode(data)
         raw = codec.decode(data)
@@ -216,7 +199,7 @@ class Parameter:
         factor = self.factor(protocol)
         return raw * factor.numerator / factor.denominator
 
-    def encode(self, value: Value, protocol: str = Protocol.MODBUS) -> tuple[int, ...]:
+    def encode(self, value: Value, protocol: str = 'modbus') -> tuple[int, ...]:
         """
         Turn a value in :attr:`unit` into the words to write, exactly.
 
@@ -225,7 +208,7 @@ class Parameter:
         """
         if self.labels:
             return self._words(self._code(value), protocol)
-        codec = self.place(protocol).codec
+        codec = self.at(protocol).codec
         if isinstance(codec, Text):
             return to_words(codec.encode(str(value)))
         number = self._number(value)
@@ -241,14 +224,14 @@ class Parameter:
         self._check_range(raw * factor, protocol)
         return self._words(raw, protocol)
 
-    def span(self, protocol: str = Protocol.MODBUS) -> tuple[Fraction, Fraction]:
+    def span(self, protocol: str = 'modbus') -> tuple[Fraction, Fraction]:
         """
         Return the least and the greatest value over ``protocol``, in :attr:`unit`.
 
         Where the manual allows more than the type can carry, or says nothing, the type decides.
         """
         factor = self.factor(protocol)
-        carried = self.place(protocol).number
+        carried = self.at(protocol).number
         low, high = carried.minimum * factor, carried.maximum * factor
         low = low if self.minimum is None else max(low, self.minimum)
         return low, high if self.maximum is None else min(high, self.maximum)
@@ -259,7 +242,7 @@ class Parameter:
         codecs = [address.codec for address in self.addresses.values()]
         return any(isinstance(codec, Number) and not codec.signed for codec in codecs)
 
-    def quantise(self, value: float, protocol: str = Protocol.MODBUS) -> tuple[int, ...]:
+    def quantise(self, value: float, protocol: str = 'modbus') -> tuple[int, ...]:
         """
         Turn a set-point into the words of the nearest step of the drive.
 
@@ -271,7 +254,7 @@ class Parameter:
         return self._words(round(number / factor), protocol)
 
     def _words(self, raw: int, protocol: str) -> tuple[int, ...]:
-        return to_words(self.place(protocol).number.encode(raw))
+        return to_words(self.at(protocol).number.encode(raw))
 
     def _meaning(self, raw: int) -> Value:
         """Return what a code of an enumeration means."""

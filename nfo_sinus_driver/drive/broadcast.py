@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
 
@@ -29,7 +28,7 @@ EVERYBODY = 95
 
 def can_broadcast(bus: Bus) -> bool:
     """Tell whether the protocol of a line has a broadcast that every drive obeys."""
-    return Protocol(bus.space) is Protocol.CLASSIC
+    return bus.space == 'classic'
 
 
 async def broadcast_stop(bus: Bus) -> None:
@@ -40,7 +39,7 @@ async def broadcast_stop(bus: Bus) -> None:
 
     :raises LinkError: the port is lost.
     """
-    place = load_model('sinus_g2')['fieldbus.mode'].place(Protocol.CLASSIC)
+    place = load_family('sinus_g2')['fieldbus.mode'].at('classic')
     await bus.write(
         EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
     )

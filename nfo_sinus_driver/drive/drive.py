@@ -29,8 +29,8 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.error_log import ErrorLog
@@ -82,7 +82,7 @@ class Drive:
         self._bus = bus
         self._unit = settings.address
         self._listener = listener
-        model = load_model(settings.model)
+        model = load_family(settings.model)
         self._registers = Registers(bus, self._unit, model, settings.retries)
         self._inverter = Inverter(model, self._registers, listener, settings)
         self._setpoint = Setpoint(
@@ -136,7 +136,7 @@ class Drive:
         self._inverter.settings = settings
 
     @property
-    def model(self) -> Model:
+    def model(self) -> Family:
         """What the catalog knows of its family."""
         return self._inverter.model
 

@@ -25,10 +25,9 @@ import math
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NO_CODE
@@ -94,7 +93,7 @@ class Inverter:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
     def __init__(
-        self, model: Model, registers: Registers, listener: Listener, settings: DriveSettings
+        self, model: Family, registers: Registers, listener: Listener, settings: DriveSettings
     ) -> None:
         self.model = model
         self.settings = settings
@@ -287,7 +286,7 @@ class Inverter:
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
         await self._registers.read('fieldbus.inv_st', priority, once=not patient)
-        classic = self._registers.protocol is Protocol.CLASSIC
+        classic = self._registers.protocol == 'classic'
         before, was_older = self.identity, self._older
         self._older = classic and self.settings.classic_dialect == 'v5.0'
         if self._older or not self._registers.reaches('fieldbus.sw_ver'):
@@ -323,7 +322,7 @@ class Inverter:
         """
         settings = self.settings
         known = settings.classic_dialect or settings.control_method == 'drive_control'
-        if known or self._registers.protocol is not Protocol.CLASSIC:
+        if known or self._registers.protocol != 'classic':
             return True
         mode = await self._registers.read_number('fieldbus.mode', Priority.SERVICE)
         return mode in (Mode.STOP, Mode.EXT)

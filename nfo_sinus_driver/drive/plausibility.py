@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 
@@ -30,7 +30,7 @@ _MOST: Mapping[str, float] = {
     'status.spd_act': 10800.0,
     'status.trq_act': 400.0,
 }
-_CODES: Mapping[str, Callable[[Model, int], bool]] = {
+_CODES: Mapping[str, Callable[[Family, int], bool]] = {
     'fieldbus.inv_st': lambda model, code: code in model.status_codes,
     'fieldbus.mode': lambda model, code: code in model.modes,
     # the upper half is described nowhere [C24]
@@ -38,7 +38,7 @@ _CODES: Mapping[str, Callable[[Model, int], bool]] = {
 }
 
 
-def can_be(model: Model, key: str, value: Value) -> bool:
+def can_be(model: Family, key: str, value: Value) -> bool:
     """Tell whether a value of a drive is one that its manual knows, as far as the manual says."""
     parameter = model[key]
     if key in _CODES:

@@ -20,7 +20,6 @@ from collections.abc import Iterable
 from collections.abc import Mapping
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
@@ -66,7 +65,7 @@ class Reference:
             )
         self._key = keys[0]
         self.most = _MOST[control_mode]
-        classic = registers.protocol is Protocol.CLASSIC
+        classic = registers.protocol == 'classic'
         self.address: Address = registers.address(_CLASSIC if classic else self._key)
 
     def words(self, value: float) -> Words:

@@ -22,8 +22,7 @@ from fractions import Fraction
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
@@ -50,7 +49,7 @@ _SHORT = frozenset(('status.op_time', 'status.rn_time', 'status.br_time'))
 _PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status', 'status.op_time')
 #: What is less on one protocol than on the other, whose register is the same: a drive with an
 #: address beyond those of Classic could not be asked again [C10].
-_HIGHEST = {(Protocol.CLASSIC, 'serial.address'): Fraction(94)}
+_HIGHEST = {('classic', 'serial.address'): Fraction(94)}
 
 
 class Registers:
@@ -60,7 +59,7 @@ class Registers:
     :param retries: how often a request that nobody answered is sent again.
     """
 
-    def __init__(self, bus: Bus, unit: int, model: Model, retries: int) -> None:
+    def __init__(self, bus: Bus, unit: int, model: Family, retries: int) -> None:
         self.model = model
         self._bus = bus
         self._unit = unit
@@ -70,18 +69,18 @@ class Registers:
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, Words] = {}
         #: How parameters are addressed on this line.
-        self.protocol = Protocol(bus.space)
+        self.protocol = bus.space
         bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
-        place = self.model[key].place(self.protocol)
+        place = self.model[key].at(self.protocol)
         return Address(place.numbers, place.words)
 
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
-        return self.protocol is Protocol.MODBUS and self.model.writes_and_reads
+        return self.protocol == 'modbus' and self.model.writes_and_reads
 
     def words(self, key: str, value: Value) -> Words:
         """
@@ -111,14 +110,14 @@ class Registers:
 
         :raises ValueError: a code that the manual does not list, where the type has no room for it.
         """
-        if key in _SHORT and self.protocol is Protocol.CLASSIC:
+        if key in _SHORT and self.protocol == 'classic':
             low, high = words
             words = (low, high & 0xFF)
         return self.model[key].decode(words, self.protocol)
 
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
-        return key in self.model and self.protocol in self.model[key].places
+        return key in self.model and self.protocol in self.model[key].addresses
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""

@@ -26,9 +26,9 @@ from typing import NamedTuple
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Model
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import StatusCode
 
@@ -84,7 +84,7 @@ class InverterStatus:
     at: float
     word: int | None
     code: int
-    model: Model
+    model: Family
     by_mode: bool = False
     code_at: float = -math.inf
 

@@ -31,9 +31,8 @@ import contextlib
 from fractions import Fraction
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -117,7 +116,7 @@ class SimulatedDrive:
         lenient: bool = False,
         variant: Variant | None = None,
     ) -> None:
-        self.model = load_model(model)
+        self.model = load_family(model)
         machine = machine_of(self.model)
         self._setpoints = frozenset(_RUNNERS[model].setpoint_of.values())
         self.settings = frozenset(
@@ -191,11 +190,11 @@ class SimulatedDrive:
         """
         entry = self._registers.log_entry(register, count)
         if entry is not None:
-            log = self.model.error_logs[Protocol.MODBUS]
+            log = self.model.error_logs['modbus']
             return to_words(log.codec.encode(self.faults.log_word(entry)))
         parameter = self._registers.find(register, count)
         raw = self.read_raw(parameter.key)
-        return to_words(parameter.place(Protocol.MODBUS).number.encode(raw))
+        return to_words(parameter.at('modbus').number.encode(raw))
 
     def write(self, register: int, words: Sequence[int]) -> None:
         """
@@ -204,7 +203,7 @@ class SimulatedDrive:
         :raises Refused: as the reason says.
         """
         parameter = self._registers.find(register, len(words))
-        raw = parameter.place(Protocol.MODBUS).number.decode(to_bytes(words))
+        raw = parameter.at('modbus').number.decode(to_bytes(words))
         self.write_raw(parameter.key, raw)
         if parameter.key in COMMANDS:
             self.runner.by_fieldbus = self.firmware.own_bus_codes

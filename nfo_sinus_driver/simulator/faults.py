@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 import enum
 
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Model
 
 
 class SioErr(enum.IntFlag):
@@ -73,7 +73,7 @@ class Faults:
     :ivar sio_err: what went wrong on the line since it was last read.
     """
 
-    def __init__(self, model: Model, log_size: int) -> None:
+    def __init__(self, model: Family, log_size: int) -> None:
         self._model = model
         self._kinds = {Kind.FAULT}
         if model.status_word.tells_alarms:

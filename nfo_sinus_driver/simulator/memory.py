@@ -25,9 +25,8 @@ from collections.abc import Mapping
 from fractions import Fraction
 import math
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.catalog import to_words
@@ -81,18 +80,18 @@ FACTORY: Mapping[str, Value] = {
 }
 
 
-def home(parameter: Parameter) -> Protocol:
+def home(parameter: Parameter) -> str:
     """Return the protocol whose raw number the memory keeps."""
-    return Protocol.MODBUS if Protocol.MODBUS in parameter.places else Protocol.CLASSIC
+    return 'modbus' if 'modbus' in parameter.addresses else 'classic'
 
 
-def convert(parameter: Parameter, raw: int, protocol: Protocol) -> int:
+def convert(parameter: Parameter, raw: int, protocol: str) -> int:
     """Return the number that ``protocol`` carries for one of the memory, the nearest it can."""
     source = home(parameter)
     if protocol is source:
         return raw
     exact = raw * parameter.factor(source) / parameter.factor(protocol)
-    codec = parameter.place(protocol).number
+    codec = parameter.at(protocol).number
     return min(max(math.floor(exact + Fraction(1, 2)), codec.minimum), codec.maximum)
 
 
@@ -105,7 +104,7 @@ class Memory:
     :raises ValueError: an unknown key, or a value that the drive would refuse.
     """
 
-    def __init__(self, model: Model, settings: Mapping[str, Value]) -> None:
+    def __init__(self, model: Family, settings: Mapping[str, Value]) -> None:
         self.model = model
         self._factors = {
             key: float(parameter.factor(home(parameter))) for key, parameter in model.items()
@@ -150,13 +149,13 @@ class Memory:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]
         words = parameter.encode(value, home(parameter))
-        self._raw[key] = parameter.place(home(parameter)).number.decode(to_bytes(words))
+        self._raw[key] = parameter.at(home(parameter)).number.decode(to_bytes(words))
 
     @staticmethod
     def show(parameter: Parameter, raw: int) -> Value:
         """Turn a raw number of this memory into engineering units."""
         protocol = home(parameter)
-        return parameter.decode(to_words(parameter.place(protocol).number.encode(raw)), protocol)
+        return parameter.decode(to_words(parameter.at(protocol).number.encode(raw)), protocol)
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
@@ -189,14 +188,14 @@ class Memory:
 class RegisterMap:
     """Which holding registers belong to which parameter [M0 table 4, table 5]."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Family) -> None:
         self._by_base = {
-            parameter.place(Protocol.MODBUS).index: parameter
+            parameter.at('modbus').index: parameter
             for parameter in model.values()
-            if Protocol.MODBUS in parameter.places
+            if 'modbus' in parameter.addresses
         }
         # the manual of the Optimal tells of none
-        self._log = model.error_logs.get(Protocol.MODBUS)
+        self._log = model.error_logs.get('modbus')
 
     def log_entry(self, register: int, count: int) -> int | None:
         """
@@ -222,7 +221,7 @@ class RegisterMap:
         parameter = self._by_base.get(register)
         if parameter is None:
             raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
-        words = parameter.place(Protocol.MODBUS).words
+        words = parameter.at('modbus').words
         if count != words:
             raise Refused(Reason.ADDRESS, f'{parameter.key} takes {words} registers, not {count}')
         return parameter

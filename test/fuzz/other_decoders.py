@@ -27,9 +27,9 @@ from fuzz import judges
 from fuzz.decoders import Case
 from fuzz.decoders import classic_frame
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.link import classic_refusal
@@ -49,9 +49,10 @@ _SILENCE, _OVER = 0.01, 0.011
 
 _PARAMETERS = [
     (parameter, protocol)
-    for model in map(load_model, MODELS)
+    for model in map(load_family, families())
     for parameter in model.values()
-    for protocol in parameter.places
+    for protocol in ('modbus', 'classic')
+    if protocol in parameter.addresses
 ]
 
 
@@ -62,7 +63,7 @@ def _catalog(random: Random, frames: int) -> None:
     """Judge what raw words become, those of a damaged answer included."""
     for _ in range(frames):
         parameter, protocol = random.choice(_PARAMETERS)
-        place = parameter.places[protocol]
+        place = parameter.addresses[protocol]
         count = place.words if random.random() < 0.9 else random.choice((0, 1, 2, 3))
         raw = [
             random.choice((0, 1, 0x7FFF, 0x8000, 0xFFFF, random.getrandbits(16)))

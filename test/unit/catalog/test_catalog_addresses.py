@@ -22,12 +22,11 @@ from collections import Counter
 import pytest
 
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
-G2 = load_model('sinus_g2')
-MODBUS = [parameter for parameter in G2.values() if Protocol.MODBUS in parameter.places]
-CLASSIC = [parameter for parameter in G2.values() if Protocol.CLASSIC in parameter.places]
+G2 = load_family('sinus_g2')
+MODBUS = [parameter for parameter in G2.values() if 'modbus' in parameter.addresses]
+CLASSIC = [parameter for parameter in G2.values() if 'classic' in parameter.addresses]
 
 #: How many parameters each group has, counted on paper in [M0 table 4] and, for the field bus,
 #: [M0 table 3] and [M0 table 5]; Tuning is no parameter but a command.
@@ -72,7 +71,7 @@ MODBUS_ONLY = {
 
 def instance(parameter: Parameter) -> int:
     """The number that all buses count from (ADI)."""
-    return parameter.place('profibus').index - 1000
+    return parameter.at('profibus').index - 1000
 
 
 def test_count_of_every_group() -> None:
@@ -85,11 +84,11 @@ def test_keys_and_addresses_are_unique() -> None:
         register
         for parameter in MODBUS
         for register in range(
-            parameter.place(Protocol.MODBUS).index,
-            parameter.place(Protocol.MODBUS).index + parameter.place(Protocol.MODBUS).words,
+            parameter.at('modbus').index,
+            parameter.at('modbus').index + parameter.at('modbus').words,
         )
     ]
-    ids = [number for p in CLASSIC for number in p.place(Protocol.CLASSIC).numbers]
+    ids = [number for p in CLASSIC for number in p.at('classic').numbers]
     assert len(set(registers)) == len(registers)
     assert len(set(ids)) == len(ids)
     assert len({(parameter.group, parameter.name) for parameter in G2.values()}) == len(G2)
@@ -100,12 +99,12 @@ def test_numbers_of_profibus_and_canopen_are_unique() -> None:
         keys: dict[int, list[str]] = {}
         for key, row in G2.items():
             if protocol in row.addresses:
-                keys.setdefault(row.place(protocol).index, []).append(key)
+                keys.setdefault(row.at(protocol).index, []).append(key)
         shared = [names for names in keys.values() if len(names) > 1]
         assert sorted(shared) == sorted(ONE_OBJECT.values())
         for names in shared:
             # the elements of an array count from 0 on PROFIBUS, on CANopen 0 is their number
-            parts = [G2[key].place(protocol).sub_index for key in names]
+            parts = [G2[key].at(protocol).sub_index for key in names]
             assert parts == [first, first + 1]
 
 
@@ -114,10 +113,10 @@ def test_the_three_formulas(parameter: Parameter) -> None:
     number = instance(parameter)
     assert number >= 1
     # PNU = 1000 + ADI, index = 2000h + ADI, register = 210h + 4 (ADI - 1)
-    assert parameter.place('canopen').index == 0x2000 + number
+    assert parameter.at('canopen').index == 0x2000 + number
     base = 0x210 + 4 * (number - 1)
     offset = OFFSETS.get(parameter.key, 0)
-    place = parameter.place(Protocol.MODBUS)
+    place = parameter.at('modbus')
     assert place.index == base + offset
     # no parameter reaches into the next instance
     assert offset + place.words <= 4
@@ -132,9 +131,9 @@ def test_what_only_one_bus_has() -> None:
 
 def test_times_of_the_ramps_are_not_the_speeds_before_them() -> None:
     # the speed half of a ramp stands at the base and must never be written [C46]
-    taken = {number for p in MODBUS for number in p.place(Protocol.MODBUS).occupied}
+    taken = {number for p in MODBUS for number in p.at('modbus').occupied}
     assert taken.isdisjoint({(0x27C,), (0x27D,), (0x280,), (0x281,)})
-    assert G2['control.accel'].factor(Protocol.MODBUS) * 1000 == 1
+    assert G2['control.accel'].factor('modbus') * 1000 == 1
 
 
 def test_ids_of_words_that_belong_together() -> None:
@@ -142,8 +141,8 @@ def test_ids_of_words_that_belong_together() -> None:
     descending = {
         row.key
         for row in CLASSIC
-        if list(row.place(Protocol.CLASSIC).numbers)
-        != sorted(row.place(Protocol.CLASSIC).numbers)
+        if list(row.at('classic').numbers)
+        != sorted(row.at('classic').numbers)
     }
     assert descending == {'fieldbus.spd_scl_numerator', 'fieldbus.spd_scl_denominator'}
 
@@ -159,10 +158,10 @@ def test_error_log_is_where_no_parameter_is() -> None:
     assert modbus.entries == classic.entries == 32
     assert G2.error_logs['profibus'].address(31) == 13188
     for area, rows, protocol in (
-        (modbus, MODBUS, Protocol.MODBUS),
-        (classic, CLASSIC, Protocol.CLASSIC),
+        (modbus, MODBUS, 'modbus'),
+        (classic, CLASSIC, 'classic'),
     ):
-        taken = {number for row in rows for number in row.place(protocol).occupied}
+        taken = {number for row in rows for number in row.at(protocol).occupied}
         words = range(area.words)
         log = {(area.address(n) + word,) for n in range(area.limit) for word in words}
         assert taken.isdisjoint(log)

@@ -30,7 +30,6 @@ import pytest
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Address
-from nfo_sinus_driver.catalog import Protocol
 
 #: What is misprinted, by key and table, with the reading that is followed.
 MISPRINTS = {
@@ -71,9 +70,9 @@ NO_LABELS = {
 }
 
 
-def keys_on(protocol: Protocol) -> set[str]:
+def keys_on(protocol: str) -> set[str]:
     """The parameters that one protocol reaches."""
-    return {key for key, row in G2.items() if protocol in row.places}
+    return {key for key, row in G2.items() if protocol in row.addresses}
 
 
 def type_of(place: Address) -> str:
@@ -99,13 +98,13 @@ def test_classic_ids_and_types() -> None:
             ids = tuple(int(number, 16) for number in re.findall(r'E([0-9A-F]{4})', line.cells[0]))
             if not ids:
                 assert 'TBD' in line.cells[0]  # to be defined, says the manual [C27]
-                assert Protocol.CLASSIC not in row.places
+                assert 'classic' not in row.addresses
                 continue
-            place = row.place(Protocol.CLASSIC)
+            place = row.at('classic')
             assert place.numbers == ids, row.key
             assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             seen.add(row.key)
-    assert seen == keys_on(Protocol.CLASSIC)
+    assert seen == keys_on('classic')
 
 
 def test_modbus_registers_and_types() -> None:
@@ -114,13 +113,13 @@ def test_modbus_registers_and_types() -> None:
         for line in lines_of(table):
             (row,) = line.parameters
             registers = [int(number, 16) for number in re.findall(r'([0-9A-F]{4})h', line.cells[0])]
-            place = row.place(Protocol.MODBUS)
+            place = row.at('modbus')
             assert place.index == registers[0], row.key
             assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             if line.cells[1] != '2 * UINT16':  # its second register has a line of its own
                 assert place.occupied == [(number,) for number in registers], row.key
             seen.add(row.key)
-    assert seen == keys_on(Protocol.MODBUS)
+    assert seen == keys_on('modbus')
 
 
 def test_profibus_numbers_types_and_access() -> None:
@@ -135,13 +134,13 @@ def test_profibus_numbers_types_and_access() -> None:
                 if misprint is not None:
                     assert printed == misprint[0], 'no misprint any more'
                     printed = misprint[1]
-                place = row.place('profibus')
+                place = row.at('profibus')
                 assert place.index == printed, row.key
                 sub_index = 0 if line.cells[2].startswith('Array') else None
                 if row.key in SECOND:
                     sub_index = 1
                 assert place.sub_index == sub_index, row.key
-                assert place.factor == row.factor(Protocol.MODBUS)
+                assert place.factor == row.factor('modbus')
                 expected = line.cells[2].split()[-1]
                 if row.key == 'error.overload_s_temp':
                     assert expected == 'UINT16'
@@ -150,7 +149,7 @@ def test_profibus_numbers_types_and_access() -> None:
                     assert expected == 'UINT16'
                     expected = 'UINT32'  # the two masks are an array here
                 assert type_of(place) == expected, row.key
-                modbus = type_of(row.place(Protocol.MODBUS))
+                modbus = type_of(row.at('modbus'))
                 assert (type_of(place) == modbus) == (row.key not in OTHER_TYPES), row.key
                 allowed = {'R/W': Access.READ_WRITE, 'R': Access.READ, 'W': Access.WRITE}
                 if row.access is Access.ACKNOWLEDGE or row.key in NEVER_WRITTEN:
@@ -170,10 +169,10 @@ def test_canopen_indices() -> None:
                 assert line.name == 'SetpointSource'
                 continue
             for row in line.parameters:
-                place = row.place('canopen')
+                place = row.at('canopen')
                 assert place.index == int(index[1], 16), row.key
                 # no type is printed
-                assert type_of(place) == type_of(row.place(Protocol.MODBUS)), row.key
+                assert type_of(place) == type_of(row.at('modbus')), row.key
                 seen.add(row.key)
     assert seen == {key for key, row in G2.items() if 'canopen' in row.addresses}
 
@@ -203,14 +202,14 @@ def test_enumerations(table: int) -> None:
 
 @pytest.mark.parametrize('table', [2, 3, 4, 5])
 def test_factors(table: int) -> None:
-    protocol = Protocol.CLASSIC if table < 4 else Protocol.MODBUS
+    protocol = 'classic' if table < 4 else 'modbus'
     units = {'kW': {'kW': 1, 'W': 1000}, 'kwh': {'kWh': 1}, 'mwh': {'kWh': 1000}}
     units |= {'Unit': {'': 1}, '1': {'': 1}}
     units |= {name: {name: 1} for name in ('A', 'Ω', 'H', 's', 'h', 'V', '°C', '%')}
     counts = {'divided': 0, 'scaled': 0, 'plain': 0}
     for line in lines_of(table):
         (row,) = line.parameters
-        if row.labels or protocol not in row.places:
+        if row.labels or protocol not in row.addresses:
             continue
         text = re.sub(r'</?sup>|\s|\*', '', line.cells[2]) if len(line.cells) > 2 else ''
         divided = re.search(r'(°C|%|1|[^\W\d_]+)/10(\d)', text)
@@ -258,7 +257,7 @@ def test_ranges_decimals_units_and_types() -> None:
     for row, cells in settings_of_m2():
         if '=' in cells[3]:
             continue  # an enumeration
-        place = row.place(Protocol.CLASSIC)
+        place = row.at('classic')
         decimals = int(cells[4] or 0)
         low, high = counts_of(cells[3])
         if row.key == 'serial.address':

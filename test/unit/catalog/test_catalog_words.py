@@ -26,14 +26,14 @@ import pytest
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.families.sinus_g2.words import state_of
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 
 #: The display texts of [M0 table 19]; 41 to 44 are from [M2 table 3].
 TEXTS = [

@@ -25,15 +25,14 @@ import re
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_optimal.words import Control
 from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.families.sinus_optimal.words import Status
 
 MANUALS = Path(__file__).resolve().parents[4] / 'shared' / 'manuals'
-OPTIMAL = load_model('sinus_optimal')
+OPTIMAL = load_family('sinus_optimal')
 #: What the scaling column says, as unit and factor.
 SCALES = {
     'mA (A x 10^3)': ('A', '0.001'),
@@ -78,7 +77,7 @@ def test_registers(lines: list[str]) -> None:
     ):
         assert row.name == name.split(' (')[0]
         numbers = [int(number, 16) for number in re.findall(r'([0-9A-F]{4})h', addresses)]
-        place = row.place(Protocol.MODBUS)
+        place = row.at('modbus')
         assert [*place.occupied[0], *place.occupied[-1]] == [numbers[0], numbers[-1]], name
         assert (numbers[0] - 0x210) // 4 + 1 == int(adi), name
         assert row.source.split('; ')[0] == f'M1 ADI {adi}', name

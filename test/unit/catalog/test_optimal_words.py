@@ -29,7 +29,7 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal.words import Control
 from nfo_sinus_driver.families.sinus_optimal.words import Mode
@@ -37,8 +37,8 @@ from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.families.sinus_optimal.words import Status
 from nfo_sinus_driver.families.sinus_optimal.words import state_of
 
-G2 = load_model('sinus_g2')
-OPTIMAL = load_model('sinus_optimal')
+G2 = load_family('sinus_g2')
+OPTIMAL = load_family('sinus_optimal')
 DRIVE_STATUS = Path(__file__).resolve().parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
 WORD = st.integers(0, 0xFFFF)
 KIND = st.sampled_from(Kind)
@@ -334,7 +334,7 @@ def test_facts_that_a_model_does_not_tell() -> None:
 @pytest.mark.parametrize('name', families())
 @given(word=WORD, listed=KIND)
 def test_nothing_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -> None:
-    tells = load_model(name).status_word
+    tells = load_family(name).status_word
     facts = tells.facts(word, listed)
     assert not facts & ~tells.valid
     # the bits and the kind never contradict each other
