@@ -213,7 +213,7 @@ class Bus:
         awaited = task.awaited
         if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
             return False
-        self._turns.withdraw(task)
+        self._turns.remove(Waiting(task, awaited))
         self._advance(task, reply, None)
         return True
 

@@ -26,7 +26,7 @@ from nfo_sinus_driver.link import Refused
 #: longer than a burst of noise.
 _MISSING_AFTER = 2.0
 #: The share of the time that all missing units may take together while others answer.
-_MISSING_SHARE = 1 / 16
+_MISSING_SHARE = 1 / 20
 
 
 class Silences:

@@ -21,7 +21,6 @@ What waits for the line, and which of it goes next. No thread, no clock and noth
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterator
 from typing import Literal
@@ -45,8 +44,10 @@ _MOST_OWED = 0.07
 #: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
+#: What only wants to know something, and can wait for a unit that does not answer.
+_ASKS = (Priority.POLL, *_BACKGROUND)
 
-#: A poll of a unit that did not answer the last request.
+#: What is asked of a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
 #: What is said to a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
@@ -80,13 +81,13 @@ class Turns:
     see the fault that should stop the motor: so after each of them something else has a turn, and
     the background's share is of the time between them.
 
-    A unit that does not answer keeps the line for a time-out with every poll. All of these together
+    A unit that does not answer keeps the line for a time-out with every poll. They all together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
     not answer is repeated at once, and after each of them somebody else has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. Their polls, and stops that were told to them
-    in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Those that have been silent for long are missing. What is asked of them, and stops that they
+    were told in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
@@ -99,8 +100,9 @@ class Turns:
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
-        self._queues: dict[_Rank, deque[Slot | Waiting]] = {
-            rank: deque() for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
+        #: In order; the values say nothing.
+        self._queues: dict[_Rank, dict[Slot | Waiting, None]] = {
+            rank: {} for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
@@ -114,7 +116,7 @@ class Turns:
 
     def add(self, entry: Slot | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
-        self._queues[self._rank(entry)].append(entry)
+        self._queues[self._rank(entry)][entry] = None
 
     @property
     def missing_wait(self) -> bool:
@@ -128,18 +130,32 @@ class Turns:
         :param missing: what is for a missing unit may go.
         """
         for rank in self._order(missing):
-            for entry in self._queues[rank]:
+            entry = self._first(rank)
+            if entry is not None:
+                del self._queues[rank][entry]
+                self._given = rank
                 unit = None if isinstance(entry, Slot) else entry.transfer.unit
-                if unit is None or unit != self._unheard:
-                    self._queues[rank].remove(entry)
-                    self._given = rank
-                    self._told_to_stop = unit if rank in _STOPS else None
-                    return entry
+                self._told_to_stop = unit if rank in _STOPS else None
+                return entry
         if self._unheard is None:
             return None
         # nobody else waits
         self._unheard = None
         return self.take(missing=missing)
+
+    def _first(self, rank: _Rank) -> Slot | Waiting | None:
+        """Return what goes next of one rank; what is for a unit that is missing by now waits."""
+        queue = self._queues[rank]
+        while True:
+            entry = next((one for one in queue if not self._is_unheard(one)), None)
+            if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
+                return entry
+            del queue[entry]
+            self._queues[_MISSING][entry] = None
+
+    def _is_unheard(self, entry: Slot | Waiting) -> bool:
+        """Tell whether it is for the unit that did not answer the stop just now."""
+        return isinstance(entry, Waiting) and entry.transfer.unit == self._unheard
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -159,12 +175,17 @@ class Turns:
                 most = _MOST_OWED if self._queues[rank] else _MOST_SAVED
                 self._owed[rank] = min(owed, most)
 
+    def remove(self, entry: Waiting) -> None:
+        """Take out what need not be sent any more."""
+        for queue in self._queues.values():
+            queue.pop(entry, None)
+
     def withdraw(self, task: Task) -> None:
         """Take out all that a task waits to send."""
         for queue in self._queues.values():
             for entry in tuple(queue):
                 if isinstance(entry, Waiting) and entry.task is task:
-                    queue.remove(entry)
+                    del queue[entry]
 
     def clear(self) -> list[Slot | Waiting]:
         """Take out everything."""
@@ -177,7 +198,8 @@ class Turns:
         yield from _STOPS
         if not self._slot_went:
             yield _SLOT
-        background = sorted(_BACKGROUND, key=self._owed.__getitem__, reverse=True)
+        first, second = _BACKGROUND
+        background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
         # one turn after a stop that nobody has heard: it is for the most urgent of the others
         between_stops = self._unheard is not None
         for priority in background:
@@ -197,7 +219,7 @@ class Turns:
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
             self._told_in_vain.discard(transfer.unit)
-        elif transfer.priority is Priority.POLL:
+        elif transfer.priority in _ASKS:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING

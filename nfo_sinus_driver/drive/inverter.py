@@ -20,6 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import replace
 from fractions import Fraction
+import functools
 import logging
 import math
 
@@ -76,6 +77,11 @@ class Identity:
     vendor: str = ''
     model: str = ''
     serial: str = ''
+
+    @functools.cached_property
+    def version(self) -> Fraction | None:
+        """The firmware as a number that can be compared exactly; ``None`` if it does not tell."""
+        return None if math.isnan(self.firmware) else Fraction(self.firmware)
 
     @property
     def versions(self) -> str:
@@ -236,7 +242,7 @@ class Inverter:
         """
         words = await self._registers.read_words(key, priority, once=True)
         value = self._registers.number(key, words)
-        if self._registers.can_be(key, words):
+        if not self._registers.is_odd(key):
             return value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
@@ -403,8 +409,7 @@ class Inverter:
 
     def text_of(self, code: int) -> str:
         """Return what the display of this firmware says for a code."""
-        told = self.identity is not None and not math.isnan(self.identity.firmware)
-        firmware = Fraction(self.identity.firmware) if told and self.identity else None
+        firmware = self.identity.version if self.identity else None
         if self._older and firmware is None:
             firmware = Fraction(0)
         return self.model.status_code(code).shown(firmware)

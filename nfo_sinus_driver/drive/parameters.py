@@ -56,7 +56,8 @@ _log = logging.getLogger(__name__)
 _ROUND = 9.8
 #: How often it is looked whether there is something to read, s.
 _WAIT = 0.5
-#: How often progress is logged while the parameters are read for the first time, s.
+#: When progress is logged first while the parameters are read for the first time, s; then each time
+#: after a pause twice as long, for on a line with many drives it takes minutes.
 _PROGRESS = 5.0
 #: After how many rounds that brought nothing a parameter is not there.
 _REFUSALS = 2
@@ -233,7 +234,8 @@ class Parameters:
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
-        told_at = time.monotonic()
+        pause = _PROGRESS
+        tell_at = time.monotonic() + pause
         refusals = 0
         while keys and refusals < _REFUSALS:
             refused: dict[str, Refused] = {}
@@ -244,8 +246,9 @@ class Parameters:
                 except Refused as error:
                     # by a busy drive, perhaps: asked again when the others are read
                     refused[key] = error
-                if time.monotonic() > told_at + _PROGRESS:
-                    told_at = time.monotonic()
+                if time.monotonic() > tell_at:
+                    pause *= 2
+                    tell_at = time.monotonic() + pause
                     self._inverter.tell(Severity.INFO, f'parameters: {self.progress}')
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -41,18 +40,19 @@ def take_picture(
 
     :param seen: the status, or ``None`` while the drive is not connected.
     """
-    snapshot = Snapshot(
-        at=time.monotonic(),
+    if seen is None:
+        return Snapshot(
+            at=time.monotonic(),
+            connected=inverter.connected,
+            enabled=setpoint.armed,
+            control_method=inverter.settings.control_method,
+        )
+    code = seen.listed
+    return Snapshot(
+        at=seen.at,
         connected=inverter.connected,
         enabled=setpoint.armed,
         control_method=inverter.settings.control_method,
-    )
-    if seen is None:
-        return snapshot
-    code = seen.listed
-    return dataclasses.replace(
-        snapshot,
-        at=seen.at,
         status=seen,
         control_mode=inverter.control_mode,
         unit=inverter.unit,

@@ -68,14 +68,17 @@ class Registers:
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, Words] = {}
+        self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = bus.space
         bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
-        place = self.model[key].at(self.protocol)
-        return Address(place.numbers, place.words)
+        if key not in self._addresses:
+            place = self.model[key].at(self.protocol)
+            self._addresses[key] = Address(place.numbers, place.words)
+        return self._addresses[key]
 
     @property
     def writes_and_reads(self) -> bool:
@@ -232,6 +235,10 @@ class Registers:
         """Write words to an address."""
         await self._ask(address, priority, words, once)
 
+    def is_odd(self, key: str) -> bool:
+        """Tell whether what was read last of a parameter cannot be, and was read more than once."""
+        return key in self._odd
+
     def can_be(self, key: str, words: Words) -> bool:
         """Tell whether words mean a value that the manual knows of this parameter."""
         try:
@@ -244,13 +251,14 @@ class Registers:
         address = self.address(key)
         reply = await self._ask(address, priority, None, once)
         before = self._odd.pop(key, None)
-        for _ in range(_READINGS - 1):
-            if reply.words == before or self.can_be(key, reply.words):
+        readings = 1
+        while not self.can_be(key, reply.words):
+            if reply.words == before or readings == _READINGS:
+                self._odd[key] = reply.words
                 break
             before = reply.words
             reply = await self._ask(address, priority, None, once)
-        if not self.can_be(key, reply.words):
-            self._odd[key] = reply.words
+            readings += 1
         return reply
 
     async def _ask(

@@ -275,6 +275,7 @@ class Setpoint:
             self._reading_back = self._bus.spawn(self._read_back())
 
     async def _read_back(self) -> None:
+        """Find out whether the drive took what was told to all; if not, give it its own."""
         reference = self._reference
         assert reference is not None
         await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - time.monotonic())
@@ -286,8 +287,8 @@ class Setpoint:
             return
         finally:
             self._reading_back = None
-        # nothing was written between the reading and this
-        if kept == self._written:
+        # nothing was written between the reading and this; what nobody knows is written anyway
+        if not self._written or kept == self._written:
             return
         if not self._told_missed:
             self._told_missed = True

@@ -23,6 +23,7 @@ in both [C86].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from functools import reduce
 from operator import xor
 
@@ -30,6 +31,9 @@ from operator import xor
 POINT_TO_POINT = 0
 #: The address that all drives obey and none answers.
 BROADCAST = 95
+
+#: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
+PREPARED = 1024
 
 _EOT = 0x04
 _ENQ = 0x05
@@ -108,6 +112,7 @@ def answers(message: Message, request: Request) -> bool:
     return kind(message) in kinds(request)
 
 
+@lru_cache(PREPARED)
 def encode(message: Message) -> bytes:
     """
     Return the bytes of a message.

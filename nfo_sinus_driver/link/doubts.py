@@ -88,7 +88,9 @@ class Doubts(Generic[Kind]):
 
     def _left(self, unit: int) -> dict[Kind, float]:
         """Forget what is too late by now; return the rest, and until when each may come."""
+        if unit not in self._until:
+            return {}
         now = time.monotonic()
-        left = {kind: until for kind, until in self._until.get(unit, {}).items() if until > now}
+        left = {kind: until for kind, until in self._until[unit].items() if until > now}
         self._until[unit] = left
         return left

@@ -23,6 +23,7 @@ begins a frame: whatever came before it is lost.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import functools
 import re
 from typing import TypeVar
 
@@ -46,6 +47,7 @@ def lrc(data: bytes) -> int:
     return -sum(data) & 0xFF
 
 
+@functools.lru_cache(modbus_pdu.PREPARED)
 def encode(request: Request[object]) -> bytes:
     """Return the frame of a request."""
     message = modbus_pdu.encode(request)

@@ -25,10 +25,10 @@ from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
-from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.modbus_pdu import read_of
 
 _T = TypeVar('_T')
 
@@ -44,7 +44,7 @@ class ModbusLink(ABC):
 
         :raises LinkError: as its subclasses say.
         """
-        return Reply(*self._ask(Read(unit, address.numbers[0], address.words)))
+        return Reply(*self._ask(read_of(unit, address.numbers[0], address.words)))
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
         """
@@ -73,7 +73,7 @@ class ModbusLink(ABC):
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
-        self._ask_unheard(Read(unit, source.numbers[0], source.words))
+        self._ask_unheard(read_of(unit, source.numbers[0], source.words))
         try:
             return self.write(unit, address, words)
         except LinkError as error:

@@ -22,6 +22,7 @@ it into frames of its own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+import functools
 import struct
 from typing import Protocol
 from typing import TypeVar
@@ -38,12 +39,18 @@ _EXCEPTION = 0x80
 #: Unit, function, code.
 REFUSAL_LENGTH = 3
 
+#: Of how many requests each line keeps what is sent; those of a poll are sent again and again.
+PREPARED = 1024
+
 _T = TypeVar('_T')
 _Answer = TypeVar('_Answer', covariant=True)
 
 
 class Request(Protocol[_Answer]):
     """What a request knows of itself and of its answer; all in messages."""
+
+    def __hash__(self) -> int:
+        """Requests that ask the same of the same unit are the same."""
 
     @property
     def unit(self) -> int:
@@ -79,12 +86,12 @@ class _TellsWords:
     function: int
     count: int
 
-    @property
+    @functools.cached_property
     def answer_head(self) -> bytes:
         """What of the answer is known beforehand."""
         return bytes((self.unit, self.function, 2 * self.count))
 
-    @property
+    @functools.cached_property
     def answer_length(self) -> int:
         """Bytes of the answer."""
         return 3 + 2 * self.count
@@ -180,11 +187,19 @@ class WriteAndRead(_TellsWords):
         return struct.pack(f'>4HB{size}H', *where, 2 * size, *self.words)
 
 
+@functools.lru_cache(PREPARED)
+def read_of(unit: int, register: int, count: int) -> Read:
+    """Return the request that reads; one that comes again is the same."""
+    return Read(unit, register, count)
+
+
+@functools.lru_cache(PREPARED)
 def encode(request: Request[object]) -> bytes:
     """Return the message of a request."""
     return bytes((request.unit, request.function)) + request.body
 
 
+@functools.lru_cache(PREPARED)
 def refusal_head(request: Request[object]) -> bytes:
     """Return how a message begins by which the unit refuses a request."""
     return bytes((request.unit, request.function | _EXCEPTION))

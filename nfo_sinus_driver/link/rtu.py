@@ -22,6 +22,7 @@ in any pieces, among noise and the answers to other requests.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import functools
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
@@ -44,6 +45,7 @@ def crc(data: bytes) -> bytes:
     return value.to_bytes(CRC_LENGTH, 'little')
 
 
+@functools.lru_cache(modbus_pdu.PREPARED)
 def encode(request: Request[object]) -> bytes:
     """Return the frame of a request."""
     message = modbus_pdu.encode(request)

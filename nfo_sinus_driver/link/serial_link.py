@@ -219,12 +219,11 @@ class SerialLink(ModbusLink):
         :returns: whether it was asked, and answered.
         :raises NotReady: that cannot be told from others either.
         """
-        questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
-        question = self._doubts.first_certain(request.unit, questions)
-        if question is request:
+        if not self._in_doubt(request):
             return False
+        probe = self._doubts.first_certain(request.unit, self._probes(request.unit))
         try:
-            self._probe(question)
+            self._probe(probe)
         except LinkError as error:
             # nobody has heard the request itself
             error.maybe_done = False

@@ -101,13 +101,14 @@ class AllDrives:
         failed: list[str] = []
         done: list[str] = []
         futures: list[tuple[str, Future[str]]] = []
-        for node in self._line.drives:
-            if node.settings.control_method == 'monitor':
-                continue
-            try:
-                futures.append((node.get_name(), command(node)))
-            except DriveError as error:
-                failed.append(f'{node.get_name()}: {error}')
+        with self._line.at_once():
+            for node in self._line.drives:
+                if node.settings.control_method == 'monitor':
+                    continue
+                try:
+                    futures.append((node.get_name(), command(node)))
+                except DriveError as error:
+                    failed.append(f'{node.get_name()}: {error}')
         deadline = time.monotonic() + timeout
         for name, future in futures:
             try:

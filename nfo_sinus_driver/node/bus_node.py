@@ -77,6 +77,9 @@ class BusNode(Node):
         self.line.bus.start()
 
     def _tell(self) -> None:
+        if not self.line.bus.alive:
+            # the driver is ending, and has closed the port
+            return
         statistics = self.line.bus.statistics()
         silent = [node.get_name() for node in self.line.drives if node.is_silent]
         stamp = self.get_clock().now().to_msg()

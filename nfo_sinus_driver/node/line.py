@@ -17,8 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
 from dataclasses import dataclass
 from dataclasses import field
+import threading
 from typing import TYPE_CHECKING
 
 from rclpy.qos import DurabilityPolicy
@@ -33,6 +36,9 @@ from nfo_sinus_driver.node.outbox import Outbox
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.node.drive_node import DriveNode
+
+#: How long the bus waits for what is to begin at once, s; no drive times out by then.
+_LONGEST_GATHERING = 0.1
 
 #: For what flows: status, actual values, telemetry, statistics.
 RELIABLE = QoSProfile(
@@ -88,6 +94,16 @@ class Line:
     def say(self, log: Callable[[str], object], text: str) -> None:
         """Log a line from the outbox, for the bus must not wait for a log."""
         self.outbox.put(lambda: log(text))
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Have all that is asked of the bus meanwhile begin together, between two transactions."""
+        complete = threading.Event()
+        self.bus.call(lambda: complete.wait(_LONGEST_GATHERING))
+        try:
+            yield
+        finally:
+            complete.set()
 
     def rival_of(self, owner: DriveNode, address: int) -> DriveNode | None:
         """Return another node whose drive would answer to an address, too."""

@@ -20,8 +20,11 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from concurrent.futures import wait
 import ctypes
 import sys
 import time
@@ -138,26 +141,28 @@ class DriverProcess:
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
         # all are told before the first is waited for, and nobody can enable any of them again
-        stops = [(node, node.stop_for_good(_time_left(node, begun))) for node in self._drives]
+        with self._bus_node.line.at_once():
+            stops = {
+                node.stop_for_good(node.settings.shutdown_timeout): node for node in self._drives
+            }
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
-        unconfirmed = [
-            node
-            for node, future in stops
-            if self._may_be_there(node) and not _confirmed(node, future, begun)
+        unconfirmed: list[DriveNode] = []
+        releases: dict[Future[str], DriveNode] = {}
+        for node, stop in _as_they_end(stops):
+            if self._may_be_there(node) and not _confirmed(node, stop):
+                unconfirmed.append(node)
+            elif node.drive.heard:
+                # one that is silent must not take the others' time to be released
+                releases[node.drive.disconnect(_time_left(node, begun))] = node
+        unconfirmed += [
+            node for node, release in _as_they_end(releases) if not _confirmed(node, release)
         ]
-        releases = [
-            (node, node.drive.disconnect(_time_left(node, begun)))
-            for node in self._drives
-            if node.drive.heard and node not in unconfirmed
-        ]
-        unconfirmed += [node for node, future in releases if not _confirmed(node, future, begun)]
         for node in unconfirmed:
             node.get_logger().error(
                 'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
                 'the emergency stop'
             )
         return not unconfirmed
-
 
     def _may_be_there(self, node: DriveNode) -> bool:
         """Tell whether there may be a motor: one that never answered was never started by us."""
@@ -169,15 +174,32 @@ def _time_left(node: DriveNode, begun: float) -> float:
     return max(0.0, begun + node.settings.shutdown_timeout - time.monotonic())
 
 
-def _confirmed(node: DriveNode, future: Future[str], begun: float) -> bool:
+def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveNode, Future[str]]]:
     """
-    Wait for the answer to a stop or a release, and log it.
+    Yield nodes with their futures: as these end, and at last those that do not end in time.
+
+    The time that an exit may take is each drive's own: it is over when no drive has answered for so
+    long, for many drives on a slow line take turns.
+    """
+    waiting = set(futures)
+    while waiting:
+        patience = max(futures[future].settings.shutdown_timeout for future in waiting)
+        ended, waiting = wait(waiting, patience + _LAST_ANSWER, FIRST_COMPLETED)
+        for future in ended or waiting:
+            yield futures[future], future
+        if not ended:
+            return
+
+
+def _confirmed(node: DriveNode, future: Future[str]) -> bool:
+    """
+    Log the answer to a stop or a release; false if there is none, or it is no success.
 
     A drive that has never answered anything need not confirm: it may well not be there.
     """
     log = node.get_logger()
     try:
-        answer = future.result(_time_left(node, begun) + _LAST_ANSWER)
+        answer = future.result(timeout=0)
     except FutureTimeoutError:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False

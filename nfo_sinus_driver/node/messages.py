@@ -47,6 +47,9 @@ _CONTROL_MODES = {
     'Speed': DriveStatus.SPEED,
 }
 _STATES = {state: getattr(DriveStatus, state.name) for state in State}
+#: The facts have the names and the bits that the message has; plain numbers, for this is done with
+#: every poll, and flags take their time.
+_FACTS = tuple((str(fact.name).lower(), int(fact)) for fact in Fact)
 _KINDS = {Kind.STATUS: InvSt.STATUS, Kind.ALARM: InvSt.ALARM, Kind.FAULT: InvSt.FAULT}
 
 #: The fields of Telemetry and where they come from.
@@ -90,13 +93,12 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
 
 
 def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
-    facts = seen.facts
+    facts = int(seen.facts)
     message.state = _STATES[seen.state]
     message.status_word = seen.word or 0
     message.valid = seen.valid.value
-    # the facts have the names and the bits that the message has
-    for fact in Fact:
-        setattr(message, str(fact.name).lower(), fact in facts)
+    for name, bit in _FACTS:
+        setattr(message, name, bool(facts & bit))
 
 
 def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:

@@ -302,8 +302,8 @@ MUTANTS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/registers.py',
-        '        return Address(place.numbers, place.words)',
-        '        return Address(place.numbers, 2)',
+        'Address(place.numbers, place.words)',
+        'Address(place.numbers, 2)',
         (_TRACE,),
     ),
     Mutant(

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
@@ -105,6 +106,7 @@ class Status(enum.IntFlag):
     STOPPING = 1 << 15
 
 
+@functools.lru_cache(maxsize=256)
 def state_of(word: int) -> State:
     """Return the state that a DriveStatus word shows; UNKNOWN for a pattern not in table 16."""
     for mask, pattern, state in _STATES:

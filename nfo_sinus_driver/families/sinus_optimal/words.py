@@ -23,6 +23,7 @@ with those.
 from __future__ import annotations
 
 import enum
+import functools
 
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
@@ -92,6 +93,7 @@ class Status(enum.IntFlag):
     STOPPING = 1 << 15
 
 
+@functools.lru_cache(maxsize=256)
 def state_of(word: int) -> State:
     """
     Return the state that a Drive Status word shows.

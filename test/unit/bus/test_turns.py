@@ -358,6 +358,24 @@ def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() 
     assert not turns.missing_wait
 
 
+@pytest.mark.parametrize('kind', [Priority.POLL, *_BACKGROUND])
+def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
+    kind: Priority,
+) -> None:
+    missing: set[int] = set()
+    turns = Turns(missing.__contains__, missing.__contains__)
+    waiting = Waiting(cast(Task, 'asks'), Transfer(7, Address((1,), 1), kind))
+    turns.add(waiting)
+    missing.add(7)
+    assert turns.take(missing=False) is None
+    assert turns.missing_wait
+    assert turns.take() is waiting
+    turns.add(waiting)
+    missing.clear()
+    # it answers again, and is nothing special any more
+    assert turns.take() is waiting
+
+
 def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() -> None:
     silent: set[int] = {7}
     turns = Turns(silent.__contains__, silent.__contains__)

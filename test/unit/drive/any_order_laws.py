@@ -233,7 +233,9 @@ class Laws(History):
         if command.name == 'enable':
             self._judge_enabled(command, error)
         elif command.name in STOPS and self._method != 'monitor':
-            untouched = self.disturbed_at + NOTICED_IDLE < command.at and self.enabled_at is None
+            # what another master starts while the drive is lost is seen once it is found again
+            since = max(self.disturbed_at, self.settled_since if self._foreign else -math.inf)
+            untouched = since + NOTICED_IDLE < command.at and self.enabled_at is None
             if error is None and untouched and self.running:
                 raise Broken(f'{command.name} is answered although it runs')
             if error is None and self.tuning:

@@ -23,7 +23,7 @@ import pytest
 #: What the neighbours keep of the rate that they would have alone on the line.
 _KEPT = 0.9
 #: From when on a drive that is unplugged is asked seldom, s.
-_SETTLED = 3.0
+_SETTLED = 5.0
 
 
 def _ride(rig: LineRig) -> None:
