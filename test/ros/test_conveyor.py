@@ -28,6 +28,7 @@ from bench import holds_for
 from bench import wait_until
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import DriveStatus
+import pytest
 from std_msgs.msg import Float32
 from ways import needs
 
