@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
@@ -47,6 +48,7 @@ __all__ = [
     'Meaning',
     'Number',
     'Parameter',
+    'Role',
     'State',
     'StatusCode',
     'StatusWord',

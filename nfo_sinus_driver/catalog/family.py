@@ -37,6 +37,7 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -53,6 +54,7 @@ class Family(Mapping[str, Parameter]):
     :ivar name: the name of its folder.
     :ivar title: what its maker calls it.
     :ivar parameters: its parameters, in the order of the manual.
+    :ivar roles: which of them has which role.
     :ivar status_codes: its inverter status codes, by number.
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
     :ivar status_word: what its status word means.
@@ -63,6 +65,7 @@ class Family(Mapping[str, Parameter]):
     name: str
     title: str
     parameters: Mapping[str, Parameter]
+    roles: Mapping[Role, str]
     status_codes: Mapping[int, StatusCode]
     error_logs: Mapping[str, ErrorLogArea]
     status_word: StatusWord
@@ -87,6 +90,15 @@ class Family(Mapping[str, Parameter]):
         """The parameters that become ROS parameters, in the order of the manual."""
         return tuple(parameter for parameter in self.values() if parameter.is_setting)
 
+    def key(self, role: Role) -> str:
+        """Return the key of the parameter that has a role; ``''`` if this family has none."""
+        return self.roles.get(role, '')
+
+    @functools.cached_property
+    def role_of(self) -> Mapping[str, Role]:
+        """The roles of the parameters that have one, by key."""
+        return {key: role for role, key in self.roles.items()}
+
     def status_code(self, code: int) -> StatusCode:
         """Return what an inverter status code means; an unknown code is shown as its number."""
         unlisted = 'Status code that the manual does not list'
@@ -98,7 +110,6 @@ class Family(Mapping[str, Parameter]):
         return tuple(code for code in self.status_codes.values() if meaning in code.meanings)
 
 
-@functools.cache
 def families() -> tuple[str, ...]:
     """Return the names of the families that there are folders of."""
     return tuple(sorted(path.parent.name for path in _FAMILIES.glob('*/parameters.csv')))
@@ -118,10 +129,16 @@ def load_family(name: str) -> Family:
     keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
     addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
 
-    def address(row: table.Row) -> tuple[str, Address]:
+    def known(row: table.Row) -> str:
         if row['parameter'] not in addresses:
             raise ValueError(f'no parameter is {row["parameter"]}')
-        return row['parameter'], _address(row)
+        return row['parameter']
+
+    def address(row: table.Row) -> tuple[str, Address]:
+        return known(row), _address(row)
+
+    def role(row: table.Row) -> tuple[Role, str]:
+        return Role(row['role']), known(row)
 
     for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes):
         addresses[key][found.protocol] = found
@@ -130,6 +147,7 @@ def load_family(name: str) -> Family:
         return _parameter(row, addresses[row['parameter']])
 
     parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
+    roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
     log = folder / 'error_log.csv'
     logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
@@ -138,6 +156,7 @@ def load_family(name: str) -> Family:
         name=name,
         title=words.TITLE,
         parameters={row.key: row for row in parameters},
+        roles=dict(roles),
         status_codes={row.code: row for row in codes},
         error_logs={row.protocol: row for row in logs},
         status_word=words.STATUS_WORD,

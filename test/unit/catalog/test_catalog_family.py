@@ -26,6 +26,7 @@ import time
 import pytest
 
 from nfo_sinus_driver.catalog import CatalogError
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import family
 from nfo_sinus_driver.catalog import load_family
@@ -34,8 +35,9 @@ NAME = 'sinus_g2'
 PARAMETERS = 'parameters.csv'
 ADDRESSES = 'addresses.csv'
 CODES = 'status_codes.csv'
+ROLES = 'roles.csv'
 ERROR_LOG = 'error_log.csv'
-TABLES = (PARAMETERS, ADDRESSES, CODES, ERROR_LOG)
+TABLES = (PARAMETERS, ADDRESSES, CODES, ROLES, ERROR_LOG)
 load_afresh = load_family.__wrapped__
 
 Row = dict[str, str]
@@ -113,6 +115,7 @@ def test_copied_tables_are_as_good(folder: Path) -> None:
     again, once = load_afresh(NAME), load_family(NAME)
     assert again.parameters == once.parameters
     assert again.status_codes == once.status_codes
+    assert again.roles == once.roles
     assert again.error_logs == once.error_logs
 
 
@@ -166,6 +169,10 @@ def test_copied_tables_are_as_good(folder: Path) -> None:
         (CODES, ['5'], {'requires_ack': 'maybe'}, "no 'maybe'"),
         (CODES, ['5'], {'meanings': 'tuned lost'}, "'lost' is not a valid Meaning"),
         (CODES, ['37'], {'renamed': 'later'}, 'Invalid literal for Fraction'),
+        (ROLES, ['actual_speed'], {'role': 'speed'}, "'speed' is not a valid Role"),
+        (ROLES, ['actual_speed'], {'role': 'firmware'}, 'firmware stands in line 7 already'),
+        (ROLES, ['actual_speed'], {'parameter': 'speed'}, 'no parameter is speed'),
+        (ROLES, ['actual_speed'], {'parameter': 'fieldbus.sw_ver'}, 'stands in line 7 already'),
         (ERROR_LOG, ['classic'], {'codec': 'string4'}, 'an entry is no string4'),
         (ERROR_LOG, ['classic'], {'protocol': 'modbus'}, 'modbus stands in line 2 already'),
         (ERROR_LOG, ['classic'], {'stride': ''}, 'invalid literal'),
@@ -206,7 +213,7 @@ def test_wrong_number_of_columns(folder: Path, file: str, end: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ('file', 'column'), [(PARAMETERS, 'labels'), (ADDRESSES, 'codec'), (CODES, 'meanings')]
+    ('file', 'column'), [(PARAMETERS, 'labels'), (ADDRESSES, 'codec'), (ROLES, 'role')]
 )
 def test_missing_column(folder: Path, file: str, column: str) -> None:
     text = (folder / file).read_text(encoding='utf-8')
@@ -214,7 +221,7 @@ def test_missing_column(folder: Path, file: str, column: str) -> None:
     assert refusal() == f"{NAME}/{file}, line 2: no '{column}'"
 
 
-@pytest.mark.parametrize('file', [ADDRESSES, CODES])
+@pytest.mark.parametrize('file', [ADDRESSES, CODES, ROLES])
 def test_missing_table(folder: Path, file: str) -> None:
     (folder / file).unlink()
     assert refusal().startswith(f'{NAME}/{file}: [Errno 2] No such file')
@@ -229,6 +236,22 @@ def test_quote_that_is_not_closed(folder: Path) -> None:
     text = (folder / CODES).read_text(encoding='utf-8')
     (folder / CODES).write_text(text + '99,"open', 'utf-8')
     assert refusal() == f'{NAME}/{CODES}, line 50: unexpected end of data'
+
+
+def test_roles() -> None:
+    g2, optimal = load_family('sinus_g2'), load_family('sinus_optimal')
+    # the G2 plays them all
+    assert set(g2.roles) == set(Role)
+    assert set(g2.roles) > set(optimal.roles)
+    assert g2.key(Role.ACTUAL_SPEED) == 'status.spd_act'
+    assert g2.key(Role.COMMUNICATION_TIMEOUT) == 'serial.sio_tot'
+    assert g2.role_of['status.spd_act'] is Role.ACTUAL_SPEED
+    assert 'status.sigma' not in g2.role_of
+    # what only looks alike has another name there [C53]
+    assert optimal.key(Role.SPEED_SETPOINT) == 'fieldbus.input_speed_setpoint'
+    # a role that nobody has is a feature that is missing
+    assert optimal.key(Role.COMMUNICATION_TIMEOUT) == ''
+    assert optimal.key(Role.COMMUNICATION_TIMEOUT) not in optimal
 
 
 def test_family_without_an_error_log(folder: Path) -> None:
