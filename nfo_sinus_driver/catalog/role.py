@@ -53,6 +53,7 @@ class Role(enum.Enum):
     ACTUAL_FREQUENCY = 'actual_frequency'
     ACTUAL_SPEED = 'actual_speed'
     ACTUAL_TORQUE = 'actual_torque'
+    ACTUAL_PROCESS_VALUE = 'actual_process_value'
     OUTPUT_VOLTAGE = 'output_voltage'
     OUTPUT_CURRENT = 'output_current'
     OUTPUT_POWER = 'output_power'
@@ -75,7 +76,4 @@ class Role(enum.Enum):
     #: After how long a silence of the line the drive stops the motor by itself, and if it does.
     COMMUNICATION_TIMEOUT = 'communication_timeout'
     STOP_AT_TIMEOUT = 'stop_at_timeout'
-    BUS_PROTOCOL = 'bus_protocol'
     BUS_ADDRESS = 'bus_address'
-    BAUD_RATE = 'baud_rate'
-    CHARACTER_FORMAT = 'character_format'

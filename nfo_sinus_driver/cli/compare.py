@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import json
 
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
@@ -35,7 +36,6 @@ from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
 
-_ADDRESS = 'serial.address'
 _ABSENT = 'absent'
 
 
@@ -60,10 +60,11 @@ def diff(options: argparse.Namespace) -> int:
         for key in (*left.values, *(key for key in right.values if key not in left.values))
         if not same(left.values.get(key), right.values.get(key))
     ]
-    if _ADDRESS in differing and left.address != right.address and left.address and right.address:
-        # two drives on one line cannot have the same
-        differing.remove(_ADDRESS)
     model = load_family(options.model)
+    own = model.key(Role.BUS_ADDRESS)
+    if own in differing and left.address != right.address and left.address and right.address:
+        # two drives on one line cannot have the same
+        differing.remove(own)
     if options.json:
         table = {
             key: {'left': left.values.get(key), 'right': right.values.get(key)} for key in differing

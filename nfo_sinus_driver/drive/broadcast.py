@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
@@ -39,7 +40,8 @@ async def broadcast_stop(bus: Bus) -> None:
 
     :raises LinkError: the port is lost.
     """
-    place = load_family('sinus_g2')['fieldbus.mode'].at('classic')
+    g2 = load_family('sinus_g2')
+    place = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
     await bus.write(
         EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
     )

@@ -19,6 +19,7 @@ from __future__ import annotations
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errors import DriveError
@@ -38,7 +39,8 @@ async def detect_model(bus: Bus, unit: int) -> str:
     """
     if bus.space == 'classic':
         return 'sinus_g2'
-    place = load_family('sinus_g2')['fieldbus.sw_ver'].at('modbus')
+    g2 = load_family('sinus_g2')
+    place = g2[g2.key(Role.FIRMWARE)].at('modbus')
     try:
         if await bus.identify(unit, Priority.SERVICE) != Identification():
             return 'sinus_g2'

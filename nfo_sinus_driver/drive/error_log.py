@@ -25,6 +25,7 @@ import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
@@ -42,7 +43,6 @@ _TICKS = 0xFFFFFF
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
 _TRIES = 3
-_ENERGY = 'status.e_out'
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
 
@@ -144,7 +144,8 @@ class ErrorLog:
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, and have the clock follow it."""
         once = priority > Priority.POLL
-        hours, at = await self._registers.read_at('status.op_time', priority, once=once)
+        key = self._inverter.model.key(Role.OPERATING_TIME)
+        hours, at = await self._registers.read_at(key, priority, once=once)
         assert not isinstance(hours, str)
         self.clock.note(float(hours), at)
         return float(hours)
@@ -189,9 +190,9 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        what = 'resetting the kWh counter'
+        what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
         self._errands.require(what)
-        if not self._inverter.has(_ENERGY):
+        if not self._inverter.has(energy):
             told = self._inverter.identity
             raise DriveError(
                 f'{what} came with firmware 4.38; this drive has '
@@ -199,12 +200,12 @@ class ErrorLog:
             )
         with self._errands.lent(what) as loan:
             async with self._errands.sent(loan):
-                before = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                before = await self._registers.read_number(energy, Priority.SERVICE)
                 await self._errands.tell(loan, Scmd.RESET_E_OUT)
-                after = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
-                    raise DriveError(f'the drive took the command, but {_ENERGY} is {after:g} kWh')
-        return f'{_ENERGY}: {before:.3f} -> {after:.3f} kWh'
+                    raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')
+        return f'{energy}: {before:.3f} -> {after:.3f} kWh'
 
     def _area(self) -> ErrorLogArea:
         if not self.documented:

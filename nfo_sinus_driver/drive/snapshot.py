@@ -29,6 +29,7 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import StatusCode
 
@@ -247,13 +248,13 @@ class Snapshot:
 @dataclass(frozen=True)
 class Telemetry:
     """
-    Measured values by catalog key, NaN where the drive has none, and when the last one arrived.
+    Measured values by their roles, NaN where the drive has none, and when the last one arrived.
 
     :ivar at: s of ``time.monotonic``.
     """
 
     at: float
-    values: dict[str, float]
+    values: dict[Role, float]
 
 
 class Listener(Protocol):

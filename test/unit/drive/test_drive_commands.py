@@ -31,6 +31,7 @@ import pytest
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import withdrawal
@@ -131,9 +132,9 @@ def test_telemetry(rig: Rig) -> None:
     rig.connect()
     wait_until(lambda: rig.notes.telemetry)
     values = rig.notes.telemetry[0].values
-    assert values['status.dc_link'] == pytest.approx(565, abs=5)
-    assert values['status.op_time'] == pytest.approx(1234.5, abs=0.1)
-    assert values['status.e_out'] == pytest.approx(1.234)
+    assert values[Role.DC_LINK_VOLTAGE] == pytest.approx(565, abs=5)
+    assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.1)
+    assert values[Role.ENERGY] == pytest.approx(1.234)
     assert not any(math.isnan(value) for value in values.values())
 
 
