@@ -35,6 +35,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 import functools
 import re
+import struct
 from typing import Generic
 from typing import TypeVar
 
@@ -198,17 +199,16 @@ def codec_of(name: str) -> Number | Text:
 
 def to_bytes(words: Sequence[int]) -> bytes:
     """Return 16-bit words as they stand on Modbus, the high byte of each first."""
-    return b''.join(word.to_bytes(2, 'big') for word in words)
+    return struct.pack(f'>{len(words)}H', *words)
 
 
 def to_words(data: bytes) -> tuple[int, ...]:
     """Return the 16-bit words of bytes as they stand on Modbus."""
-    pairs = zip(data[::2], data[1::2], strict=True)
-    return tuple(high << 8 | low for high, low in pairs)
+    return struct.unpack(f'>{len(data) // 2}H', data)
 
 
 def _swapped(data: bytes) -> bytes:
-    return b''.join(data[at : at + 2] for at in range(len(data) - 2, -1, -2))
+    return data[2:] + data[:2]
 
 
 def _halves(data: bytes) -> bytes:

@@ -257,3 +257,12 @@ def test_roles() -> None:
 def test_family_without_an_error_log(folder: Path) -> None:
     (folder / ERROR_LOG).unlink()
     assert load_afresh(NAME).error_logs == {}
+
+
+def test_the_catalog_knows_no_family() -> None:
+    names = {name for one in families() for name in (one, load_family(one).title)}
+    # how to set a parameter is shown by one
+    keys = {key for one in families() for key in load_family(one)} - {'control.accel'}
+    for path in Path(family.__file__).parent.glob('*.py'):
+        text = path.read_text(encoding='utf-8')
+        assert {name for name in names | keys if name in text} == set(), path.name
