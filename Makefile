@@ -83,7 +83,7 @@ fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=
 		--frames $(or $(FRAMES),1000000) $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
 
 # Not a part of setup: only the comparison needs other masters.
-bench: setup ## measure its speed, and that of others (two hours; BENCH=--quick: 12 minutes)
+bench: setup ## measure its speed, and that of others (two hours; BENCH=--quick: 10 minutes)
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)

@@ -45,6 +45,8 @@ _FORMATS = {'modbus_rtu': '8E1', 'modbus_ascii': '7E1', 'classic': '7E1'}
 _DEPTH = 10
 #: From the moment that every drive is polled until nothing is special any more, s.
 _SETTLE = 2.0
+#: How often drives are told to run at most.
+_TRIES = 5
 
 
 class Listener(Node):
@@ -78,8 +80,12 @@ class Listener(Node):
         self._command(SetBool, f'/{name}/enable', data=True)
 
     def enable_all(self) -> None:
-        """Let every drive run and follow set-points."""
-        self._command(Trigger, '/nfo_sinus_bus/enable_all')
+        """Let every drive run and follow set-points; on a busy machine not at the first try."""
+        for _ in range(_TRIES - 1):
+            with contextlib.suppress(RuntimeError):
+                return self._command(Trigger, '/nfo_sinus_bus/enable_all')
+            time.sleep(_SETTLE)
+        return self._command(Trigger, '/nfo_sinus_bus/enable_all')
 
     def known(self, name: str) -> set[str]:
         """Return the names of a drive's parameters as its node has them now."""

@@ -34,12 +34,14 @@ class Measurement:
 
     :ivar group: what ``--only`` takes.
     :ivar measure: makes it, once, and returns its rows.
+    :ivar minor: ``--quick`` leaves it out, unless its group is asked for.
     """
 
     group: str
     what: str
     baud_rate: int
     measure: Callable[[Effort], list[Row]]
+    minor: bool = False
 
     def __str__(self) -> str:
         return f'{self.what}, {self.baud_rate} bit/s'
@@ -64,4 +66,6 @@ def all_measurements() -> Iterator[Measurement]:
         ('classic', 9600, stops.SLOW_KINDS),
     ):
         measure = partial(stops.measure, protocol, baud_rate, kinds)
-        yield Measurement('stop', f'stops, {protocol}', baud_rate, measure)
+        yield Measurement(
+            'stop', f'stops, {protocol}', baud_rate, measure, minor=baud_rate != 57600
+        )

@@ -57,7 +57,7 @@ def main() -> None:
     chosen = [
         one
         for one in all_measurements()
-        if (not options.only or one.group in options.only)
+        if (one.group in options.only if options.only else not (options.quick and one.minor))
         and (not options.baud or one.baud_rate in options.baud)
     ]
     runs = options.runs or (1 if options.quick else 5)

@@ -83,6 +83,9 @@ _SLOW_PERIOD = 0.1
 #: On a full line, where each read waits for its turn, once in so many turns of this drive: so two
 #: reads that every poll takes become 2.4 at most, with the control mode, which changes least.
 _SLOW_TURNS = 15
+#: A motor is at its speed while what the control mode is about changes by no more than this share
+#: from poll to poll; else frequency and speed are both measured each time.
+_STEADY = 0.02
 _MODE_TURNS = 60
 
 
@@ -333,13 +336,16 @@ class Watch:
                 # before it is told: a set-point never has the unit of another mode
                 self._motion.watch(seen)
         actual = _ACTUAL.get(inverter.control_mode)
+        steady = True
         if actual is not None:
             asked_at = time.monotonic()
-            await self._measure(actual)
+            last = inverter.last_polled(actual).value
+            now = await self._measure(actual)
             self._turn = time.monotonic() - asked_at
+            steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
             age = time.monotonic() - inverter.last_polled(role).at
-            if role is not actual and age >= self._slow_period:
+            if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
         self._publish(seen)
 
@@ -351,10 +357,11 @@ class Watch:
             self._inverter.tell(Severity.ERROR, f'{text}; then call ~/fault_ack')
         self._told_fault = code
 
-    async def _measure(self, role: Role) -> None:
+    async def _measure(self, role: Role) -> float:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
         value = await self._read_measured(role)
         self._inverter.polled[role] = Measured(value, time.monotonic())
+        return value
 
     async def _read_measured(self, role: Role) -> float:
         try:

@@ -221,9 +221,12 @@ class SerialLink(ModbusLink):
         """
         if not self._in_doubt(request):
             return False
-        probe = self._doubts.first_certain(request.unit, self._probes(request.unit))
+        questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
+        question = self._doubts.first_certain(request.unit, questions)
+        if question is request:
+            return False
         try:
-            self._probe(probe)
+            self._probe(question)
         except LinkError as error:
             # nobody has heard the request itself
             error.maybe_done = False

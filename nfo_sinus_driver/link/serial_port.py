@@ -141,7 +141,9 @@ class SerialPort:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise _busy(self._path) from None
-        fcntl.ioctl(fd, termios.TIOCEXCL)
+        if not _is_pty(fd):
+            # a pseudo-terminal would stay so when it is closed, and then open for root alone
+            fcntl.ioctl(fd, termios.TIOCEXCL)
 
     def _configure(self, fd: int) -> None:
         settings = self._settings

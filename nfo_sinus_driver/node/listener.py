@@ -22,6 +22,7 @@ import threading
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -35,7 +36,7 @@ _FOR_EVER = -1
 
 
 class _Apart(ReentrantCallbackGroup):
-    """Keeps subscriptions, though not their events, from the executor of their node."""
+    """Keeps subscriptions from the executor of their node."""
 
     def can_execute(self, entity: object) -> bool:
         return not isinstance(entity, Subscription)
@@ -68,7 +69,13 @@ class Listener:
     ) -> None:
         """Have a function called with each message, once the listener was started."""
         subscription = node.create_subscription(
-            message_type, topic, callback, quality, callback_group=_Apart()
+            message_type,
+            topic,
+            callback,
+            quality,
+            callback_group=_Apart(),
+            # rclpy's own would stay with the executor, and each message would wake it several times
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._ways.append((subscription, callback))
 

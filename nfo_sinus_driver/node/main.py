@@ -134,8 +134,9 @@ class DriverProcess:
         self._bus_node.line.outbox.close()
         self._bus_node.line.listener.close(_LAST_CALLBACK)
         end_all(self._executors, _LAST_CALLBACK)
+        deadline = time.monotonic() + _LAST_CALLBACK
         for node in self._drives:
-            node.join(_LAST_CALLBACK)
+            node.join(max(0.0, deadline - time.monotonic()))
         return confirmed
 
     def _stop_motors(self, why: str) -> bool:
@@ -178,13 +179,14 @@ def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveN
     """
     Yield nodes with their futures: as these end, and at last those that do not end in time.
 
-    The time that an exit may take is each drive's own: it is over when no drive has answered for so
-    long, for many drives on a slow line take turns.
+    All of them together have the time that an exit may take.
     """
     waiting = set(futures)
+    patience = max((node.settings.shutdown_timeout for node in futures.values()), default=0.0)
+    deadline = time.monotonic() + patience + _LAST_ANSWER
     while waiting:
-        patience = max(futures[future].settings.shutdown_timeout for future in waiting)
-        ended, waiting = wait(waiting, patience + _LAST_ANSWER, FIRST_COMPLETED)
+        left = max(0.0, deadline - time.monotonic())
+        ended, waiting = wait(waiting, left, FIRST_COMPLETED)
         for future in ended or waiting:
             yield futures[future], future
         if not ended:

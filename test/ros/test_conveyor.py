@@ -43,7 +43,7 @@ _RARE = (
 _WATCHED = 10.0
 _WAKE_UPS = 20
 #: All parameters of all drives are read first, which takes as long as the machine makes it, s.
-_START = 3 * PATIENCE
+_START = 6 * PATIENCE
 #: A read, and SCMD = Stop, by Modbus.
 _READ = '03'
 _STOP = '0602980000'

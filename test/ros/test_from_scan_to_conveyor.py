@@ -30,6 +30,7 @@ from bench import Client
 from bench import holds_for
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 import pytest
 from std_msgs.msg import Float32
 from ways import needs
@@ -128,13 +129,13 @@ def test_no_set_point_for_all_without_a_broadcast(bench: Bench) -> None:
             wait_until(lambda: frequencies(simulator) == [0, 15, 0], 'its own does it')
 
 
-@needs('rtu', 'classic')
 def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
     simulator = bench.simulator(*_ADDRESSES, *_QUICK)
     file = bench.folder / 'found.yaml'
-    protocol = ('--protocol', bench.way.protocol)
+    way = bench.way
+    line = ('--protocol', way.protocol, '--model', way.model, '--baud-rate', str(way.baud_rate))
     done = subprocess.run(
-        [*_COMMAND, 'scan', '--port', bench.port, *protocol, '--addresses', '1-4',
+        [*_COMMAND, 'scan', '--port', bench.port, *line, '--addresses', '1-4',
          '--response-timeout', '2.0', '--params', str(file)],
         capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
@@ -173,7 +174,7 @@ def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
 @pytest.mark.every_way
 @needs('rtu')
 def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -> None:
-    simulator, (infeed, middle, outfeed) = start(bench, rate='5.0')
+    simulator, (infeed, middle, outfeed) = start(bench, rate='2.0')
 
     def turn_on() -> bool:
         return all(
@@ -196,7 +197,11 @@ def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -
         assert not middle.change_state(Transition.TRANSITION_CONFIGURE)
         assert turn_on()
         simulator.inject('silence', 0.0, address=2)
-        assert middle.change_state(Transition.TRANSITION_CONFIGURE)
+        # all its parameters are read beside the polls of the others
+        request = Transition(id=Transition.TRANSITION_CONFIGURE)
+        configured = middle.call_async('change_state', ChangeState, transition=request)
+        wait_until(configured.done, 'it is configured', timeout=3 * PATIENCE)
+        assert configured.result().success
         assert middle.change_state(Transition.TRANSITION_ACTIVATE)
         # its set-points flow on, and nothing turns before it is enabled
         holds_for(A_WHILE, lambda: not simulator.state(2)['turning'], 'it stands')

@@ -74,6 +74,13 @@ def fast(make_virtual: MakeVirtual, **settings: object) -> VirtualRig:
     )
 
 
+async def busy(rig: VirtualRig) -> None:
+    """Read something again and again, as other drives of a line are read."""
+    voltage = Address((rig.register('status.u_rms'),), 1)
+    while True:
+        await rig.bus.read(1, voltage, Priority.POLL)
+
+
 def per_poll(rig: VirtualRig, seconds: float) -> float:
     """How many transactions there are for one status."""
     begun = len(rig.link.frames)
@@ -97,12 +104,7 @@ def test_a_poll_takes_two_transactions_on_a_full_line_too(make_virtual: MakeVirt
     rig = fast(make_virtual)
     rig.ride()
     voltage = rig.register('status.u_rms')
-
-    async def neighbour() -> None:
-        while True:
-            await rig.bus.read(1, Address((voltage,), 1), Priority.POLL)
-
-    neighbours = [rig.bus.run(neighbour()) for _ in range(31)]
+    neighbours = [rig.bus.run(busy(rig)) for _ in range(31)]
     rig.pass_time(2.0)
     begun = len(rig.link.frames)
     rig.pass_time(30.0)
@@ -152,6 +154,26 @@ def test_the_slow_values_are_never_old(make_virtual: MakeVirtual) -> None:
         assert at - snapshot.speed_at < LATEST
         assert at - snapshot.frequency_at < LATEST
         assert at - snapshot.status.code_at < LATEST
+
+
+def test_a_motor_that_comes_to_a_stop_is_told_to_stand_in_both_units_at_once(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual(poll_rate=5.0, parameters={'control.mode': 'Speed'})
+    rig.connect()
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    rig.send(600.0)
+    rig.pass_time(1.0)
+    rig.send(None)
+    # a full line, where a turn takes long
+    neighbours = [rig.bus.run(busy(rig)) for _ in range(31)]
+    rig.drive.stop()
+    kept = keep(rig)
+    rig.pass_time(10.0)
+    assert not any(neighbour.done() for neighbour in neighbours)
+    stands = [snapshot for _, snapshot in kept.told if snapshot.speed == 0]
+    assert stands
+    assert all(snapshot.frequency == 0 for snapshot in stands)
 
 
 @pytest.mark.parametrize('rate', [0.0, 20.0, 5.0, 0.5])
@@ -241,7 +263,10 @@ def test_after_a_lost_answer_the_inverter_status_is_read(make_virtual: MakeVirtu
     rig = fast(make_virtual)
     rig.ride()
     rig.pass_time(0.05)
-    for _ in range(20):
+    for steps in range(20):
+        # at another moment of the poll each time
+        for _ in range(steps):
+            rig.bus.step()
         rig.link.losses = 1
         while rig.link.losses:
             rig.bus.step()

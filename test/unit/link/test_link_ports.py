@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+import array
 from collections.abc import Iterator
 import errno
 import fcntl
@@ -49,6 +50,8 @@ from nfo_sinus_driver.link.url_port import UrlPort
 #: No honest wait here takes this long, on any machine, s.
 PATIENCE = 30.0
 EVERY_BYTE = bytes(range(256))
+#: Whether a terminal is open for root alone (asm-generic/ioctls.h).
+_TIOCGEXCL = 0x80045440
 
 
 class Pty:
@@ -256,6 +259,15 @@ def test_port_in_use(pty: Pty, port: SerialPort) -> None:
     port.close()
     second.open()
     second.close()
+
+
+def test_a_pseudo_terminal_stays_open_to_others_than_root(pty: Pty, port: SerialPort) -> None:
+    port.close()
+    again = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+    exclusive = array.array('i', [-1])
+    fcntl.ioctl(again, _TIOCGEXCL, exclusive)
+    os.close(again)
+    assert exclusive[0] == 0
 
 
 def test_port_locked_as_pyserial_does(pty: Pty) -> None:
