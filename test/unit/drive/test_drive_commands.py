@@ -144,9 +144,9 @@ def test_telemetry_of_older_firmware(make_rig: MakeRig) -> None:
     rig.connect()
     wait_until(lambda: rig.notes.telemetry)
     values = rig.notes.telemetry[0].values
-    assert {key for key, value in values.items() if math.isnan(value)} == {
-        'status.e_out',
-        'status.sigma_e_out',
+    assert {role for role, value in values.items() if math.isnan(value)} == {
+        Role.ENERGY,
+        Role.TOTAL_ENERGY,
     }
     asked = {bytes.fromhex(frame['hex'])[2:4].hex() for frame in rig.trace() if is_request(frame)}
     assert '02a8' in asked
