@@ -81,7 +81,7 @@ def test_every_parameter_there_and_back(low: int, high: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ('row', 'protocol'), PLACES, ids=[f'{row.key}-{protocol.value}' for row, protocol in PLACES]
+    ('row', 'protocol'), PLACES, ids=[f'{row.key}-{protocol}' for row, protocol in PLACES]
 )
 def test_the_edges_of_every_range(row: Parameter, protocol: str) -> None:
     codec = row.at(protocol).number
