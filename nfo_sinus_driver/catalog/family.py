@@ -140,12 +140,11 @@ def load_family(name: str) -> Family:
     def role(row: table.Row) -> tuple[Role, str]:
         return Role(row['role']), known(row)
 
-    for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes):
-        addresses[key][found.protocol] = found
-
     def parameter(row: table.Row) -> Parameter:
         return _parameter(row, addresses[row['parameter']])
 
+    for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes):
+        addresses[key][found.protocol] = found
     parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
     roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
