@@ -33,7 +33,7 @@ from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.link import LinkError
 
 _NO_BROADCAST = (
-    'only the Classic protocol has set-points for all drives at once: publish to ~/setpoint of each'
+    'only the Classic protocol has set-points for all drives at once: publish one to each drive'
 )
 
 
