@@ -129,6 +129,7 @@ class Turns:
 
         :param missing: what is for a missing unit may go.
         """
+        self._release_found()
         for rank in self._order(missing):
             entry = self._first(rank)
             if entry is not None:
@@ -142,6 +143,13 @@ class Turns:
         # nobody else waits
         self._unheard = None
         return self.take(missing=missing)
+
+    def _release_found(self) -> None:
+        """Put what waits for a unit that answers again where it belongs: it may be a stop."""
+        found = [one for one in self._queues[_MISSING] if self._rank(one) != _MISSING]
+        for entry in found:
+            del self._queues[_MISSING][entry]
+            self.add(entry)
 
     def _first(self, rank: _Rank) -> Slot | Waiting | None:
         """Return what goes next of one rank; what is for a unit that is missing by now waits."""

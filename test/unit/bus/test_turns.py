@@ -426,3 +426,21 @@ def test_everything_can_be_taken_out_at_once() -> None:
     cleared = turns.clear()
     assert sorted(map(id, cleared)) == sorted(map(id, entries))
     assert turns.take() is None
+
+
+def test_a_stop_in_vain_goes_ahead_again_once_the_unit_answers() -> None:
+    missing = {7}
+    turns = Turns(missing.__contains__, missing.__contains__)
+    turns.add(stop_of(7))
+    turns.take()
+    turns.took(0.1)
+    repeated, before, other = stop_of(7), poll_of(1), poll_of(1)
+    turns.add(repeated)
+    turns.add(before)
+    assert turns.take(missing=False) is before
+    turns.took(_READ)
+    turns.add(other)
+    # somebody else has asked it meanwhile
+    missing.clear()
+    assert turns.take(missing=False) is repeated
+    assert turns.take(missing=False) is other
