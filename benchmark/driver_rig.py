@@ -37,8 +37,7 @@ from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 import trace_file
 
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
 #: Unlike any other drive's name: what is said to these must never reach a motor.
 NAMES = [f'simulated_for_bench_{number}' for number in range(1, 33)]
@@ -173,9 +172,9 @@ class DriverRig(Rig):
         active = self.listener.active
         self.wait_for(lambda: active.keys() >= set(self.names), self.driver)
         done = max(active.values())
-        space = Protocol.CLASSIC if self.line.protocol == 'classic' else Protocol.MODBUS
-        settings = load_model('sinus_g2').settings
-        wanted = {parameter.key for parameter in settings if space in parameter.places}
+        space = 'classic' if self.line.protocol == 'classic' else 'modbus'
+        settings = load_family('sinus_g2').settings
+        wanted = {parameter.key for parameter in settings if space in parameter.addresses}
         for name in self.names:
             if not self.listener.known(name) >= wanted:
                 self.wait_for(lambda name=name: self.listener.known(name) >= wanted, self.driver)

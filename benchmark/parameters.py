@@ -34,16 +34,15 @@ from rig import PATIENCE
 import trace_file
 from trace_file import Frame
 
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.control import Client
 
 _BAUD_RATE = 19200
 _KEY = 'control.accel'
-_PLACES = {p.key: p.places.get(Protocol.MODBUS) for p in load_model('sinus_g2').settings}
-_SETTINGS = {place.address for place in _PLACES.values() if place is not None}
+_PLACES = {p.key: p.addresses.get('modbus') for p in load_family('sinus_g2').settings}
+_SETTINGS = {place.index for place in _PLACES.values() if place is not None}
 _POLLED = {
-    load_model('sinus_g2')[key].place(Protocol.MODBUS).address
+    load_family('sinus_g2')[key].at('modbus').index
     for key in ('fieldbus.drive_status', 'fieldbus.inv_st', 'status.frq_act', 'status.spd_act')
 }
 

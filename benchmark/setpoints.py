@@ -30,15 +30,14 @@ import speed
 import trace_file
 from trace_file import Frame
 
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 BAUD_RATE = 57600
 DRIVES = (1, 8, 32)
-_MODEL = load_model('sinus_g2')
+_MODEL = load_family('sinus_g2')
 _SETPOINT, _SCMD = (
-    _MODEL[key].place(Protocol.MODBUS).address for key in ('status.frq_set', 'fieldbus.scmd')
+    _MODEL[key].at('modbus').index for key in ('status.frq_set', 'fieldbus.scmd')
 )
 #: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real
 #: conveyor; a machine that is busy elsewhere stops no motor.
@@ -153,7 +152,7 @@ def _delays(
         written.setdefault((unit, word), []).append(at)
     delays = []
     for at, drive, value in published:
-        (word,) = _MODEL['status.frq_set'].quantise(value, Protocol.MODBUS)
+        (word,) = _MODEL['status.frq_set'].quantise(value, 'modbus')
         moments = written.get((drive + 1, word), ())
         delays += [moment - at for moment in moments if at <= moment < at + _LOST][:1]
     return delays, len(published) - len(delays)

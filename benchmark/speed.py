@@ -33,8 +33,7 @@ from row import Row
 import trace_file
 from trace_file import Line
 
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
 #: The first and the second are measured one after the other: they are compared.
 DRIVES = (32, 1, 8)
@@ -151,12 +150,12 @@ def plain_cycle(line: Line) -> float:
 
 
 def _read_time(line: Line, key: str) -> float:
-    parameter = load_model('sinus_g2')[key]
+    parameter = load_family('sinus_g2')[key]
     if line.protocol == 'classic':
         # an ENQUIRY of 8 characters and a REPLY of 14 for each word [M0 §6.1.3]
-        return parameter.place(Protocol.CLASSIC).words * 22 * line.character
+        return parameter.at('classic').words * 22 * line.character
     # 8 bytes ask, 5 and the words answer, t3.5 is before each
-    words = parameter.place(Protocol.MODBUS).words
+    words = parameter.at('modbus').words
     return (13 + 2 * words) * line.character + 2 * line.gap
 
 
@@ -171,5 +170,5 @@ def cycles(window: Window, rig: Rig) -> Figures:
 
 def _place(rig: Rig) -> int:
     """Return the register or Classic id of the status."""
-    space = Protocol.CLASSIC if rig.line.protocol == 'classic' else Protocol.MODBUS
-    return load_model('sinus_g2')[_STATUS].place(space).address
+    space = 'classic' if rig.line.protocol == 'classic' else 'modbus'
+    return load_family('sinus_g2')[_STATUS].at(space).index

@@ -46,11 +46,11 @@ from std_srvs.srv import Trigger
 import trace_file
 from trace_file import Frame
 
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.simulator.control import Client
 
@@ -66,7 +66,7 @@ _PAUSE = 1.0
 _FAULT = 5
 #: What of DriveStatus tells that a motor no longer runs as it was told to.
 _TELLS = ~int(Status.SETPOINT_REACHED | Status.LIMIT_ACTIVE | Status.REV_OP_ENABLED) & 0xFFFF
-_MODEL = load_model('sinus_g2')
+_MODEL = load_family('sinus_g2')
 _STATUS, _INV_ST, _MODE_KEY = 'fieldbus.drive_status', 'fieldbus.inv_st', 'control.mode'
 
 #: The character that stands for address 0 in a Classic frame [M0 §6.1].
@@ -94,12 +94,12 @@ class _Wire:
     def __init__(self, protocol: str) -> None:
         self._protocol = protocol
         self._classic = protocol == 'classic'
-        self._space = Protocol.CLASSIC if self._classic else Protocol.MODBUS
+        self._space = 'classic' if self._classic else 'modbus'
         self.setpoint = 'fieldbus.setpoint' if self._classic else 'status.frq_set'
 
     def reads(self, request: bytes, unit: int, key: str) -> bool:
         """Tell whether a request reads a parameter."""
-        place = _MODEL[key].place(self._space).address
+        place = _MODEL[key].at(self._space).index
         if self._classic:
             return request == classic.encode(classic.Enquiry(unit, place))
         message = self._message(request)
@@ -107,7 +107,7 @@ class _Wire:
 
     def writes(self, request: bytes, units: Container[int], key: str, word: int) -> bool:
         """Tell whether a request gives one of some units a word."""
-        place = _MODEL[key].place(self._space).address
+        place = _MODEL[key].at(self._space).index
         if self._classic:
             unit = request[1] - _ADDRESS_ZERO
             return unit in units and request == classic.encode(classic.Select(unit, place, word))
@@ -360,7 +360,7 @@ def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
 
 def _tells(key: str, before: int | None, word: int) -> bool:
     if key == _INV_ST:
-        return word not in _MODEL.dialect.codes.bus_running
+        return Meaning.BUS_RUNNING not in _MODEL.status_code(word).meanings
     return before is not None and bool((before ^ word) & (_TELLS if key == _STATUS else 0xFFFF))
 
 

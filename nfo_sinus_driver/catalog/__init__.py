@@ -12,54 +12,51 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+
 """What the manuals say: tables and pure functions on them. No I/O beyond that, no ROS."""
 
-from nfo_sinus_driver.catalog.dialect import Dialect
-from nfo_sinus_driver.catalog.dialect import Fact
-from nfo_sinus_driver.catalog.error_log import ERROR_LOG
+from nfo_sinus_driver.catalog.codec import Number
+from nfo_sinus_driver.catalog.codec import Text
+from nfo_sinus_driver.catalog.codec import codec_of
+from nfo_sinus_driver.catalog.codec import to_bytes
+from nfo_sinus_driver.catalog.codec import to_words
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
-from nfo_sinus_driver.catalog.inv_st import InvStCode
-from nfo_sinus_driver.catalog.inv_st import Kind
-from nfo_sinus_driver.catalog.model import MODELS
-from nfo_sinus_driver.catalog.model import Model
-from nfo_sinus_driver.catalog.model import load_model
-from nfo_sinus_driver.catalog.parameter import DEFAULT_SCALING
+from nfo_sinus_driver.catalog.family import Family
+from nfo_sinus_driver.catalog.family import families
+from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.parameter import Access
+from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
-from nfo_sinus_driver.catalog.parameter import Place
-from nfo_sinus_driver.catalog.parameter import Protocol
-from nfo_sinus_driver.catalog.parameter import RawType
-from nfo_sinus_driver.catalog.parameter import Scaling
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.words import Control
-from nfo_sinus_driver.catalog.words import Mode
-from nfo_sinus_driver.catalog.words import Scmd
-from nfo_sinus_driver.catalog.words import State
-from nfo_sinus_driver.catalog.words import Status
-from nfo_sinus_driver.catalog.words import state_of
+from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import Kind
+from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+from nfo_sinus_driver.catalog.table import CatalogError
 
 __all__ = [
-    'DEFAULT_SCALING',
-    'ERROR_LOG',
-    'MODELS',
     'Access',
-    'Control',
-    'Dialect',
+    'Address',
+    'CatalogError',
     'ErrorLogArea',
     'Fact',
-    'InvStCode',
+    'Family',
     'Kind',
-    'Mode',
-    'Model',
+    'Meaning',
+    'Number',
     'Parameter',
-    'Place',
-    'Protocol',
-    'RawType',
-    'Scaling',
-    'Scmd',
+    'Role',
     'State',
-    'Status',
+    'StatusCode',
+    'StatusWord',
+    'Text',
     'Value',
-    'load_model',
-    'state_of',
+    'codec_of',
+    'families',
+    'load_family',
+    'to_bytes',
+    'to_words',
 ]

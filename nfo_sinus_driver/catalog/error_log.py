@@ -17,38 +17,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from nfo_sinus_driver.catalog.parameter import Protocol
-from nfo_sinus_driver.catalog.parameter import RawType
+from nfo_sinus_driver.catalog.codec import Number
 
 
 @dataclass(frozen=True)
 class ErrorLogArea:
     """
-    The error log on one bus: entries of two words each, the newest first.
+    The error log on one bus, the newest entry first.
 
-    The low word of an entry and the low byte of its high word are the operating time of the error
-    in 0.1 h, the high byte is the code of :class:`InvStCode`; code 0 ends the log [M2 §9].
+    The low 24 bits of an entry are the operating time of the error in 0.1 h, the high byte is the
+    code of :class:`StatusCode`; code 0 ends the log [M2 §9].
 
-    :ivar first: the register or Classic id of the first word of the newest entry.
+    :ivar protocol: the protocol that reaches it.
+    :ivar space: which numbering of that protocol ``first`` counts in.
+    :ivar first: where the newest entry stands.
     :ivar stride: from an entry to the next older one.
     :ivar entries: how many every drive has.
     :ivar limit: how many some drives have; beyond ``entries`` stop at code 0 or a refusal [C4].
+    :ivar codec: how the bytes of an entry are read.
     """
 
+    protocol: str
+    space: str
     first: int
     stride: int
     entries: int
     limit: int
+    codec: Number
 
-    #: The type of an entry.
-    TYPE = RawType.UINT32
+    @property
+    def words(self) -> int:
+        """How many 16-bit words an entry has."""
+        return self.codec.size // 2
 
     def address(self, entry: int) -> int:
         """
-        Return where the low word of an entry stands, 0 being the newest; the other one follows.
+        Return where an entry begins, 0 being the newest.
 
         :raises IndexError: no drive has so many entries.
         """
@@ -56,10 +62,7 @@ class ErrorLogArea:
             raise IndexError(f'the error log has {self.limit} entries, not {entry + 1}')
         return self.first + self.stride * entry
 
-
-#: The error log of the G2 ([M0 table 2, table 4], [M2 §9], [C4]); the Optimal's is not documented.
-#: On PROFIBUS it is P13157 to P13188; the index that CANopen has for it is in doubt [C2].
-ERROR_LOG: Mapping[Protocol, ErrorLogArea] = {
-    Protocol.MODBUS: ErrorLogArea(0xC000, 4, 32, 32),
-    Protocol.CLASSIC: ErrorLogArea(0x0200, 2, 32, 128),
-}
+    def numbers(self, entry: int) -> tuple[int, ...]:
+        """Return the register of an entry, or the ids of its words, the low one first."""
+        first = self.address(entry)
+        return tuple(range(first, first + self.words)) if self.space == 'id' else (first,)

@@ -26,15 +26,13 @@ from collections.abc import Iterator
 from collections.abc import Sequence
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog.error_log import ERROR_LOG
-from nfo_sinus_driver.catalog.model import MODELS
-from nfo_sinus_driver.catalog.model import Model
-from nfo_sinus_driver.catalog.model import load_model
+from nfo_sinus_driver.catalog.error_log import ErrorLogArea
+from nfo_sinus_driver.catalog.family import Family
+from nfo_sinus_driver.catalog.family import families
+from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
-from nfo_sinus_driver.catalog.parameter import Protocol
 
-_TITLES = {'sinus_g2': 'NFO Sinus G2', 'sinus_optimal': 'NFO Sinus Optimal'}
 _KINDS = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
 _ACCESS = {
     Access.READ: 'read',
@@ -46,7 +44,7 @@ _ACCESS = {
 _MOST_LABELS = 7
 
 _INTRODUCTION = """\
-<!-- Made from the tables in nfo_sinus_driver/catalog by `make parameters`: change those. -->
+<!-- Made from the tables in nfo_sinus_driver/families by `make parameters`: change those. -->
 
 # Parameters
 
@@ -87,42 +85,51 @@ inverter status above it. Code 0 ends the log.
 
 | bus | first entry | next entry | entries |
 |---|---|---|---|
-| Modbus | {modbus.first:04X}h | {modbus.stride} registers on | {modbus.entries} |
-| Classic | E{classic.first:04X} | {classic.stride} ids on | {classic.entries} to {classic.limit} |
-| PROFIBUS | P13157 | the next number | {modbus.entries} |
 """
+#: How each numbering is printed: the title of its column, and a number in it.
+_SPACES = {
+    'register': ('Modbus', '{:04X}h', '{} registers on'),
+    'id': ('Classic', 'E{:04X}', '{} ids on'),
+    'pnu': ('PROFIBUS', 'P{}', 'the next number'),
+    'object': ('CANopen', '{:04X}h', 'the next index'),
+}
 
 _Column = tuple[str, Callable[[Parameter], str]]
 
 
 def page() -> str:
     """Return the whole page in Markdown."""
-    parts = [part for name in MODELS for part in _model(load_model(name))]
+    parts = [part for name in families() for part in _family(load_family(name))]
     return '\n'.join([_INTRODUCTION, *parts])
 
 
-def _model(model: Model) -> Iterator[str]:
-    yield f'## {_TITLES[model.name]}\n'
-    groups = list(dict.fromkeys(parameter.group for parameter in model.settings))
+def _family(family: Family) -> Iterator[str]:
+    yield f'## {family.title}\n'
+    groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
     if groups:
         names = ', '.join(f'[{group}](#{_anchor(group)})' for group in groups)
-        yield _SETTINGS.format(count=len(model.settings), groups=names)
+        yield _SETTINGS.format(count=len(family.settings), groups=names)
     else:
         yield _NO_SETTINGS
     for group in groups:
-        rows = [parameter for parameter in model.settings if parameter.group == group]
+        rows = [parameter for parameter in family.settings if parameter.group == group]
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
-        rows = [parameter for parameter in model.values() if parameter.group == group]
+        rows = [parameter for parameter in family.values() if parameter.group == group]
         yield f'### {title}\n'
         yield _table(_OTHER_COLUMNS, rows)
-    if model.name == 'sinus_g2':
-        log = {protocol.value: area for protocol, area in ERROR_LOG.items()}
+    if family.error_logs:
         yield '### Error log\n'
-        yield _ERROR_LOG.format(**log)
+        yield _ERROR_LOG + ''.join(map(_log_row, family.error_logs.values()))
+
+
+def _log_row(area: ErrorLogArea) -> str:
+    bus, first, following = _SPACES[area.space]
+    entries = f'{area.entries}' + (f' to {area.limit}' if area.limit > area.entries else '')
+    return f'| {bus} | {first.format(area.first)} | {following.format(area.stride)} | {entries} |\n'
 
 
 def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
@@ -160,27 +167,26 @@ def _values(parameter: Parameter) -> str:
 def _step(parameter: Parameter) -> str:
     if parameter.labels:
         return ''
-    steps = {protocol: parameter.factor(protocol) for protocol in parameter.places}
-    modbus = steps.get(Protocol.MODBUS)
-    classic = steps.get(Protocol.CLASSIC, modbus)
-    if modbus is None or classic is None or modbus == classic:
-        return _number(modbus or classic or Fraction(1))
-    return f'{_number(modbus)}, {_number(classic)}'
+    steps = [_number(address.factor) for address in parameter.addresses.values()]
+    return ', '.join(dict.fromkeys(steps))
 
 
-def _modbus(parameter: Parameter) -> str:
-    place = parameter.places.get(Protocol.MODBUS)
-    return '' if place is None else f'{place.address:04X}h'
+def _column(space: str) -> _Column:
+    """Return the column of a numbering."""
+    title, shown, _ = _SPACES[space]
 
+    def cell(parameter: Parameter) -> str:
+        found = [a for a in parameter.addresses.values() if a.space == space]
+        # a sub-index is the id of another word
+        numbers = [n for a in found for n in (a.numbers if space == 'id' else a.numbers[:1])]
+        return ', '.join(map(shown.format, numbers))
 
-def _classic(parameter: Parameter) -> str:
-    place = parameter.places.get(Protocol.CLASSIC)
-    return '' if place is None else ', '.join(f'E{address:04X}' for address in place.addresses)
+    return title, cell
 
 
 def _types(parameter: Parameter) -> str:
-    names = [place.type.name for place in parameter.places.values()]
-    return ', '.join(dict.fromkeys(reversed(names)))
+    names = [address.codec.name for address in parameter.addresses.values()]
+    return ', '.join(dict.fromkeys(name.partition('_')[0].upper() for name in names))
 
 
 def _number(number: Fraction) -> str:
@@ -192,10 +198,7 @@ def _anchor(title: str) -> str:
 
 
 _ADDRESSES: tuple[_Column, ...] = (
-    ('Modbus', _modbus),
-    ('Classic', _classic),
-    ('PROFIBUS', lambda row: '' if row.pnu is None else f'P{row.pnu}'),
-    ('CANopen', lambda row: '' if row.canopen is None else f'{row.canopen:04X}h'),
+    *map(_column, _SPACES),
     ('From', lambda row: '' if row.since is None else _number(row.since)),
 )
 _SETTING_COLUMNS: tuple[_Column, ...] = (

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-One parameter of a drive: where it stands on each bus and how raw words become a value.
+One parameter of a drive: where it stands on each bus and how raw numbers become a value.
 
 ``value = raw * factor``, with one factor per bus ([C14], [C15]): the manuals write the same
 scaling in three opposite notations, so the tables hold plain factors.
@@ -30,57 +30,13 @@ import functools
 import math
 import struct
 
+from nfo_sinus_driver.catalog.codec import Number
+from nfo_sinus_driver.catalog.codec import Text
+from nfo_sinus_driver.catalog.codec import to_bytes
+from nfo_sinus_driver.catalog.codec import to_words
+
 #: An engineering value: a number, the label of an enumeration, or on/off.
 Value = bool | int | float | str
-
-
-class Protocol(enum.Enum):
-    """The two ways a parameter is addressed on the drive's own serial port."""
-
-    MODBUS = 'modbus'
-    CLASSIC = 'classic'
-
-
-class RawType(enum.Enum):
-    """The type of a parameter on the bus, as the manuals name it [M0 table 2, table 4]."""
-
-    UINT16 = (1, False)
-    SINT16 = (1, True)
-    UINT32 = (2, False)
-    SINT32 = (2, True)
-    ENUM = (1, False, 'enum')  # the third item only keeps it from being an alias of UINT16
-
-    def __init__(self, words: int, signed: bool, _: str = '') -> None:
-        self.words = words
-        self.signed = signed
-        bits = 16 * words
-        self.minimum = -(1 << bits - 1) if signed else 0
-        self.maximum = (1 << bits - int(signed)) - 1
-
-    def to_raw(self, words: Sequence[int]) -> int:
-        """
-        Join 16-bit words, the low one first [M0 §6.2.3], to the raw number.
-
-        :raises ValueError: not exactly as many words as the type has.
-        """
-        if len(words) != self.words:
-            raise ValueError(f'{self.name} takes {self.words} words, not {len(words)}')
-        raw = 0
-        for position, word in enumerate(words):
-            raw |= (word & 0xFFFF) << 16 * position
-        if raw > self.maximum:
-            raw -= 1 << 16 * self.words
-        return raw
-
-    def to_words(self, raw: int) -> tuple[int, ...]:
-        """
-        Split a raw number into 16-bit words, the low one first.
-
-        :raises ValueError: the number does not fit the type.
-        """
-        if not self.minimum <= raw <= self.maximum:
-            raise ValueError(f'{raw} does not fit {self.name} ({self.minimum} to {self.maximum})')
-        return tuple(raw >> 16 * position & 0xFFFF for position in range(self.words))
 
 
 class Access(enum.Enum):
@@ -93,58 +49,59 @@ class Access(enum.Enum):
     ACKNOWLEDGE = 'ack'
 
 
-@dataclass(frozen=True)
-class Scaling:
-    """
-    The factors that a drive's scale parameters set for whole groups [M0 §8.3].
-
-    The addresses of all but SpdScl are unknown [C16], so the factory defaults are assumed.
-    TrqScl stands for T-nom / 100, so torque is in percent of the nominal torque [C13].
-    """
-
-    frq_scl: Fraction = Fraction(1, 10)
-    spd_scl: Fraction = Fraction(1)
-    trq_scl: Fraction = Fraction(1)
-    reg_scl: Fraction = Fraction(1, 10)
-
-    def factor(self, name: str) -> Fraction:
-        """Return the factor the manual calls ``name``: ``FrqScl``, ``SpdScl`` and so on."""
-        factor: Fraction = getattr(self, f'{name[:3].lower()}_scl')
-        return factor
-
-
-DEFAULT_SCALING = Scaling()
-
 #: The groups of the tables that hold no settings: what a drive measures, and what controls it.
 NO_SETTINGS = frozenset({'Status', 'Fieldbus'})
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a parameter stands on one bus, its type there and its factor there."""
+class Address:
+    """
+    Where a parameter stands on one bus, and how its bytes make a value there.
 
-    #: The Modbus base register, or the Classic ids of the words, the low word's first.
-    addresses: tuple[int, ...]
-    type: RawType
-    #: ``None`` where one of the drive's scale parameters gives the factor [M0 §8.3].
-    factor: Fraction | None
+    :ivar protocol: the protocol that reaches it.
+    :ivar space: which numbering of that protocol ``index`` counts in.
+    :ivar index: its number there; of several registers the first.
+    :ivar sub_index: which part of it; on Classic the id of the high word.
+    :ivar codec: how the bytes are read.
+    :ivar factor: the value of one raw count, in the parameter's unit.
+    :ivar source: where in the manuals that stands.
+    """
+
+    protocol: str
+    space: str
+    index: int
+    sub_index: int | None
+    codec: Number | Text
+    factor: Fraction
+    source: str
 
     @property
-    def address(self) -> int:
-        """The Modbus register, or the Classic id of the low word."""
-        return self.addresses[0]
+    def number(self) -> Number:
+        """
+        The codec of what is no text.
+
+        :raises ValueError: it is a text.
+        """
+        if isinstance(self.codec, Text):
+            raise ValueError(f'{self.codec.name} is no number')
+        return self.codec
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The index, and the sub-index where there is one."""
+        return (self.index,) if self.sub_index is None else (self.index, self.sub_index)
 
     @property
     def words(self) -> int:
-        """How many 16-bit words the parameter has here."""
-        return self.type.words
+        """How many 16-bit words it takes."""
+        return self.codec.size // 2
 
     @property
-    def occupied(self) -> Sequence[int]:
-        """Every register or id that it takes: Classic names them all, Modbus only the first."""
-        if len(self.addresses) == self.words:
-            return self.addresses
-        return range(self.address, self.address + self.words)
+    def occupied(self) -> Sequence[tuple[int, ...]]:
+        """All that it takes and nobody else may: registers and ids one by one."""
+        if self.space == 'register':
+            return [(self.index + word,) for word in range(self.words)]
+        return [(id_,) for id_ in self.numbers] if self.space == 'id' else [self.numbers]
 
 
 @dataclass(frozen=True)
@@ -154,8 +111,10 @@ class Parameter:
 
     :ivar key: ``group.name`` in snake case; for a setting this is the ROS parameter's name.
     :ivar name: the manual's name.
-    :ivar places: where it stands, by protocol; a protocol that lacks it is absent.
-    :ivar scale: the drive's scale parameter that gives the factor (``FrqScl`` …), or ``''``.
+    :ivar addresses: where it stands, by protocol; a protocol that lacks it is absent.
+    :ivar scale: the drive's scale parameter that may change the factor (``FrqScl`` …), or ``''``;
+        the addresses of all but SpdScl are unknown [C16], so the factory's factors are assumed.
+        TrqScl stands for T-nom / 100, so torque is in percent of the nominal torque [C13].
     :ivar unit: the unit of its values.
     :ivar minimum: the least value the manual allows, in ``unit``; ``None`` where it says none.
     :ivar maximum: the greatest, likewise.
@@ -164,14 +123,12 @@ class Parameter:
     :ivar stopped: the motor must stand for it to be written (type Init, not Init/Run).
     :ivar since: the first firmware that has it, or ``None``.
     :ivar source: where in the manuals it stands.
-    :ivar pnu: its PROFIBUS parameter number, 1000 + ADI [M0 §6.3.3]; ``None`` if it has none.
-    :ivar canopen: its CANopen index, 2000h + ADI [M0 §6.4.3], likewise.
     """
 
     key: str
     name: str
     group: str
-    places: Mapping[Protocol, Place]
+    addresses: Mapping[str, Address]
     scale: str
     unit: str
     minimum: Fraction | None
@@ -183,8 +140,6 @@ class Parameter:
     since: Fraction | None
     description: str
     source: str
-    pnu: int | None = None
-    canopen: int | None = None
 
     @functools.cached_property
     def kind(self) -> type[bool] | type[int] | type[float] | type[str]:
@@ -193,8 +148,11 @@ class Parameter:
             labels = set(self.labels.values())
             # RegAmp is one of two numbers, with nothing between them [C46]
             return bool if labels == {'OFF', 'ON'} else int if labels == {'-1', '1'} else str
-        whole = all(place.factor == 1 for place in self.places.values())
-        return int if whole else float
+        if any(isinstance(address.codec, Text) for address in self.addresses.values()):
+            return str
+        # a scale parameter may make it finer
+        whole = all(address.factor == 1 for address in self.addresses.values())
+        return int if whole and not self.scale else float
 
     @property
     def is_setting(self) -> bool:
@@ -206,41 +164,22 @@ class Parameter:
         """Firmware that [M2] describes has it too; asking such a drive for others is a fault."""
         return 'M2' in self.source
 
-    def place(self, protocol: Protocol) -> Place:
+    def at(self, protocol: str) -> Address:
         """
         Return where it stands on ``protocol``.
 
         :raises KeyError: the parameter cannot be reached over that protocol.
         """
         try:
-            return self.places[protocol]
+            return self.addresses[protocol]
         except KeyError:
-            raise KeyError(f'{self.key} cannot be reached over {protocol.value}') from None
+            raise KeyError(f'{self.key} cannot be reached over {protocol}') from None
 
-    def factor(self, protocol: Protocol, scaling: Scaling = DEFAULT_SCALING) -> Fraction:
+    def factor(self, protocol: str) -> Fraction:
         """Return the value of one raw count over ``protocol``, in :attr:`unit`."""
-        if scaling is DEFAULT_SCALING and protocol in self._factors:
-            return self._factors[protocol]
-        factor = self.place(protocol).factor
-        return scaling.factor(self.scale) if factor is None else factor
+        return self.at(protocol).factor
 
-    @functools.cached_property
-    def _factors(self) -> Mapping[Protocol, Fraction]:
-        """The factors that hold by default, for they are asked for with every value."""
-        default = DEFAULT_SCALING.factor(self.scale) if self.scale else None
-        factors = {protocol: place.factor for protocol, place in self.places.items()}
-        return {
-            protocol: factor
-            for protocol, own in factors.items()
-            if (factor := default if own is None else own) is not None
-        }
-
-    def decode(
-        self,
-        words: Sequence[int],
-        protocol: Protocol = Protocol.MODBUS,
-        scaling: Scaling = DEFAULT_SCALING,
-    ) -> Value:
+    def decode(self, words: Sequence[int], protocol: str = 'modbus') -> Value:
         """
         Turn the words read from the drive into a value in :attr:`unit`.
 
@@ -249,20 +188,18 @@ class Parameter:
         :raises ValueError: not as many words as the parameter has, or a code that has no value of
             the parameter's type.
         """
-        raw = self.place(protocol).type.to_raw(words)
+        codec, data = self.at(protocol).codec, to_bytes(words)
+        if isinstance(codec, Text):
+            return codec.decode(data)
+        raw = codec.decode(data)
         if self.labels:
             return self._meaning(raw)
         if self.kind is int:
             return raw
-        factor = self.factor(protocol, scaling)
+        factor = self.factor(protocol)
         return raw * factor.numerator / factor.denominator
 
-    def encode(
-        self,
-        value: Value,
-        protocol: Protocol = Protocol.MODBUS,
-        scaling: Scaling = DEFAULT_SCALING,
-    ) -> tuple[int, ...]:
+    def encode(self, value: Value, protocol: str = 'modbus') -> tuple[int, ...]:
         """
         Turn a value in :attr:`unit` into the words to write, exactly.
 
@@ -270,30 +207,31 @@ class Parameter:
             of the drive; the message says what would be right.
         """
         if self.labels:
-            return self.place(protocol).type.to_words(self._code(value))
+            return self._words(self._code(value), protocol)
+        codec = self.at(protocol).codec
+        if isinstance(codec, Text):
+            return to_words(codec.encode(str(value)))
         number = self._number(value)
-        factor = self.factor(protocol, scaling)
+        factor = self.factor(protocol)
         raw = round(number / factor)
         if not _means(float(number), raw * factor, factor):
-            self._check_range(number, protocol, scaling)
+            self._check_range(number, protocol)
             below = math.floor(number / factor)
             raise ValueError(
                 f'{self.key}: {value} lies between two steps of the drive, '
                 f'{_show(below * factor)} and {_show((below + 1) * factor)}'
             )
-        self._check_range(raw * factor, protocol, scaling)
-        return self.place(protocol).type.to_words(raw)
+        self._check_range(raw * factor, protocol)
+        return self._words(raw, protocol)
 
-    def span(
-        self, protocol: Protocol = Protocol.MODBUS, scaling: Scaling = DEFAULT_SCALING
-    ) -> tuple[Fraction, Fraction]:
+    def span(self, protocol: str = 'modbus') -> tuple[Fraction, Fraction]:
         """
         Return the least and the greatest value over ``protocol``, in :attr:`unit`.
 
         Where the manual allows more than the type can carry, or says nothing, the type decides.
         """
-        factor = self.factor(protocol, scaling)
-        carried = self.place(protocol).type
+        factor = self.factor(protocol)
+        carried = self.at(protocol).number
         low, high = carried.minimum * factor, carried.maximum * factor
         low = low if self.minimum is None else max(low, self.minimum)
         return low, high if self.maximum is None else min(high, self.maximum)
@@ -301,23 +239,22 @@ class Parameter:
     @property
     def never_negative(self) -> bool:
         """It is unsigned on some bus; Classic has signed types for nearly everything [C23]."""
-        return any(not place.type.signed for place in self.places.values())
+        codecs = [address.codec for address in self.addresses.values()]
+        return any(isinstance(codec, Number) and not codec.signed for codec in codecs)
 
-    def quantise(
-        self,
-        value: float,
-        protocol: Protocol = Protocol.MODBUS,
-        scaling: Scaling = DEFAULT_SCALING,
-    ) -> tuple[int, ...]:
+    def quantise(self, value: float, protocol: str = 'modbus') -> tuple[int, ...]:
         """
         Turn a set-point into the words of the nearest step of the drive.
 
         :raises ValueError: not finite, or out of range.
         """
         number = self._number(value)
-        factor = self.factor(protocol, scaling)
-        self._check_range(number, protocol, scaling)
-        return self.place(protocol).type.to_words(round(number / factor))
+        factor = self.factor(protocol)
+        self._check_range(number, protocol)
+        return self._words(round(number / factor), protocol)
+
+    def _words(self, raw: int, protocol: str) -> tuple[int, ...]:
+        return to_words(self.at(protocol).number.encode(raw))
 
     def _meaning(self, raw: int) -> Value:
         """Return what a code of an enumeration means."""
@@ -352,10 +289,10 @@ class Parameter:
             raise ValueError(f'{self.key}: {number} is not finite')
         return Fraction(value)
 
-    def _check_range(self, number: Fraction, protocol: Protocol, scaling: Scaling) -> None:
-        low, high = self.span(protocol, scaling)
+    def _check_range(self, number: Fraction, protocol: str) -> None:
+        low, high = self.span(protocol)
         # the bounds are decimal fractions and the values binary ones
-        slack = self.factor(protocol, scaling) / 1000
+        slack = self.factor(protocol) / 1000
         if not low - slack <= number <= high + slack:
             if self.maximum is None and number < low:
                 allowed = f'at least {_show(low)}'

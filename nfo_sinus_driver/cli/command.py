@@ -22,6 +22,7 @@ import math
 import time
 
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
 from nfo_sinus_driver.cli.status_line import as_line
@@ -66,7 +67,7 @@ def _stop(helm: Helm, options: argparse.Namespace) -> tuple[bool, str]:
     seen = remote.look()
     told = remote.inverter.describe()
     if not seen.from_bus:
-        if seen.driven or seen.code == seen.codes.start_delay:
+        if seen.driven or seen.means(Meaning.START_DELAY):
             return False, (
                 f'keypad or terminals run the motor ({told}), so the bus cannot stop it: '
                 'press STOP at the keypad, or open its RUN input'

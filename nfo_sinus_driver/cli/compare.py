@@ -21,9 +21,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import json
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import read_file
 from nfo_sinus_driver.cli.progress import put
@@ -35,7 +36,6 @@ from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
 
-_ADDRESS = 'serial.address'
 _ABSENT = 'absent'
 
 
@@ -60,10 +60,11 @@ def diff(options: argparse.Namespace) -> int:
         for key in (*left.values, *(key for key in right.values if key not in left.values))
         if not same(left.values.get(key), right.values.get(key))
     ]
-    if _ADDRESS in differing and left.address != right.address and left.address and right.address:
+    model = load_family(options.model)
+    own = model.key(Role.BUS_ADDRESS)
+    if own in differing and left.address != right.address and left.address and right.address:
         # two drives on one line cannot have the same
-        differing.remove(_ADDRESS)
-    model = load_model(options.model)
+        differing.remove(own)
     if options.json:
         table = {
             key: {'left': left.values.get(key), 'right': right.values.get(key)} for key in differing
@@ -110,7 +111,7 @@ def _read(drive: Remote) -> _Side:
     return _Side(f'address {drive.address}', drive.read(), str(drive.address))
 
 
-def _cell(side: _Side, key: str, model: Model) -> str:
+def _cell(side: _Side, key: str, model: Family) -> str:
     if key not in side.values:
         return _ABSENT
     return shown(side.values[key], model[key].unit if key in model else '')

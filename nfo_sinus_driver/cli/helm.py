@@ -28,6 +28,7 @@ import time
 from typing import Any
 from typing import TypeVar
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
@@ -79,8 +80,8 @@ class Ear:
         self._mute = tuple(mute)
         #: What was said to a person.
         self.told: list[str] = []
-        #: What was measured last, by catalog key.
-        self.values: dict[str, float] = {}
+        #: What was measured last.
+        self.values: dict[Role, float] = {}
 
     def on_event(self, severity: Severity, text: str) -> None:
         """Pass on what a person has to know."""

@@ -24,6 +24,7 @@ import json
 import math
 
 from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.cli.erase import erase
 from nfo_sinus_driver.cli.progress import progress
@@ -40,8 +41,14 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.link import Refused
 
-_NAMEPLATE = ('motor.p_nom', 'motor.u_nom', 'motor.f_nom', 'motor.n_nom', 'motor.i_nom')
-_COUNTERS = {'status.op_time': 'operating time', 'status.rn_time': 'running time'}
+_NAMEPLATE = (
+    Role.NOMINAL_POWER,
+    Role.NOMINAL_VOLTAGE,
+    Role.NOMINAL_FREQUENCY,
+    Role.NOMINAL_SPEED,
+    Role.NOMINAL_CURRENT,
+)
+_COUNTERS = {Role.OPERATING_TIME: 'operating time', Role.RUNNING_TIME: 'running time'}
 
 
 def info(options: argparse.Namespace) -> int:
@@ -50,9 +57,9 @@ def info(options: argparse.Namespace) -> int:
         drive = session.drive()
         identity = drive.identify()
         seen = drive.look()
-        mode = _measure(drive, filter(drive.registers.reaches, ['control.mode']))
-        nameplate = _measure(drive, filter(drive.registers.reaches, _NAMEPLATE))
-        hours = _measure(drive, filter(drive.registers.reaches, _COUNTERS))
+        mode = _measure_roles(drive, [Role.CONTROL_MODE])
+        nameplate = _measure_roles(drive, _NAMEPLATE)
+        hours = _measure_roles(drive, _COUNTERS)
         facts = {
             'address': str(drive.address),
             'port': options.port,
@@ -61,11 +68,11 @@ def info(options: argparse.Namespace) -> int:
             'vendor': identity.vendor,
             'firmware': identity.versions,
             'serial number': identity.serial,
-            'status': f'{drive.inverter.describe()} ({drive.model.inv_st(seen.code).description})',
+            'status': f'{drive.inverter.describe()} ({seen.listed.description})',
             'state': seen.state.name.lower().replace('_', ' '),
-            'control mode': str(mode.get('control.mode', '')),
-            'motor': ', '.join(shown(nameplate[key], drive.model[key].unit) for key in nameplate),
-            **{_COUNTERS[key]: shown(hours[key], drive.model[key].unit) for key in hours},
+            'control mode': ''.join(mode.values()),
+            'motor': ', '.join(nameplate.values()),
+            **{_COUNTERS[role]: text for role, text in hours.items()},
         }
     if options.json:
         put(json.dumps(facts, ensure_ascii=False, indent=2))
@@ -201,6 +208,16 @@ def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]
     others = [key for key in wanted if key not in settings and drive.inverter.has(key)]
     values.update(_measure(drive, others))
     return values
+
+
+def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
+    keys = {role: drive.model.key(role) for role in roles}
+    found = _measure(drive, filter(drive.registers.reaches, keys.values()))
+    return {
+        role: shown(found[key], drive.model[key].unit)
+        for role, key in keys.items()
+        if key in found
+    }
 
 
 def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:

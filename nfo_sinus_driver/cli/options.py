@@ -21,8 +21,7 @@ from collections.abc import Sequence
 import math
 import shlex
 
-from nfo_sinus_driver.catalog import MODELS
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import ADDRESSES
@@ -63,7 +62,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     for name, default in defaults.items():
         if not hasattr(options, name):
             setattr(options, name, default)
-    protocol = Protocol.CLASSIC if options.protocol == 'classic' else Protocol.MODBUS
+    protocol = 'classic' if options.protocol == 'classic' else 'modbus'
     if options.verb == 'scan' and not options.addresses:
         options.addresses = tuple(filter(None, ADDRESSES[protocol]))
     against = getattr(options, 'against', None)
@@ -105,7 +104,7 @@ def _common() -> argparse.ArgumentParser:
         metavar='N',
         help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone (default: 1)',
     )
-    add('--model', choices=MODELS, help='default: sinus_g2')
+    add('--model', choices=families(), help='default: sinus_g2')
     add(
         '--baud-rate',
         type=int,

@@ -33,7 +33,7 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import listed
@@ -66,7 +66,7 @@ class ParameterFile:
     skipped: tuple[str, ...] = ()
 
 
-def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: Model) -> str:
+def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: Family) -> str:
     """Return the text of a parameter file, with units in comments."""
     lines = [_TITLE, '#']
     said = {what: _one_line(header.get(what, '')) for what in HEADER}

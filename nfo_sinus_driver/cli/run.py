@@ -21,6 +21,7 @@ import json
 import math
 import time
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.helm import Ended
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
@@ -111,7 +112,7 @@ class _Ride:
                 'then type nfo-sinus ack'
             )
         mode = remote.do(remote.inverter.read_control_mode)
-        if not remote.registers.reaches('control.mode'):
+        if not remote.registers.reaches(remote.model.key(Role.CONTROL_MODE)):
             # nothing tells it, so it is what was typed
             mode = options.control_mode or mode
         if options.control_mode not in ('', mode):

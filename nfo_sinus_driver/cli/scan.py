@@ -25,6 +25,7 @@ import copy
 import json
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.driver_params import driver_params
 from nfo_sinus_driver.cli.driver_params import require_new
 from nfo_sinus_driver.cli.parameter_file import STANDARD
@@ -158,7 +159,8 @@ def _ask(drive: Remote) -> dict[str, str] | None:
     :raises DriveError: the port cannot be used.
     """
     try:
-        drive.do(lambda: drive.registers.read_words('fieldbus.inv_st', Priority.POLL, once=True))
+        status = drive.model.key(Role.STATUS_CODE)
+        drive.do(lambda: drive.registers.read_words(status, Priority.POLL, once=True))
         identity = drive.identify()
     except DriveError as error:
         cause = error.__cause__

@@ -30,9 +30,9 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.trouble import Trouble
@@ -77,7 +77,7 @@ class Remote:
     def __init__(self, bus: Bus, settings: DriveSettings) -> None:
         self._bus = bus
         self.address = settings.address
-        self.model: Model = load_model(settings.model)
+        self.model: Family = load_family(settings.model)
         self.registers = Registers(bus, settings.address, self.model, settings.retries)
         self.inverter = Inverter(self.model, self.registers, self, settings)
         motion = None

@@ -21,21 +21,22 @@ from datetime import datetime
 import json
 import math
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Snapshot
 
 #: What is measured beside the status: its name, its unit and its decimals.
 _VALUES = {
-    'status.i_rms': ('output_current', 'A', 2),
-    'status.p_out': ('output_power', 'W', 0),
-    'status.trq_act': ('torque', '%', 0),
+    Role.OUTPUT_CURRENT: ('output_current', 'A', 2),
+    Role.OUTPUT_POWER: ('output_power', 'W', 0),
+    Role.ACTUAL_TORQUE: ('torque', '%', 0),
 }
 
 
-def as_line(seen: Snapshot, values: Mapping[str, float], more: str = '') -> str:
+def as_line(seen: Snapshot, values: Mapping[Role, float], more: str = '') -> str:
     """
     Return what a drive does, in one line.
 
-    :param values: what was measured, by catalog key.
+    :param values: what was measured.
     :param more: what stands behind the time.
     """
     when = f'{datetime.now().astimezone():%H:%M:%S}'
@@ -48,13 +49,13 @@ def as_line(seen: Snapshot, values: Mapping[str, float], more: str = '') -> str:
         cells.append(f'actual {_number(seen.actual, 1):>5} {seen.unit}')
     cells += [f'{_number(seen.frequency, 1):>5} Hz', f'{_number(seen.speed, 0):>5} rpm']
     cells += [
-        f'{_number(values.get(key, math.nan), decimals):>4} {unit}'
-        for key, (_, unit, decimals) in _VALUES.items()
+        f'{_number(values.get(role, math.nan), decimals):>4} {unit}'
+        for role, (_, unit, decimals) in _VALUES.items()
     ]
     return '  '.join(cells)
 
 
-def as_json(seen: Snapshot, values: Mapping[str, float]) -> str:
+def as_json(seen: Snapshot, values: Mapping[Role, float]) -> str:
     """Return the same as a JSON document of one line; the names are those of the messages."""
     facts: dict[str, object] = {
         'time': datetime.now().astimezone().isoformat(),
@@ -75,7 +76,7 @@ def as_json(seen: Snapshot, values: Mapping[str, float]) -> str:
             'speed': _known(seen.speed),
         }
         facts |= {
-            name: _known(values.get(key, math.nan)) for key, (name, _, _) in _VALUES.items()
+            name: _known(values.get(role, math.nan)) for role, (name, _, _) in _VALUES.items()
         }
     return json.dumps(facts, ensure_ascii=False)
 

@@ -22,7 +22,7 @@ from datetime import datetime
 from importlib import metadata
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.loading import Loading
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import format_file
@@ -65,7 +65,7 @@ def load(options: argparse.Namespace) -> int:
     """Put saved settings into the drive; only what differs is written."""
     file = read_file(options.file)
     # what another model has is refused before anything is asked of the drive
-    settings = {parameter.key for parameter in load_model(options.model).settings}
+    settings = {parameter.key for parameter in load_family(options.model).settings}
     require_names(file.values, settings, options.model, _NOTHING)
     with Session(options, writes=not options.dry_run) as session:
         drive = session.drive()

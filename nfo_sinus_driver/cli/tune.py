@@ -20,6 +20,7 @@ import argparse
 import json
 import time
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.helm import Ended
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
@@ -52,7 +53,7 @@ def tune(options: argparse.Namespace) -> int:
     with Session(options) as session:
         drive = session.drive()
         drive.identify(thoroughly=False)
-        if not drive.inverter.has('fieldbus.scmd'):
+        if not drive.inverter.has(drive.model.key(Role.START_COMMAND)):
             raise Trouble(
                 f'{what} is not known of this model ({drive.model.name}): [M1] lists no command '
                 'for it; do it at the keypad'

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 import difflib
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.cli.trouble import Trouble
@@ -81,7 +81,7 @@ def parse_value(parameter: Parameter, text: str) -> Value:
         raise ValueError(f'{parameter.key}: {text!r} is not a number') from None
 
 
-def measured(model: Model) -> tuple[Parameter, ...]:
+def measured(model: Family) -> tuple[Parameter, ...]:
     """Return what a drive measures, where reading it has no effect."""
     return tuple(
         parameter
@@ -90,7 +90,7 @@ def measured(model: Model) -> tuple[Parameter, ...]:
     )
 
 
-def readable(model: Model) -> Mapping[str, Parameter]:
+def readable(model: Family) -> Mapping[str, Parameter]:
     """Return what this tool shows when asked for it by name: settings and measured values."""
     return {parameter.key: parameter for parameter in (*model.settings, *measured(model))}
 

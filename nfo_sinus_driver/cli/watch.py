@@ -27,6 +27,7 @@ import sys
 import time
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
@@ -39,13 +40,13 @@ from nfo_sinus_driver.link import Refused
 
 #: What is measured: its name, as in the messages of the driver, its width and its decimals.
 _VALUES = {
-    'status.frq_act': ('frequency', 6, 1),
-    'status.spd_act': ('speed', 5, 0),
-    'status.i_rms': ('output_current', 6, 2),
-    'status.u_rms': ('output_voltage', 4, 0),
-    'status.p_out': ('output_power', 5, 0),
-    'status.trq_act': ('torque', 4, 0),
-    'status.dc_link': ('dc_link_voltage', 4, 0),
+    Role.ACTUAL_FREQUENCY: ('frequency', 6, 1),
+    Role.ACTUAL_SPEED: ('speed', 5, 0),
+    Role.OUTPUT_CURRENT: ('output_current', 6, 2),
+    Role.OUTPUT_VOLTAGE: ('output_voltage', 4, 0),
+    Role.OUTPUT_POWER: ('output_power', 5, 0),
+    Role.ACTUAL_TORQUE: ('torque', 4, 0),
+    Role.DC_LINK_VOLTAGE: ('dc_link_voltage', 4, 0),
 }
 _CLEAR_LINE = '\r\x1b[K'
 
@@ -115,12 +116,15 @@ def _show(
     return answered
 
 
-async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[str, float]]:
+async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[Role, float]]:
     seen = await drive.inverter.look(Priority.POLL, once=True)
     values = dict.fromkeys(_VALUES, math.nan)
-    for key in filter(drive.registers.reaches, _VALUES):
+    for role in _VALUES:
+        key = drive.model.key(role)
+        if not drive.registers.reaches(key):
+            continue
         try:
-            values[key] = await drive.registers.read_number(key, Priority.POLL, once=True)
+            values[role] = await drive.registers.read_number(key, Priority.POLL, once=True)
         except Refused:
             # it has none
             continue
@@ -128,11 +132,11 @@ async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[str, float]]:
 
 
 def _facts(
-    drive: Remote, seen: InverterStatus, values: Mapping[str, float]
+    drive: Remote, seen: InverterStatus, values: Mapping[Role, float]
 ) -> dict[str, object]:
     measured = {
-        name: None if math.isnan(values[key]) else values[key]
-        for key, (name, _, _) in _VALUES.items()
+        name: None if math.isnan(values[role]) else values[role]
+        for role, (name, _, _) in _VALUES.items()
     }
     return {
         'connected': True,
@@ -144,10 +148,10 @@ def _facts(
     }
 
 
-def _line(drive: Remote, values: Mapping[str, float]) -> str:
+def _line(drive: Remote, values: Mapping[Role, float]) -> str:
     cells = [f'{drive.inverter.describe():<18}']
-    for key, (_, width, decimals) in _VALUES.items():
-        value = values[key]
+    for role, (_, width, decimals) in _VALUES.items():
+        value, key = values[role], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'
         unit = drive.model[key].unit if key in drive.model else ''
         cells.append(f'{number:>{width}} {unit}')

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -64,7 +65,7 @@ def explain(error: LinkError, address: int, *, known: bool) -> str:
 
 def explain_fault(inverter: Inverter, seen: InverterStatus) -> str:
     """Return which fault stands, what it means and what to do about its cause."""
-    fault = inverter.model.inv_st(seen.code)
+    fault = seen.listed
     return f'fault {inverter.describe()}: {fault.description}. {fault.remedy}'
 
 
@@ -75,7 +76,7 @@ def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
     :raises DriveError: one does.
     """
     if seen.faulted:
-        fault = inverter.model.inv_st(seen.code)
+        fault = seen.listed
         raise DriveError(
             f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
             'then call ~/fault_ack'
@@ -121,9 +122,9 @@ def explain_loss(inverter: Inverter) -> str:
 
 def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
     told = inverter.describe()
-    if seen.code in seen.codes.terminals:
+    if seen.means(Meaning.TERMINALS):
         return f'the terminals have control now ({told}): press STOP at the drive'
-    if seen.code in seen.codes.keypad:
+    if seen.means(Meaning.KEYPAD):
         return f'the keypad has control now and runs the motor ({told}): press STOP there'
     if seen.runs:
         # the current limit, for one, shows instead of who runs it

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
 
 #: The address that every drive listens to and none answers [M0 §6.1.2].
@@ -29,7 +29,7 @@ EVERYBODY = 95
 
 def can_broadcast(bus: Bus) -> bool:
     """Tell whether the protocol of a line has a broadcast that every drive obeys."""
-    return Protocol(bus.space) is Protocol.CLASSIC
+    return bus.space == 'classic'
 
 
 async def broadcast_stop(bus: Bus) -> None:
@@ -40,7 +40,8 @@ async def broadcast_stop(bus: Bus) -> None:
 
     :raises LinkError: the port is lost.
     """
-    place = load_model('sinus_g2')['fieldbus.mode'].place(Protocol.CLASSIC)
+    g2 = load_family('sinus_g2')
+    place = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
     await bus.write(
-        EVERYBODY, Address(place.addresses, place.words), (Mode.STOP,), Priority.STOP
+        EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
     )

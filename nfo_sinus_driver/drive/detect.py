@@ -19,8 +19,8 @@ from __future__ import annotations
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.link import Address
@@ -37,13 +37,14 @@ async def detect_model(bus: Bus, unit: int) -> str:
 
     :raises DriveError: it does not answer; the message says what to check.
     """
-    if Protocol(bus.space) is Protocol.CLASSIC:
+    if bus.space == 'classic':
         return 'sinus_g2'
-    place = load_model('sinus_g2')['fieldbus.sw_ver'].place(Protocol.MODBUS)
+    g2 = load_family('sinus_g2')
+    place = g2[g2.key(Role.FIRMWARE)].at('modbus')
     try:
         if await bus.identify(unit, Priority.SERVICE) != Identification():
             return 'sinus_g2'
-        await bus.read(unit, Address(place.addresses, place.words), Priority.SERVICE)
+        await bus.read(unit, Address(place.numbers, place.words), Priority.SERVICE)
     except Refused:
         return 'sinus_optimal'
     except Cancelled:

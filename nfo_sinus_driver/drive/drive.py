@@ -29,8 +29,9 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.error_log import ErrorLog
@@ -65,7 +66,7 @@ _T = TypeVar('_T')
 #: How long an exit waits for the first answer of a drive that has never answered yet, s.
 _FIRST_ANSWER = 1.0
 #: What the unit of set-points follows from.
-_MODE_KEYS = frozenset(('control.mode', 'pi_reg.unit'))
+_MODE_ROLES = (Role.CONTROL_MODE, Role.PROCESS_UNIT)
 
 
 class Drive:
@@ -82,7 +83,7 @@ class Drive:
         self._bus = bus
         self._unit = settings.address
         self._listener = listener
-        model = load_model(settings.model)
+        model = load_family(settings.model)
         self._registers = Registers(bus, self._unit, model, settings.retries)
         self._inverter = Inverter(model, self._registers, listener, settings)
         self._setpoint = Setpoint(
@@ -136,7 +137,7 @@ class Drive:
         self._inverter.settings = settings
 
     @property
-    def model(self) -> Model:
+    def model(self) -> Family:
         """What the catalog knows of its family."""
         return self._inverter.model
 
@@ -440,15 +441,16 @@ class Drive:
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""
-        values = self.parameters.values
-        if 'serial.sio_tot' in keys:
-            self._inverter.sio_tot = float(values['serial.sio_tot'])
-        if 'serial.auto_stop' in keys:
-            self._inverter.auto_stop = bool(values.get('serial.auto_stop'))
-        if 'serial.sio_tot' in keys:
+        values, key = self.parameters.values, self.model.key
+        timeout, stop = key(Role.COMMUNICATION_TIMEOUT), key(Role.STOP_AT_TIMEOUT)
+        if timeout in keys:
+            self._inverter.sio_tot = float(values[timeout])
+        if stop in keys:
+            self._inverter.auto_stop = bool(values.get(stop))
+        if timeout in keys:
             # the drive may have to be kept alive more often from now on
             self._watch.wake()
-        if not _MODE_KEYS.isdisjoint(keys):
+        if any(key(role) in keys for role in _MODE_ROLES):
             self._watch.read_mode_soon()
         self._listener.on_parameters(keys)
 

@@ -25,12 +25,8 @@ from __future__ import annotations
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog import words_optimal
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
 from nfo_sinus_driver.drive.advice import CONTROLLED_ELSEWHERE
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.control_method import Removal
@@ -38,6 +34,10 @@ from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.reference import references
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.link import Refused
 
 _WORD = 'fieldbus.drive_control'
@@ -178,7 +178,7 @@ class DriveControl:
             MODE = Stop would take from them.
         """
         registers, why, elsewhere = self._registers, '', False
-        if code == SIO_FAIL:
+        if Meaning.SERIAL_FAILURE in registers.model.status_code(code).meanings:
             elsewhere = await registers.read('fieldbus.mode', Priority.SERVICE) == Mode.EXT
             if not elsewhere:
                 with contextlib.suppress(Refused):

@@ -24,8 +24,7 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.errors import DriveError
@@ -34,6 +33,8 @@ from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -69,7 +70,7 @@ class Errands:
         inverter = self._inverter
         if not inverter.connected:
             raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
-        if not inverter.has('fieldbus.scmd'):
+        if not inverter.has(inverter.model.key(Role.START_COMMAND)):
             raise DriveError(
                 f'{what} is not known of this model ({inverter.model.name}): [M1] lists no command '
                 'for it; do it at the keypad'
@@ -166,7 +167,7 @@ class Errands:
         while True:
             try:
                 await self._registers.write(
-                    'fieldbus.scmd',
+                    self._inverter.model.key(Role.START_COMMAND),
                     command,
                     Priority.STOP,
                     once=True,
@@ -192,7 +193,8 @@ class Errands:
         inverter, what = self._inverter, loan.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
-        mode = int(await self._registers.read_number('fieldbus.mode', Priority.SERVICE))
+        key = self._inverter.model.key(Role.CONTROL_SOURCE)
+        mode = int(await self._registers.read_number(key, Priority.SERVICE))
         if mode == Mode.INHIBIT:
             raise DriveError(
                 f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '

@@ -24,15 +24,16 @@ import math
 import time
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -42,7 +43,6 @@ _TICKS = 0xFFFFFF
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
 _TRIES = 3
-_ENERGY = 'status.e_out'
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
 
@@ -115,7 +115,7 @@ class ErrorLog:
     @property
     def documented(self) -> bool:
         """A manual says where it stands."""
-        return self._inverter.has('fieldbus.scmd')
+        return self._registers.protocol in self._inverter.model.error_logs
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """
@@ -144,7 +144,8 @@ class ErrorLog:
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, and have the clock follow it."""
         once = priority > Priority.POLL
-        hours, at = await self._registers.read_at('status.op_time', priority, once=once)
+        key = self._inverter.model.key(Role.OPERATING_TIME)
+        hours, at = await self._registers.read_at(key, priority, once=once)
         assert not isinstance(hours, str)
         self.clock.note(float(hours), at)
         return float(hours)
@@ -189,9 +190,9 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        what = 'resetting the kWh counter'
+        what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
         self._errands.require(what)
-        if not self._inverter.has(_ENERGY):
+        if not self._inverter.has(energy):
             told = self._inverter.identity
             raise DriveError(
                 f'{what} came with firmware 4.38; this drive has '
@@ -199,19 +200,19 @@ class ErrorLog:
             )
         with self._errands.lent(what) as loan:
             async with self._errands.sent(loan):
-                before = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                before = await self._registers.read_number(energy, Priority.SERVICE)
                 await self._errands.tell(loan, Scmd.RESET_E_OUT)
-                after = await self._registers.read_number(_ENERGY, Priority.SERVICE)
+                after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
-                    raise DriveError(f'the drive took the command, but {_ENERGY} is {after:g} kWh')
-        return f'{_ENERGY}: {before:.3f} -> {after:.3f} kWh'
+                    raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')
+        return f'{energy}: {before:.3f} -> {after:.3f} kWh'
 
     def _area(self) -> ErrorLogArea:
         if not self.documented:
             raise DriveError(
                 f'the error log of this model ({self._inverter.model.name}) is not documented [M1]'
             )
-        return ERROR_LOG[self._registers.protocol]
+        return self._inverter.model.error_logs[self._registers.protocol]
 
     async def _read(
         self, area: ErrorLogArea, limit: int, known: int, priority: Priority
@@ -245,14 +246,11 @@ class ErrorLog:
         self, area: ErrorLogArea, number: int, priority: Priority = Priority.POLL
     ) -> int:
         """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
-        first = area.address(number)
-        classic = self._registers.protocol.value == 'classic'
-        numbers = (first, first + 1) if classic else (first,)
         # nobody waits for what is read in the background, so it is not asked for again at once
         words = await self._registers.read_from(
-            Address(numbers, area.TYPE.words), priority, once=priority > Priority.POLL
+            Address(area.numbers(number), area.words), priority, once=priority > Priority.POLL
         )
-        return area.TYPE.to_raw(words)
+        return area.codec.decode(to_bytes(words))
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
         code, then = code_of(entry), hours_of(entry)

@@ -26,10 +26,10 @@ import math
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NO_CODE
@@ -38,6 +38,7 @@ from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
@@ -99,7 +100,7 @@ class Inverter:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
     def __init__(
-        self, model: Model, registers: Registers, listener: Listener, settings: DriveSettings
+        self, model: Family, registers: Registers, listener: Listener, settings: DriveSettings
     ) -> None:
         self.model = model
         self.settings = settings
@@ -122,7 +123,7 @@ class Inverter:
         #: Measured values that were told to be impossible.
         self._told_impossible: set[str] = set()
         #: What was polled last, by catalog key.
-        self.polled: dict[str, Measured] = {}
+        self.polled: dict[Role, Measured] = {}
         #: It changes its parameters itself just now.
         self.tuning = False
         self.control_mode = ''
@@ -197,7 +198,8 @@ class Inverter:
         return int(self._registers.number(STATUS_WORD, words)) & 0xFFFF
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
-        code, at = await self._registers.read_at('fieldbus.inv_st', priority, once=once)
+        key = self.model.key(Role.STATUS_CODE)
+        code, at = await self._registers.read_at(key, priority, once=once)
         assert isinstance(code, int)
         return code, at
 
@@ -205,8 +207,9 @@ class Inverter:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._read_code(priority, once)
         seen = InverterStatus(at, None, code, self.model, code_at=at)
-        if code in seen.codes.anonymous:
-            mode = await self._registers.read_number('fieldbus.mode', priority, once=once)
+        if seen.means(Meaning.ANONYMOUS):
+            key = self.model.key(Role.CONTROL_SOURCE)
+            mode = await self._registers.read_number(key, priority, once=once)
             seen = replace(seen, by_mode=mode == Mode.BUS)
         return self._saw(seen)
 
@@ -234,12 +237,13 @@ class Inverter:
         self.answering = False
         self.on_missed()
 
-    async def measure(self, key: str, priority: Priority) -> float:
+    async def measure(self, role: Role, priority: Priority) -> float:
         """
         Read a measured value once; NaN if the drive says what cannot be, and that again.
 
         :raises LinkError: it does not answer, or refuses.
         """
+        key = self.model.key(role)
         words = await self._registers.read_words(key, priority, once=True)
         value = self._registers.number(key, words)
         if not self._registers.is_odd(key):
@@ -254,33 +258,36 @@ class Inverter:
             )
         return math.nan
 
-    def last_polled(self, key: str) -> Measured:
+    def last_polled(self, role: Role | None) -> Measured:
         """Return what a poll has measured last."""
-        return self.polled.get(key, NOT_MEASURED)
+        return NOT_MEASURED if role is None else self.polled.get(role, NOT_MEASURED)
 
     @property
     def frequency(self) -> float:
         """Hz, as last polled."""
-        return self.last_polled('status.frq_act').value
+        return self.last_polled(Role.ACTUAL_FREQUENCY).value
 
     @property
     def speed(self) -> float:
         """The speed as last polled, rpm."""
-        return self.last_polled('status.spd_act').value
+        return self.last_polled(Role.ACTUAL_SPEED).value
 
     @property
     def can_time_out(self) -> bool:
         """It has a time-out of its own that can be read and set over this line."""
-        return self.has('serial.sio_tot') and self.has('serial.auto_stop')
+        needed = (Role.COMMUNICATION_TIMEOUT, Role.STOP_AT_TIMEOUT)
+        return all(self.has(self.model.key(role)) for role in needed)
 
     async def read_timeout(self) -> None:
         """Read whether the drive has a time-out of its own."""
         if not self.can_time_out:
             return
-        self.sio_tot = await self._registers.read_number('serial.sio_tot', Priority.SERVICE)
-        words = await self._registers.read_words('serial.auto_stop', Priority.SERVICE)
+        timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
+        stop = self.model.key(Role.STOP_AT_TIMEOUT)
+        self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
+        words = await self._registers.read_words(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = words == self._registers.words('serial.auto_stop', True)
+        self.auto_stop = words == self._registers.words(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """
@@ -291,11 +298,12 @@ class Inverter:
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self._registers.read('fieldbus.inv_st', priority, once=not patient)
-        classic = self._registers.protocol is Protocol.CLASSIC
+        await self._registers.read(self.model.key(Role.STATUS_CODE), priority, once=not patient)
+        classic = self._registers.protocol == 'classic'
         before, was_older = self.identity, self._older
         self._older = classic and self.settings.classic_dialect == 'v5.0'
-        if self._older or not self._registers.reaches('fieldbus.sw_ver'):
+        firmware_key = self.model.key(Role.FIRMWARE)
+        if self._older or not self._registers.reaches(firmware_key):
             self.identity = Identity()
             return self.identity
         if not await self._may_ask_firmware():
@@ -307,8 +315,9 @@ class Inverter:
                 self._older = was_older
             return self.identity or Identity()
         try:
-            firmware = await self._registers.read_number('fieldbus.sw_ver', Priority.SERVICE)
-            motor = await self._registers.read_number('fieldbus.nfo_ver', Priority.SERVICE)
+            firmware = await self._registers.read_number(firmware_key, Priority.SERVICE)
+            motor_key = self.model.key(Role.MOTOR_FIRMWARE)
+            motor = await self._registers.read_number(motor_key, Priority.SERVICE)
         except Refused:
             if not classic or self.settings.classic_dialect:
                 raise
@@ -328,9 +337,10 @@ class Inverter:
         """
         settings = self.settings
         known = settings.classic_dialect or settings.control_method == 'drive_control'
-        if known or self._registers.protocol is not Protocol.CLASSIC:
+        if known or self._registers.protocol != 'classic':
             return True
-        mode = await self._registers.read_number('fieldbus.mode', Priority.SERVICE)
+        key = self.model.key(Role.CONTROL_SOURCE)
+        mode = await self._registers.read_number(key, Priority.SERVICE)
         return mode in (Mode.STOP, Mode.EXT)
 
     @property
@@ -364,27 +374,30 @@ class Inverter:
 
         The Optimal has no register that tells it [C58]: it is what the settings expect.
         """
-        if self._registers.reaches('control.mode'):
-            mode = await self.read_label('control.mode', priority, once=once)
+        key = self.model.key(Role.CONTROL_MODE)
+        if self._registers.reaches(key):
+            mode = await self.read_label(key, priority, once=once)
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
-            unit = await self.read_label('pi_reg.unit', priority, once=once)
+            unit = await self.read_label(self.model.key(Role.PROCESS_UNIT), priority, once=once)
         # both at once: nobody is told of the one without the other
         self.control_mode, self.unit = mode, unit
         return mode
 
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97]."""
-        if self._registers.reaches('control.st_mode'):
-            return await self.read_label('control.st_mode', Priority.STOP) == 'Release'
+        key = self.model.key(Role.STOP_MODE)
+        if self._registers.reaches(key):
+            return await self.read_label(key, Priority.STOP) == 'Release'
         return self.seen is not None and Fact.STOP_MODE_BRAKE not in self.seen.facts
 
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""
-        if self._registers.reaches('control.run_dly'):
-            return await self.read_number('control.run_dly')
+        key = self.model.key(Role.START_DELAY)
+        if self._registers.reaches(key):
+            return await self.read_number(key)
         return _LONGEST_START_DELAY
 
     async def read_label(
@@ -412,7 +425,7 @@ class Inverter:
         firmware = self.identity.version if self.identity else None
         if self._older and firmware is None:
             firmware = Fraction(0)
-        return self.model.inv_st_text(code, firmware)
+        return self.model.status_code(code).shown(firmware)
 
     def describe(self) -> str:
         """Return the inverter status for a message: code and text."""

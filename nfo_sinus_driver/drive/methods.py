@@ -17,9 +17,6 @@
 from __future__ import annotations
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import words_optimal
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.drive_control import DriveControl
 from nfo_sinus_driver.drive.drive_control import OptimalDriveControl
@@ -28,6 +25,9 @@ from nfo_sinus_driver.drive.mode_scmd import ModeScmd
 from nfo_sinus_driver.drive.mode_scmd import ModeSmode
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 
 #: The run command that each reference has; the fixed ones are made of their number.
 _COMMANDS = {

@@ -21,11 +21,7 @@ from collections.abc import Sequence
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
-from nfo_sinus_driver.catalog.words_optimal import Mode as OptimalMode
-from nfo_sinus_driver.catalog.words_optimal import Smode
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.drive.advice import CONTROLLED_ELSEWHERE
 from nfo_sinus_driver.drive.control_method import Reached
 from nfo_sinus_driver.drive.control_method import Removal
@@ -34,6 +30,10 @@ from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.reference import references
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_optimal.words import Mode as OptimalMode
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.link import Refused
 
 #: The priority of what an acknowledgement takes: with it the motor might go on.
@@ -170,7 +170,8 @@ class ModeScmd:
         :raises DriveError: a serial fault is left, for keypad or terminals keep the control that
             MODE = Stop would take from them.
         """
-        if code != SIO_FAIL:
+        listed = self._registers.model.status_code(code)
+        if Meaning.SERIAL_FAILURE not in listed.meanings:
             await self._acknowledge_by_reading(control_mode)
             return ''
         elsewhere = await self._controlled_elsewhere()

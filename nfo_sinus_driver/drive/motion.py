@@ -34,6 +34,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
@@ -238,7 +239,7 @@ class Motion:
         """
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
-        fault = inverter.model.inv_st(seen.code)
+        fault = seen.listed
         if not seen.faulted and fault.kind is Kind.STATUS:
             return f'nothing to acknowledge ({inverter.describe()})'
         ours = self.concerned or await self._method.in_control(Priority.SERVICE)
@@ -267,7 +268,7 @@ class Motion:
             await self._settle()
         except DriveError:
             now = inverter.seen or seen
-            stands = inverter.model.inv_st(now.code)
+            stands = now.listed
             first = f'acknowledged {name}, but ' if now.code != seen.code else ''
             raise DriveError(
                 f'{first}{inverter.describe()} still stands: {stands.description}. {stands.remedy}'
@@ -448,7 +449,7 @@ class Motion:
             # another one
             if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
                 raise DriveError(NO_RUN_INPUT)
-            if seen.code == seen.codes.start_delay and not delayed:
+            if seen.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()
             if time.monotonic() > deadline:

@@ -21,6 +21,7 @@ import math
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
@@ -57,13 +58,14 @@ class Notices:
 
     def _texts(self, seen: InverterStatus) -> Mapping[str, str]:
         """Return what is there, each alarm by its code."""
-        told, entry, codes = self._inverter.describe(), seen.listed, seen.codes
+        told, entry = self._inverter.describe(), seen.listed
         texts: dict[str, str] = {}
-        limited = Fact.LIMIT_ACTIVE in seen.facts or seen.code == codes.current_limit
+        by_code = seen.means(Meaning.CURRENT_LIMIT)
+        limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
         if limited and not seen.faulted:
-            remedy = self._inverter.model.inv_st(codes.current_limit).remedy
-            texts['limit'] = f'the current limit holds the motor back ({told}). {remedy}'
-        if seen.kind is Kind.ALARM and seen.code != codes.current_limit:
+            (limit,) = seen.model.codes(Meaning.CURRENT_LIMIT)
+            texts['limit'] = f'the current limit holds the motor back ({told}). {limit.remedy}'
+        if seen.kind is Kind.ALARM and not by_code:
             if entry.remedy:
                 texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'
             elif self._unnamed and not limited:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameters import Parameters
@@ -85,7 +86,8 @@ class OwnTimeout:
             return ''
         if not self._inverter.can_time_out:
             raise DriveError('drive_timeout: this model has no SioTot, so it must be 0')
-        wanted = {'serial.sio_tot': seconds, 'serial.auto_stop': True}
+        key = self._inverter.model.key
+        wanted = {key(Role.COMMUNICATION_TIMEOUT): seconds, key(Role.STOP_AT_TIMEOUT): True}
         changes = await self._parameters.change_now(
             wanted, guarded=False, because=' (drive_timeout)'
         )

@@ -19,33 +19,34 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 
 #: Beyond what any reference of the drive asks for in either direction, 150 Hz, 9000 rpm and 200 %
 #: ([M0 table 4], [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
-_MOST: Mapping[str, float] = {
-    'status.frq_act': 180.0,
-    'status.spd_act': 10800.0,
-    'status.trq_act': 400.0,
+_MOST: Mapping[Role | None, float] = {
+    Role.ACTUAL_FREQUENCY: 180.0,
+    Role.ACTUAL_SPEED: 10800.0,
+    Role.ACTUAL_TORQUE: 400.0,
 }
-_CODES: Mapping[str, Callable[[Model, int], bool]] = {
-    'fieldbus.inv_st': lambda model, code: code in model.inv_st_codes,
-    'fieldbus.mode': lambda model, code: code in set(model.dialect.mode),
+_CODES: Mapping[Role | None, Callable[[Family, int], bool]] = {
+    Role.STATUS_CODE: lambda model, code: code in model.status_codes,
+    Role.CONTROL_SOURCE: lambda model, code: code in model.modes,
     # the upper half is described nowhere [C24]
-    'fieldbus.drive_status': lambda model, word: model.dialect.may_say(word & 0xFFFF),
+    Role.STATUS_WORD: lambda model, word: model.status_word.may_say(word & 0xFFFF),
 }
 
 
-def can_be(model: Model, key: str, value: Value) -> bool:
+def can_be(model: Family, key: str, value: Value) -> bool:
     """Tell whether a value of a drive is one that its manual knows, as far as the manual says."""
-    parameter = model[key]
-    if key in _CODES:
-        return _CODES[key](model, int(value))
+    parameter, role = model[key], model.role_of.get(key)
+    if role in _CODES:
+        return _CODES[role](model, int(value))
     if isinstance(value, str):
         return not parameter.labels or value in parameter.labels.values()
-    return abs(value) <= _MOST.get(key, abs(value)) and _in_range(parameter, value)
+    return abs(value) <= _MOST.get(role, abs(value)) and _in_range(parameter, value)
 
 
 def _in_range(parameter: Parameter, value: float) -> bool:

@@ -20,32 +20,31 @@ from collections.abc import Iterable
 from collections.abc import Mapping
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Words
 
-#: The parameter that takes the set-point, by control mode; the first that the model has.
-_KEYS: Mapping[str, tuple[str, ...]] = {
-    'Freque': ('fieldbus.input_freq_setpoint', 'status.frq_set'),
-    'Speed': ('fieldbus.input_speed_setpoint', 'status.spd_set'),
-    'Torque': ('status.trq_set',),
-    'PI-Reg': ('status.reg_set',),
+#: What takes the set-point, by control mode.
+_ROLES: Mapping[str, Role] = {
+    'Freque': Role.FREQUENCY_SETPOINT,
+    'Speed': Role.SPEED_SETPOINT,
+    'Torque': Role.TORQUE_SETPOINT,
+    'PI-Reg': Role.PROCESS_SETPOINT,
 }
-#: Over Classic all of them are written here, in the unit of the control mode ([C11], [C12]).
-_CLASSIC = 'fieldbus.setpoint'
 #: The greatest set-point over a bus in either direction [M2 table 2].
 _MOST = {'Freque': 150.0, 'Speed': 9000.0, 'Torque': 200.0, 'PI-Reg': 150.0}
 
 
 def references(registers: Registers, control_modes: Iterable[str]) -> list[Reference]:
     """Return the places of the set-points of some control modes; one that has none is left out."""
-    return [Reference(registers, mode) for mode in control_modes if _keys(registers, mode)]
+    return [Reference(registers, mode) for mode in control_modes if _key(registers, mode)]
 
 
-def _keys(registers: Registers, control_mode: str) -> list[str]:
-    return [key for key in _KEYS.get(control_mode, ()) if key in registers.model]
+def _key(registers: Registers, control_mode: str) -> str:
+    role = _ROLES.get(control_mode)
+    return '' if role is None else registers.model.key(role)
 
 
 class Reference:
@@ -59,15 +58,16 @@ class Reference:
 
     def __init__(self, registers: Registers, control_mode: str) -> None:
         self._registers = registers
-        keys = _keys(registers, control_mode)
-        if not keys:
+        self._key = _key(registers, control_mode)
+        if not self._key:
             raise DriveError(
                 f'the drive takes no set-point over the bus in control mode {control_mode or "?"}'
             )
-        self._key = keys[0]
         self.most = _MOST[control_mode]
-        classic = registers.protocol is Protocol.CLASSIC
-        self.address: Address = registers.address(_CLASSIC if classic else self._key)
+        # over Classic all are written there, in the unit of the control mode ([C11], [C12])
+        common = registers.model.key(Role.COMMON_SETPOINT)
+        written = common if registers.reaches(common) else self._key
+        self.address: Address = registers.address(written)
 
     def words(self, value: float) -> Words:
         """

@@ -22,8 +22,8 @@ from fractions import Fraction
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
@@ -43,14 +43,14 @@ _READINGS = 3
 #: The flag of SioErr that says that a fault kept a message from being carried out [M2 table 4].
 _BLOCKED = 1
 #: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
-_SHORT = frozenset(('status.op_time', 'status.rn_time', 'status.br_time'))
+_SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
-_PROBES = ('fieldbus.inv_st', 'fieldbus.drive_status', 'status.op_time')
+_PROBES = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
 #: What is less on one protocol than on the other, whose register is the same: a drive with an
 #: address beyond those of Classic could not be asked again [C10].
-_HIGHEST = {(Protocol.CLASSIC, 'serial.address'): Fraction(94)}
+_HIGHEST = {('classic', Role.BUS_ADDRESS): Fraction(94)}
 
 
 class Registers:
@@ -60,7 +60,7 @@ class Registers:
     :param retries: how often a request that nobody answered is sent again.
     """
 
-    def __init__(self, bus: Bus, unit: int, model: Model, retries: int) -> None:
+    def __init__(self, bus: Bus, unit: int, model: Family, retries: int) -> None:
         self.model = model
         self._bus = bus
         self._unit = unit
@@ -71,20 +71,21 @@ class Registers:
         self._odd: dict[str, Words] = {}
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
-        self.protocol = Protocol(bus.space)
-        bus.use_probes(unit, tuple(self.address(key) for key in _PROBES if key in model))
+        self.protocol = bus.space
+        probes = (model.key(role) for role in _PROBES if role in model.roles)
+        bus.use_probes(unit, tuple(self.address(key) for key in probes))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
         if key not in self._addresses:
-            place = self.model[key].place(self.protocol)
-            self._addresses[key] = Address(place.addresses, place.words)
+            place = self.model[key].at(self.protocol)
+            self._addresses[key] = Address(place.numbers, place.words)
         return self._addresses[key]
 
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
-        return self.protocol is Protocol.MODBUS and self.model.dialect.writes_and_reads
+        return self.protocol == 'modbus' and self.model.writes_and_reads
 
     def words(self, key: str, value: Value) -> Words:
         """
@@ -95,7 +96,7 @@ class Registers:
         parameter = self.model[key]
         if parameter.never_negative and not isinstance(value, str) and value < 0:
             raise ValueError(f'{key}: {value:g} is out of range, at least 0 {parameter.unit}')
-        highest = _HIGHEST.get((self.protocol, key))
+        highest = self._highest(key)
         if highest is not None and not isinstance(value, str) and value > highest:
             raise ValueError(f'{key}: {value:g} is out of range, at most {highest} on this bus')
         return parameter.encode(value, self.protocol)
@@ -114,22 +115,26 @@ class Registers:
 
         :raises ValueError: a code that the manual does not list, where the type has no room for it.
         """
-        if key in _SHORT and self.protocol is Protocol.CLASSIC:
+        if self.model.role_of.get(key) in _SHORT and self.protocol == 'classic':
             low, high = words
             words = (low, high & 0xFF)
         return self.model[key].decode(words, self.protocol)
 
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
-        return key in self.model and self.protocol in self.model[key].places
+        return key in self.model and self.protocol in self.model[key].addresses
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""
         parameter = self.model[key]
         low, high = parameter.span(self.protocol)
         low = max(low, Fraction(0)) if parameter.never_negative else low
-        high = _HIGHEST.get((self.protocol, key), high)
+        high = self._highest(key) or high
         return float(low), float(high), float(parameter.factor(self.protocol))
+
+    def _highest(self, key: str) -> Fraction | None:
+        role = self.model.role_of.get(key)
+        return None if role is None else _HIGHEST.get((self.protocol, role))
 
     def number(self, key: str, words: Words) -> float:
         """Return the value of words as the drive understands them."""
@@ -193,9 +198,10 @@ class Registers:
 
     async def acknowledge_serial_fault(self) -> str:
         """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
-        if not self.reaches('fieldbus.sio_err'):
+        key = self.model.key(Role.LINE_FAULTS)
+        if not self.reaches(key):
             return ''
-        (flags,) = await self.acknowledge('fieldbus.sio_err', Priority.SERVICE)
+        (flags,) = await self.acknowledge(key, Priority.SERVICE)
         # that it refused a stop since then is no reason of it
         return ', '.join(flag_names(flags & ~_BLOCKED))
 

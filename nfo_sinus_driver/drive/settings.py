@@ -19,8 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from nfo_sinus_driver.catalog import MODELS
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import families
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
@@ -51,10 +50,10 @@ DRIVE_TIMEOUT_MARGIN = 0.5
 #: On Classic, the one of a drive that is alone on its line, whatever its own is [M0 §6.1.2].
 POINT_TO_POINT = 0
 #: What a drive can be asked by: [M0 §6.2.2]; [M0 §6.1.2], where 95 is everybody [C10].
-ADDRESSES = {Protocol.MODBUS: range(1, 248), Protocol.CLASSIC: range(POINT_TO_POINT, 95)}
+ADDRESSES = {'modbus': range(1, 248), 'classic': range(POINT_TO_POINT, 95)}
 
 
-def require_address(address: int, protocol: Protocol) -> None:
+def require_address(address: int, protocol: str) -> None:
     """
     Make sure that a drive can be asked by an address.
 
@@ -62,7 +61,7 @@ def require_address(address: int, protocol: Protocol) -> None:
     """
     allowed = ADDRESSES[protocol]
     if address not in allowed:
-        name = protocol.name.title()
+        name = protocol.title()
         raise ValueError(f'address {address}: {name} has {allowed[0]} to {allowed[-1]}')
 
 
@@ -113,7 +112,7 @@ class DriveSettings:
         return self.reference == 'fieldbus'
 
     def __post_init__(self) -> None:
-        _one_of('model', self.model, (*MODELS, AUTO))
+        _one_of('model', self.model, (*families(), AUTO))
         _one_of('control_method', self.control_method, CONTROL_METHODS)
         _one_of('reference', self.reference, REFERENCES)
         kind = f'{self.control_method} on {self.model}'

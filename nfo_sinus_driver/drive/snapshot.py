@@ -26,11 +26,12 @@ from typing import NamedTuple
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import InvStCode
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog.dialect import Codes
+from nfo_sinus_driver.catalog import StatusCode
 
 if TYPE_CHECKING:
     from nfo_sinus_driver.drive.error_log import LogEntry
@@ -84,25 +85,24 @@ class InverterStatus:
     at: float
     word: int | None
     code: int
-    model: Model
+    model: Family
     by_mode: bool = False
     code_at: float = -math.inf
 
     @functools.cached_property
-    def listed(self) -> InvStCode:
+    def listed(self) -> StatusCode:
         """What the model's table says of the code."""
-        return self.model.inv_st(self.code)
+        return self.model.status_code(self.code)
 
-    @property
-    def codes(self) -> Codes:
-        """The model's codes by what they mean."""
-        return self.model.dialect.codes
+    def means(self, *meanings: Meaning) -> bool:
+        """Tell whether the code means one of these."""
+        return not self.listed.meanings.isdisjoint(meanings)
 
     @functools.cached_property
     def facts(self) -> Fact:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
-            return self.model.dialect.facts(self.word, self.listed.kind)
+            return self.model.status_word.facts(self.word, self.listed.kind)
         facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
         if self._from_bus_by_code:
             facts |= Fact.NETWORK_CONTROL
@@ -114,7 +114,7 @@ class InverterStatus:
     def valid(self) -> Fact:
         """What the drive can say of itself at all."""
         if self.word is not None:
-            return self.model.dialect.valid
+            return self.model.status_word.valid
         return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
 
     @functools.cached_property
@@ -122,12 +122,12 @@ class InverterStatus:
         """How grave the code is; the bits have the last word ([C50], [C95])."""
         if self.word is None:
             return self.listed.kind
-        return self.model.dialect.kind(self.word, self.listed.kind)
+        return self.model.status_word.kind(self.word, self.listed.kind)
 
     @functools.cached_property
     def state(self) -> State:
         """The state of the generic state machine."""
-        return State.UNKNOWN if self.word is None else self.model.dialect.state(self.word)
+        return State.UNKNOWN if self.word is None else self.model.status_word.state(self.word)
 
     @property
     def faulted(self) -> bool:
@@ -137,7 +137,7 @@ class InverterStatus:
     @property
     def standby(self) -> bool:
         """It waits for a command over the bus."""
-        return self.code in self.codes.bus_standby
+        return self.means(Meaning.BUS_STANDBY)
 
     @property
     def from_bus(self) -> bool:
@@ -160,13 +160,13 @@ class InverterStatus:
     def keeps_running(self) -> bool:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing tells a stop from a lower reference
-        may_stop = self.word is None and self.code in self.codes.slowing
+        may_stop = self.word is None and self.means(Meaning.SLOWING)
         return self.runs_by_bus and not may_stop
 
     @property
     def tuning(self) -> bool:
         """It measures the motor, which is energised then, whatever else the status says."""
-        return self.code == self.codes.tuning
+        return self.means(Meaning.TUNING)
 
     @property
     def plain(self) -> bool:
@@ -177,7 +177,7 @@ class InverterStatus:
         makes nobody do anything: speeding up, at the reference, slowing down, the brake chopper,
         standing by for keypad or terminals [M0 tables 15, 16 and 19].
         """
-        if self.kind is not Kind.STATUS or self.tuning or self.code == self.codes.start_delay:
+        if self.kind is not Kind.STATUS or self.means(Meaning.TUNING, Meaning.START_DELAY):
             return False
         # and both say the same
         return self.driven == self.runs == self._driven_by_code
@@ -185,9 +185,8 @@ class InverterStatus:
     @property
     def local(self) -> bool:
         """The code says that keypad or terminals have control, and no word that the bus has."""
-        codes = self.codes
-        told = self.code in codes.terminals or self.code in codes.keypad
-        return told and self.code not in codes.anonymous and not self.from_bus
+        told = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
+        return told and not self.means(Meaning.ANONYMOUS) and not self.from_bus
 
     @property
     def driven(self) -> bool:
@@ -198,18 +197,13 @@ class InverterStatus:
 
     @property
     def _from_bus_by_code(self) -> bool:
-        codes = self.codes
-        if self.code in codes.anonymous:
+        if self.means(Meaning.ANONYMOUS):
             return self.by_mode
-        return self.code in codes.bus_running or self.code in codes.bus_standby
+        return self.means(Meaning.BUS_RUNNING, Meaning.BUS_STANDBY)
 
     @property
     def _driven_by_code(self) -> bool:
-        codes = self.codes
-        return any(
-            self.code in driven
-            for driven in (codes.bus_running, codes.local_running, codes.running)
-        )
+        return self.means(Meaning.BUS_RUNNING, Meaning.LOCAL_RUNNING, Meaning.RUNNING)
 
 
 @dataclass(frozen=True)
@@ -254,13 +248,13 @@ class Snapshot:
 @dataclass(frozen=True)
 class Telemetry:
     """
-    Measured values by catalog key, NaN where the drive has none, and when the last one arrived.
+    Measured values by their roles, NaN where the drive has none, and when the last one arrived.
 
     :ivar at: s of ``time.monotonic``.
     """
 
     at: float
-    values: dict[str, float]
+    values: dict[Role, float]
 
 
 class Listener(Protocol):

@@ -21,6 +21,7 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Listener
@@ -30,22 +31,22 @@ from nfo_sinus_driver.link import Refused
 
 #: Read every time.
 FAST = (
-    'status.u_rms',
-    'status.i_rms',
-    'status.p_out',
-    'status.pf',
-    'status.dc_link',
-    'status.trq_act',
+    Role.OUTPUT_VOLTAGE,
+    Role.OUTPUT_CURRENT,
+    Role.OUTPUT_POWER,
+    Role.POWER_FACTOR,
+    Role.DC_LINK_VOLTAGE,
+    Role.ACTUAL_TORQUE,
 )
 #: Read one after the other, one each time, for they change slowly.
 SLOW = (
-    'status.m_temp',
-    'status.pt1000',
-    'status.op_time',
-    'status.rn_time',
-    'status.br_time',
-    'status.e_out',
-    'status.sigma_e_out',
+    Role.MOTOR_TEMPERATURE,
+    Role.PT1000_TEMPERATURE,
+    Role.OPERATING_TIME,
+    Role.RUNNING_TIME,
+    Role.BRAKE_TIME,
+    Role.ENERGY,
+    Role.TOTAL_ENERGY,
 )
 
 #: What a drive answers that does not have a parameter, and how often until it is believed.
@@ -70,29 +71,32 @@ async def watch_telemetry(
     due = deque(SLOW)
     first = True
 
-    async def measure(key: str) -> None:
+    async def measure(role: Role) -> None:
         # which firmware it has may be known only later
-        if denied[key] >= _DENIALS or not inverter.has(key):
+        if denied[role] >= _DENIALS or not inverter.has(inverter.model.key(role)):
             return
         try:
-            values[key] = await inverter.measure(key, Priority.TELEMETRY)
-            denied[key] = 0
+            values[role] = await inverter.measure(role, Priority.TELEMETRY)
+            denied[role] = 0
         except Refused as error:
-            values[key] = NAN
+            values[role] = NAN
             # over Classic it says so of everything while it tunes
-            denied[key] += error.code in _NONE_SUCH and not inverter.tuning
+            denied[role] += error.code in _NONE_SUCH and not inverter.tuning
 
     while True:
         started = time.monotonic()
         rate = inverter.settings.telemetry_rate
         if rate and inverter.connected and inverter.answering:
             try:
-                for key in (*FAST, *due) if first else (*FAST, due[0]):
-                    await measure(key)
+                for role in (*FAST, *due) if first else (*FAST, due[0]):
+                    await measure(role)
                 due.rotate(-1)
                 first = False
                 # these two are polled anyway
-                polled = {'status.frq_act': inverter.frequency, 'status.spd_act': inverter.speed}
+                polled = {
+                    Role.ACTUAL_FREQUENCY: inverter.frequency,
+                    Role.ACTUAL_SPEED: inverter.speed,
+                }
                 listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost

@@ -24,9 +24,7 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog.inv_st import TUNED
-from nfo_sinus_driver.catalog.inv_st import TUNING
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
@@ -37,6 +35,7 @@ from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
@@ -151,12 +150,12 @@ class Tuning:
                 progress(seen, elapsed)
             told = inverter.describe()
             if seen.faulted:
-                fault = inverter.model.inv_st(seen.code)
+                fault = seen.listed
                 hint = f'{fault.description}. {fault.remedy}; call ~/fault_ack first'
                 return False, f'{what} failed, {told}: {hint}'
-            if seen.code in TUNED:
+            if seen.means(Meaning.TUNED):
                 return True, f'{what} finished ({told})'
-            if seen.code == TUNING:
+            if seen.means(Meaning.TUNING):
                 begun = True
             elif loan.recalled:
                 return False, f'{what} was stopped before it was finished ({told})'

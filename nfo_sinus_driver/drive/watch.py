@@ -28,6 +28,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.errors import DriveError
@@ -67,14 +68,14 @@ _LAST_CHANCE = 0.6
 #: How often at most, if the port is gone too, s.
 _SHORTEST_PAUSE = 0.02
 #: What the control mode is about, which is measured with every poll.
-_ACTUAL_KEYS = {
-    'Freque': 'status.frq_act',
-    'Speed': 'status.spd_act',
-    'Torque': 'status.trq_act',
-    'PI-Reg': 'status.reg_act',
+_ACTUAL = {
+    'Freque': Role.ACTUAL_FREQUENCY,
+    'Speed': Role.ACTUAL_SPEED,
+    'Torque': Role.ACTUAL_TORQUE,
+    'PI-Reg': Role.ACTUAL_PROCESS_VALUE,
 }
 #: What is measured whatever it is about.
-_BASIC_KEYS = ('status.frq_act', 'status.spd_act')
+_BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
 #: How often what else a poll is made of is read, s: the other one of frequency and speed, and an
 #: inverter status that the status word gives no reason to read. All that makes the driver do
 #: something shows in that word: fault, control lost, a stop, the current limit.
@@ -334,7 +335,7 @@ class Watch:
             if mode != before and self._motion:
                 # before it is told: a set-point never has the unit of another mode
                 self._motion.watch(seen)
-        actual = _ACTUAL_KEYS.get(inverter.control_mode)
+        actual = _ACTUAL.get(inverter.control_mode)
         steady = True
         if actual is not None:
             asked_at = time.monotonic()
@@ -342,10 +343,10 @@ class Watch:
             now = await self._measure(actual)
             self._turn = time.monotonic() - asked_at
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
-        for key in _BASIC_KEYS:
-            age = time.monotonic() - inverter.last_polled(key).at
-            if key != actual and (age >= self._slow_period or not steady):
-                await self._measure(key)
+        for role in _BASIC:
+            age = time.monotonic() - inverter.last_polled(role).at
+            if role is not actual and (age >= self._slow_period or not steady):
+                await self._measure(role)
         self._publish(seen)
 
     def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
@@ -356,15 +357,15 @@ class Watch:
             self._inverter.tell(Severity.ERROR, f'{text}; then call ~/fault_ack')
         self._told_fault = code
 
-    async def _measure(self, key: str) -> float:
+    async def _measure(self, role: Role) -> float:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
-        value = await self._read_measured(key)
-        self._inverter.polled[key] = Measured(value, time.monotonic())
+        value = await self._read_measured(role)
+        self._inverter.polled[role] = Measured(value, time.monotonic())
         return value
 
-    async def _read_measured(self, key: str) -> float:
+    async def _read_measured(self, role: Role) -> float:
         try:
-            return await self._insist(lambda: self._inverter.measure(key, Priority.POLL))
+            return await self._insist(lambda: self._inverter.measure(role, Priority.POLL))
         except PortError:
             raise
         except Refused:
@@ -439,8 +440,8 @@ class Watch:
 
     def _publish(self, seen: InverterStatus | None) -> None:
         inverter = self._inverter
-        frequency, speed = (inverter.last_polled(key) for key in _BASIC_KEYS)
-        actual = inverter.last_polled(_ACTUAL_KEYS.get(inverter.control_mode, '')).value
+        frequency, speed = (inverter.last_polled(role) for role in _BASIC)
+        actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_picture(inverter, self._setpoint, seen, frequency, speed, actual)
         self._listener.on_snapshot(self.snapshot)
 

@@ -32,8 +32,6 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.catalog import MODELS
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
@@ -106,7 +104,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         )
         self._reporter = Reporter(self, line, joint)
         #: What ``model: auto`` stands for, as far as it is known.
-        self._found_model = MODELS[0]
+        self._found_model = DriveSettings().model
         self._drive = Drive(line.bus, self._concrete, self._reporter)
         self.drive_parameters = DriveParameters(self)
         self._wanted = wanted_state(self, self._drive)
@@ -313,7 +311,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         names = {field.name for field in dataclasses.fields(DriveSettings)}
         wanted = {name: value for name, value in values.items() if name in names}
         settings = DriveSettings(**wanted, retries=self._line.retries)  # type: ignore[arg-type]
-        require_address(settings.address, Protocol(self._line.bus.space))
+        require_address(settings.address, self._line.bus.space)
         other = self._line.rival_of(self, settings.address)
         if other is not None:
             raise ValueError(

@@ -23,6 +23,7 @@ from builtin_interfaces.msg import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import Snapshot
 
@@ -80,8 +81,9 @@ class Joint:
             return rpm
         if mode != 'Freque':
             raise ValueError(f'the control mode is {mode or "not known"}, not Speed or Freque')
-        nominal = drive.parameters.values
-        frequency, speed = nominal.get('motor.f_nom', 0), nominal.get('motor.n_nom', 0)
+        nominal, key = drive.parameters.values, drive.model.key
+        frequency = nominal.get(key(Role.NOMINAL_FREQUENCY), 0)
+        speed = nominal.get(key(Role.NOMINAL_SPEED), 0)
         if not frequency or not speed:
             raise ValueError('f-Nom and N-nom of the motor are not known, so Hz are no speed')
         # slip is left out: how much there is depends on the load

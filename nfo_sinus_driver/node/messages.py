@@ -28,6 +28,7 @@ from std_msgs.msg import Header
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import LogEntry
@@ -54,21 +55,21 @@ _KINDS = {Kind.STATUS: InvSt.STATUS, Kind.ALARM: InvSt.ALARM, Kind.FAULT: InvSt.
 
 #: The fields of Telemetry and where they come from.
 _TELEMETRY = {
-    'output_voltage': 'status.u_rms',
-    'output_current': 'status.i_rms',
-    'output_power': 'status.p_out',
-    'power_factor': 'status.pf',
-    'dc_link_voltage': 'status.dc_link',
-    'frequency': 'status.frq_act',
-    'speed': 'status.spd_act',
-    'torque': 'status.trq_act',
-    'motor_temperature': 'status.m_temp',
-    'pt1000_temperature': 'status.pt1000',
-    'operating_time': 'status.op_time',
-    'running_time': 'status.rn_time',
-    'brake_time': 'status.br_time',
-    'energy': 'status.e_out',
-    'total_energy': 'status.sigma_e_out',
+    'output_voltage': Role.OUTPUT_VOLTAGE,
+    'output_current': Role.OUTPUT_CURRENT,
+    'output_power': Role.OUTPUT_POWER,
+    'power_factor': Role.POWER_FACTOR,
+    'dc_link_voltage': Role.DC_LINK_VOLTAGE,
+    'frequency': Role.ACTUAL_FREQUENCY,
+    'speed': Role.ACTUAL_SPEED,
+    'torque': Role.ACTUAL_TORQUE,
+    'motor_temperature': Role.MOTOR_TEMPERATURE,
+    'pt1000_temperature': Role.PT1000_TEMPERATURE,
+    'operating_time': Role.OPERATING_TIME,
+    'running_time': Role.RUNNING_TIME,
+    'brake_time': Role.BRAKE_TIME,
+    'energy': Role.ENERGY,
+    'total_energy': Role.TOTAL_ENERGY,
 }
 
 
@@ -122,7 +123,7 @@ def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
 
 def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessage:
     """Return the Telemetry message of measured values."""
-    values = {field: measured.values.get(key, math.nan) for field, key in _TELEMETRY.items()}
+    values = {field: measured.values.get(role, math.nan) for field, role in _TELEMETRY.items()}
     return TelemetryMessage(header=Header(stamp=stamp, frame_id=frame_id), **values)
 
 

@@ -24,7 +24,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.catalog import MODELS
+from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
@@ -175,7 +175,7 @@ DRIVE_SETTINGS = (
         'model',
         'sinus_g2',
         'The drive family; auto: find out',
-        constraints=f'one of {", ".join((*MODELS, AUTO))}',
+        constraints=f'one of {", ".join((*families(), AUTO))}',
     ),
     Setting(
         'control_method',

@@ -25,13 +25,13 @@ from collections.abc import Mapping
 from fractions import Fraction
 import math
 
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog.words import Scmd
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
@@ -50,7 +50,6 @@ from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long the rest of a message may take (s). No manual says [C86].
 _PAUSE = 1.0
-_LOG = ERROR_LOG[Protocol.CLASSIC]
 #: Counters of 24 bits [C26].
 _SHORT = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
 _24_BITS = 0xFFFFFF
@@ -141,16 +140,17 @@ class Classic:
         """Nothing: on a wire, silence is silence."""
         return None
 
-    def _ids(self, model: Model) -> _Ids:
+    def _ids(self, model: Family) -> _Ids:
         if model.name not in self._models:
             self._models[model.name] = _Ids(model)
         return self._models[model.name]
 
     def _enquiry(self, drive: SimulatedDrive, id_: int) -> int:
         """Return the word that stands at an id."""
-        at = id_ - _LOG.first
-        if 0 <= at < _LOG.stride * drive.firmware.log_size:
-            return drive.faults.log_word(at // _LOG.stride) >> 16 * (at % _LOG.stride) & 0xFFFF
+        log = drive.model.error_logs['classic']
+        entry, position = divmod(id_ - log.first, log.stride)
+        if 0 <= entry < drive.firmware.log_size:
+            return to_words(log.codec.encode(drive.faults.log_word(entry)))[position]
         parameter, position = self._find(drive, id_)
         if parameter.access is Access.WRITE:
             raise _Wrong(SioErr.UNREADABLE)
@@ -160,7 +160,7 @@ class Classic:
             raise _Wrong(_FLAGS[refused.reason]) from refused
         if parameter.key in _SHORT and drive.firmware.short_counters:
             raw &= _24_BITS
-        words = parameter.place(Protocol.CLASSIC).type.to_words(raw)
+        words = to_words(parameter.at('classic').number.encode(raw))
         if len(words) > 1 and drive.tears:
             drive.tears -= drive.counters.carry(parameter)
         return words[position]
@@ -172,8 +172,7 @@ class Classic:
         closed = key in _REFERENCES and not firmware.sets_references
         if closed or parameter.access not in (Access.WRITE, Access.READ_WRITE):
             raise _Wrong(SioErr.UNWRITABLE)
-        place = parameter.place(Protocol.CLASSIC)
-        raw = place.type.to_raw([word])
+        raw = parameter.at('classic').number.decode(to_bytes([word]))
         if key == 'fieldbus.scmd':
             raw = _command(drive, raw)
         if drive.faults and not self._in_spite_of_a_fault(drive, key, raw, to_all):
@@ -213,12 +212,12 @@ class Classic:
 class _Ids:
     """Which parameter stands at which id, and which of its words."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Family) -> None:
         self._by_id = {
             id_: (parameter, position)
             for parameter in model.values()
-            if Protocol.CLASSIC in parameter.places
-            for position, id_ in enumerate(parameter.place(Protocol.CLASSIC).addresses)
+            if 'classic' in parameter.addresses
+            for position, id_ in enumerate(parameter.at('classic').numbers)
         }
 
     def find(self, id_: int) -> tuple[Parameter, int] | None:
@@ -232,8 +231,8 @@ def _read(drive: SimulatedDrive, key: str) -> int:
         key = drive.runner.setpoint_key
     parameter = drive.memory.model[key]
     # what is measured may be finer here than in the memory
-    shown = measure(parameter, Protocol.CLASSIC, drive.motor, drive.counters)
-    return convert(parameter, raw, Protocol.CLASSIC) if shown is None else shown
+    shown = measure(parameter, 'classic', drive.motor, drive.counters)
+    return convert(parameter, raw, 'classic') if shown is None else shown
 
 
 def _command(drive: SimulatedDrive, raw: int) -> int:
@@ -257,9 +256,8 @@ def _permitted(drive: SimulatedDrive, key: str, raw: int) -> bool:
 def _at_home(parameter: Parameter, raw: int) -> int:
     """Return the number that the memory keeps for a Classic one, which is coarser [C14]."""
     protocol = home(parameter)
-    exact = raw * parameter.factor(Protocol.CLASSIC) / parameter.factor(protocol)
+    exact = raw * parameter.factor('classic') / parameter.factor(protocol)
     kept = math.floor(exact + Fraction(1, 2))
-    type_ = parameter.place(protocol).type
-    if not type_.minimum <= kept <= type_.maximum:
+    if not parameter.at(protocol).number.fits(kept):
         raise _Wrong(SioErr.OUT_OF_RANGE)
     return kept

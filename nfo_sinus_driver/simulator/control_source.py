@@ -24,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 import enum
 
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 
 class Source(enum.Enum):

@@ -17,8 +17,8 @@
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog.words_optimal import Control
-from nfo_sinus_driver.catalog.words_optimal import Status
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import Status
 
 #: The commands in their order, and the status bits that must be there for one to be taken.
 _STEPS = (

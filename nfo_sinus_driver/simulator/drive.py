@@ -31,16 +31,14 @@ import contextlib
 from fractions import Fraction
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.simulator import identification
 from nfo_sinus_driver.simulator.control_source import Source
 from nfo_sinus_driver.simulator.faults import REFUSALS
-from nfo_sinus_driver.simulator.faults import SERIAL
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.firmware import firmware_of
@@ -118,7 +116,7 @@ class SimulatedDrive:
         lenient: bool = False,
         variant: Variant | None = None,
     ) -> None:
-        self.model = load_model(model)
+        self.model = load_family(model)
         machine = machine_of(self.model)
         self._setpoints = frozenset(_RUNNERS[model].setpoint_of.values())
         self.settings = frozenset(
@@ -192,9 +190,11 @@ class SimulatedDrive:
         """
         entry = self._registers.log_entry(register, count)
         if entry is not None:
-            return ErrorLogArea.TYPE.to_words(self.faults.log_word(entry))
+            log = self.model.error_logs['modbus']
+            return to_words(log.codec.encode(self.faults.log_word(entry)))
         parameter = self._registers.find(register, count)
-        return parameter.place(Protocol.MODBUS).type.to_words(self.read_raw(parameter.key))
+        raw = self.read_raw(parameter.key)
+        return to_words(parameter.at('modbus').number.encode(raw))
 
     def write(self, register: int, words: Sequence[int]) -> None:
         """
@@ -203,7 +203,7 @@ class SimulatedDrive:
         :raises Refused: as the reason says.
         """
         parameter = self._registers.find(register, len(words))
-        raw = parameter.place(Protocol.MODBUS).type.to_raw(words)
+        raw = parameter.at('modbus').number.decode(to_bytes(words))
         self.write_raw(parameter.key, raw)
         if parameter.key in COMMANDS:
             self.runner.by_fieldbus = self.firmware.own_bus_codes
@@ -274,7 +274,7 @@ class SimulatedDrive:
         self.faults.sio_err |= what
         harmless = REFUSALS if self._lenient else SioErr.BLOCKED
         if self._bus_controls and what & ~harmless:
-            self.trip(SIO_FAIL)
+            self.trip(self.faults.line_lost)
 
     # ---- what happens to it ----
 
@@ -287,7 +287,7 @@ class SimulatedDrive:
         """
         self.faults.trip(code, self.counters.op_time, cause_present=cause_present)
         self.self_restart.tripped(code)
-        if code in SERIAL:
+        if code in self.faults.of_the_line:
             self.runner.take(Source.STOP)
         self._settle()
 
@@ -361,7 +361,7 @@ class SimulatedDrive:
     @property
     def inv_st_text(self) -> str:
         """What the display says."""
-        return self.model.inv_st_text(self.inv_st, self.version)
+        return self.model.status_code(self.inv_st).shown(self.version)
 
     @property
     def inv_st(self) -> int:

@@ -19,15 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 import enum
 
-from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
-
-#: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges them
-#: [M0 §6.1.5].
-SERIAL = frozenset({SIO_FAIL, BUS_FAIL})
+from nfo_sinus_driver.catalog import Meaning
 
 
 class SioErr(enum.IntFlag):
@@ -79,13 +73,19 @@ class Faults:
     :ivar sio_err: what went wrong on the line since it was last read.
     """
 
-    def __init__(self, model: Model, log_size: int) -> None:
+    def __init__(self, model: Family, log_size: int) -> None:
         self._model = model
         self._kinds = {Kind.FAULT}
-        if Fact.ALARM in model.dialect.by_bit.values():
+        if model.status_word.tells_alarms:
             self._kinds.add(Kind.ALARM)
+        (lost,) = (code.code for code in model.codes(Meaning.SERIAL_FAILURE))
+        #: What a silent or damaged line leads to.
+        self.line_lost = lost
+        #: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges
+        #: them [M0 §6.1.5].
+        self.of_the_line = {lost, *(code.code for code in model.codes(Meaning.FIELDBUS_FAILURE))}
         #: Faults that an acknowledgement of their own ends [C42].
-        self._kept = {SIO_FAIL} if 'fieldbus.sio_err' in model else set()
+        self._kept = {lost} if 'fieldbus.sio_err' in model else set()
         self._present: dict[int, bool] = {}
         self.log: list[LogEntry] = []
         self._log_size = log_size
@@ -112,7 +112,7 @@ class Faults:
     @property
     def serial(self) -> bool:
         """Whether a fault of the serial channel stands."""
-        return not SERIAL.isdisjoint(self._present)
+        return not self.of_the_line.isdisjoint(self._present)
 
     @property
     def lasting(self) -> bool:
@@ -125,7 +125,7 @@ class Faults:
 
         :raises ValueError: the model has no such fault.
         """
-        if self._model.inv_st(code).kind not in self._kinds:
+        if self._model.status_code(code).kind not in self._kinds:
             raise ValueError(f'{code} is no fault of {self._model.name}: see its InvSt')
         if code not in self._present:
             self.log.insert(0, LogEntry(code, op_time))
@@ -150,13 +150,15 @@ class Faults:
     def acknowledge_serial(self) -> None:
         """Acknowledge the serial channel's faults, as MODE = Stop does [M0 §6.1.5]."""
         self.sio_err = SioErr(0)
-        self._present = {code: cause for code, cause in self._present.items() if code not in SERIAL}
+        self._present = {
+            code: cause for code, cause in self._present.items() if code not in self.of_the_line
+        }
 
     def take_sio_err(self) -> SioErr:
         """Return the flags of SioErr and clear them, and Sio Fail unless its cause lasts."""
         flags, self.sio_err = self.sio_err, SioErr(0)
-        if not self._present.get(SIO_FAIL, True):
-            del self._present[SIO_FAIL]
+        if not self._present.get(self.line_lost, True):
+            del self._present[self.line_lost]
         return flags
 
     def log_word(self, entry: int) -> int:
@@ -172,4 +174,4 @@ class Faults:
         self._present = {code: True for code, cause in self._present.items() if cause}
 
     def _of(self, kind: Kind) -> list[int]:
-        return [code for code in self._present if self._model.inv_st(code).kind is kind]
+        return [code for code in self._present if self._model.status_code(code).kind is kind]

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from dataclasses import field
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.timing import FORMAT_CODES
@@ -152,7 +152,7 @@ def firmware_of(memory: Memory) -> Firmware:
 
 
 def with_firmware(
-    model: Model, settings: Mapping[str, Value], dialect: str | None
+    model: Family, settings: Mapping[str, Value], dialect: str | None
 ) -> dict[str, Value]:
     """
     Return settings with the firmware that a manual describes.

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import difflib
 from typing import Any
 
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.faults import SioErr
@@ -35,7 +35,7 @@ from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 _REQUIRED: Any = object()
 
 
-def parse_setting(model: Model, key: str, text: Value) -> Value:
+def parse_setting(model: Family, key: str, text: Value) -> Value:
     """
     Turn what was typed for a parameter into its value.
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import load_family
 
 #: What the simulation needs of any drive.
 _NEEDED = (
@@ -50,7 +50,7 @@ _NEEDED = (
 _OPTIMAL_MODES = {0: 'Freque', 3: 'Speed'}
 
 
-def machine_of(model: Model) -> Model:
+def machine_of(model: Family) -> Family:
     """
     Return the model with every parameter that a simulated machine of it needs.
 
@@ -59,8 +59,7 @@ def machine_of(model: Model) -> Model:
     """
     if all(key in model for key in _NEEDED):
         return model
-    g2 = load_model('sinus_g2')
+    g2 = load_family('sinus_g2')
     hidden = {key: g2[key] for key in _NEEDED}
     hidden['control.mode'] = replace(hidden['control.mode'], labels=_OPTIMAL_MODES)
-    # what a status code means is the catalog's business
-    return Model(model.name, [*hidden.values(), *model.values()], [])
+    return replace(model, parameters={**hidden, **model})

@@ -23,9 +23,9 @@ import contextlib
 import signal
 import sys
 
-from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.control import ControlError
 from nfo_sinus_driver.simulator.doors import GATEWAY_TIMEOUT
 from nfo_sinus_driver.simulator.doors import PROTOCOLS
@@ -170,7 +170,7 @@ def _variant(options: argparse.Namespace) -> Variant | None:
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     settings: dict[str, Value] = {}
-    machine = machine_of(load_model(model))
+    machine = machine_of(load_family(model))
     for text in given:
         key, equals, value = text.partition('=')
         if not equals:
@@ -210,7 +210,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
-    add('--model', default='sinus_g2', choices=MODELS, help='default: sinus_g2')
+    add('--model', default='sinus_g2', choices=families(), help='default: sinus_g2')
     add(
         '--address',
         type=_address,

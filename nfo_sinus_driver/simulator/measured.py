@@ -21,7 +21,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.simulator.motor import Motor
 
 _HOUR = 3600.0
@@ -61,7 +60,7 @@ class Counters:
         name = parameter.key.removeprefix('status.')
         if name not in self.__dict__:
             return False
-        factor = float(parameter.factor(Protocol.CLASSIC))
+        factor = float(parameter.factor('classic'))
         high = round(getattr(self, name) / factor) >> 16
         setattr(self, name, (high + 1 << 16) * factor)
         return True
@@ -101,12 +100,12 @@ _MEASURED: Mapping[str, Callable[[Motor, Counters], float]] = {
 
 
 def measure(
-    parameter: Parameter, protocol: Protocol, motor: Motor, counters: Counters
+    parameter: Parameter, protocol: str, motor: Motor, counters: Counters
 ) -> int | None:
     """Return what ``protocol`` carries of a measured parameter; ``None`` for a stored one."""
     function = _MEASURED.get(parameter.key)
     if function is None:
         return None
     raw = round(function(motor, counters) / float(parameter.factor(protocol)))
-    type_ = parameter.place(protocol).type
-    return min(max(raw, type_.minimum), type_.maximum)
+    codec = parameter.at(protocol).number
+    return min(max(raw, codec.minimum), codec.maximum)

@@ -25,12 +25,11 @@ from collections.abc import Mapping
 from fractions import Fraction
 import math
 
-from nfo_sinus_driver.catalog import DEFAULT_SCALING
-from nfo_sinus_driver.catalog import ERROR_LOG
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -81,19 +80,19 @@ FACTORY: Mapping[str, Value] = {
 }
 
 
-def home(parameter: Parameter) -> Protocol:
+def home(parameter: Parameter) -> str:
     """Return the protocol whose raw number the memory keeps."""
-    return Protocol.MODBUS if Protocol.MODBUS in parameter.places else Protocol.CLASSIC
+    return 'modbus' if 'modbus' in parameter.addresses else 'classic'
 
 
-def convert(parameter: Parameter, raw: int, protocol: Protocol) -> int:
+def convert(parameter: Parameter, raw: int, protocol: str) -> int:
     """Return the number that ``protocol`` carries for one of the memory, the nearest it can."""
     source = home(parameter)
     if protocol is source:
         return raw
     exact = raw * parameter.factor(source) / parameter.factor(protocol)
-    type_ = parameter.place(protocol).type
-    return min(max(math.floor(exact + Fraction(1, 2)), type_.minimum), type_.maximum)
+    codec = parameter.at(protocol).number
+    return min(max(math.floor(exact + Fraction(1, 2)), codec.minimum), codec.maximum)
 
 
 class Memory:
@@ -105,7 +104,7 @@ class Memory:
     :raises ValueError: an unknown key, or a value that the drive would refuse.
     """
 
-    def __init__(self, model: Model, settings: Mapping[str, Value]) -> None:
+    def __init__(self, model: Family, settings: Mapping[str, Value]) -> None:
         self.model = model
         self._factors = {
             key: float(parameter.factor(home(parameter))) for key, parameter in model.items()
@@ -149,15 +148,14 @@ class Memory:
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]
-        place = parameter.place(home(parameter))
-        raw = place.type.to_raw(parameter.encode(value, home(parameter)))
-        self._raw[key] = raw
+        words = parameter.encode(value, home(parameter))
+        self._raw[key] = parameter.at(home(parameter)).number.decode(to_bytes(words))
 
     @staticmethod
     def show(parameter: Parameter, raw: int) -> Value:
         """Turn a raw number of this memory into engineering units."""
         protocol = home(parameter)
-        return parameter.decode(parameter.place(protocol).type.to_words(raw), protocol)
+        return parameter.decode(to_words(parameter.at(protocol).number.encode(raw)), protocol)
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
@@ -170,7 +168,7 @@ class Memory:
             if raw not in parameter.labels:
                 raise Refused(Reason.VALUE, f'{parameter.key} has no code {raw}')
             return
-        value = raw * parameter.factor(home(parameter), DEFAULT_SCALING)
+        value = raw * parameter.factor(home(parameter))
         low = parameter.minimum is not None and value < parameter.minimum
         high = parameter.maximum is not None and value > parameter.maximum
         if low or high:
@@ -190,14 +188,14 @@ class Memory:
 class RegisterMap:
     """Which holding registers belong to which parameter [M0 table 4, table 5]."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Family) -> None:
         self._by_base = {
-            parameter.place(Protocol.MODBUS).address: parameter
+            parameter.at('modbus').index: parameter
             for parameter in model.values()
-            if Protocol.MODBUS in parameter.places
+            if 'modbus' in parameter.addresses
         }
         # the manual of the Optimal tells of none
-        self._log = ERROR_LOG[Protocol.MODBUS] if model.name == 'sinus_g2' else None
+        self._log = model.error_logs.get('modbus')
 
     def log_entry(self, register: int, count: int) -> int | None:
         """
@@ -208,7 +206,7 @@ class RegisterMap:
         entry, rest = divmod(register - self._log.first, self._log.stride) if self._log else (-1, 0)
         if self._log is None or not 0 <= entry < self._log.limit:
             return None
-        if rest or count != self._log.TYPE.words:
+        if rest or count != self._log.words:
             raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
         return entry
 
@@ -223,7 +221,7 @@ class RegisterMap:
         parameter = self._by_base.get(register)
         if parameter is None:
             raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
-        words = parameter.place(Protocol.MODBUS).words
+        words = parameter.at('modbus').words
         if count != words:
             raise Refused(Reason.ADDRESS, f'{parameter.key} takes {words} registers, not {count}')
         return parameter

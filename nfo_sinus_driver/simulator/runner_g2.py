@@ -23,12 +23,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog.inv_st import START_DELAY
-from nfo_sinus_driver.catalog.inv_st import TUNING
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.simulator.control_source import RELEASED
 from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
 from nfo_sinus_driver.simulator.control_source import RUNNING
@@ -73,6 +71,8 @@ _SOURCES: Mapping[int, Source] = {
 }
 
 
+#: The inverter status while it tunes [M0 table 19].
+_TUNING = 28
 #: What DriveStatus adds while it tunes: the motor has current, and nobody says what that shows as.
 _TUNING_STATUS = (
     Status.READY_TO_SWITCH_ON
@@ -98,7 +98,7 @@ class G2Runner(Runner):
         2: 'status.trq_set',
         3: 'status.spd_set',
     }
-    delayed = START_DELAY
+    delayed = 25
     usual = Variant()
     run_command = 'fieldbus.scmd'
 
@@ -317,7 +317,7 @@ class G2Runner(Runner):
     def inv_st(self) -> int:
         """The inverter status while no fault stands [M0 table 19]."""
         if self.tuning is not None:
-            return TUNING
+            return _TUNING
         if self._tuned:
             return self._tuned
         code = super().inv_st

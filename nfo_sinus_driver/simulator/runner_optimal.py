@@ -30,11 +30,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog.words_optimal import Control
-from nfo_sinus_driver.catalog.words_optimal import Mode
-from nfo_sinus_driver.catalog.words_optimal import Smode
-from nfo_sinus_driver.catalog.words_optimal import Status
-from nfo_sinus_driver.catalog.words_optimal import state_of
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import Mode
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
+from nfo_sinus_driver.families.sinus_optimal.words import Status
+from nfo_sinus_driver.families.sinus_optimal.words import state_of
 from nfo_sinus_driver.simulator.control_source import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.control_source import Source
 from nfo_sinus_driver.simulator.control_steps import ControlSteps

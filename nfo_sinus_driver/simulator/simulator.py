@@ -27,7 +27,7 @@ import time
 from typing import Any
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
@@ -123,7 +123,7 @@ class Simulator:
         newer_functions: str = KNOWN,
         variant: Variant | None = None,
     ) -> None:
-        machine = machine_of(load_model(model))
+        machine = machine_of(load_family(model))
         known = with_firmware(machine, settings or {}, dialect)
         firmware = firmware_of(Memory(machine, known))
         first = door(

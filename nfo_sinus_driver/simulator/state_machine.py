@@ -24,8 +24,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 import enum
 
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Status
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Status
 
 #: Without both of these the power is off, or a quick stop is wanted [M0 table 14].
 _POWER = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.memory import Memory
 
 

@@ -27,11 +27,11 @@ from fuzz import judges
 from fuzz.decoders import Case
 from fuzz.decoders import classic_frame
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.catalog import MODELS
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog import words
-from nfo_sinus_driver.catalog import words_optimal
-from nfo_sinus_driver.catalog.parameter import DEFAULT_SCALING
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2 import words
+from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.link import classic_refusal
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -49,9 +49,10 @@ _SILENCE, _OVER = 0.01, 0.011
 
 _PARAMETERS = [
     (parameter, protocol)
-    for model in map(load_model, MODELS)
+    for model in map(load_family, families())
     for parameter in model.values()
-    for protocol in parameter.places
+    for protocol in ('modbus', 'classic')
+    if protocol in parameter.addresses
 ]
 
 
@@ -62,7 +63,7 @@ def _catalog(random: Random, frames: int) -> None:
     """Judge what raw words become, those of a damaged answer included."""
     for _ in range(frames):
         parameter, protocol = random.choice(_PARAMETERS)
-        place = parameter.places[protocol]
+        place = parameter.addresses[protocol]
         count = place.words if random.random() < 0.9 else random.choice((0, 1, 2, 3))
         raw = [
             random.choice((0, 1, 0x7FFF, 0x8000, 0xFFFF, random.getrandbits(16)))
@@ -76,18 +77,17 @@ def _catalog(random: Random, frames: int) -> None:
         assert count == place.words, f'{value!r} from {count} words'
         form = {(1, False): '<H', (1, True): '<h', (2, False): '<I', (2, True): '<i'}
         data = struct.pack(f'<{count}H', *raw)
-        number = struct.unpack(form[count, place.type.signed], data)[0]
+        number = struct.unpack(form[count, place.number.signed], data)[0]
         assert type(value) is parameter.kind, f'{parameter.key}: {value!r}'
         if parameter.labels:
             label = parameter.labels.get(number, str(number))
             shown = {True: 'ON', False: 'OFF'}[value] if parameter.kind is bool else str(value)
             assert shown == label, f'{parameter.key}: {value!r} instead of {label!r}'
         else:
-            factor = place.factor or DEFAULT_SCALING.factor(parameter.scale)
-            assert math.isclose(value, Fraction(number) * factor, rel_tol=1e-12)
+            assert math.isclose(value, Fraction(number) * place.factor, rel_tol=1e-12)
         word = random.getrandbits(16)
-        assert words.state_of(word) in words.State
-        assert words_optimal.state_of(word) in words.State
+        assert words.state_of(word) in State
+        assert words_optimal.state_of(word) in State
         assert len(classic_refusal.flag_names(word)) == bin(word).count('1')
 
 

@@ -22,7 +22,7 @@ from bench import wait_until
 import pytest
 from ways import needs
 
-from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 _THREE = """
 nfo_sinus_bus: {ros__parameters: {drives: [left, right, watched]}}

@@ -32,7 +32,7 @@ from topic_hardware import components
 from ways import needs
 import yaml
 
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
@@ -71,7 +71,7 @@ def test_every_parameter_of_a_file_is_one_of_ours(name: str) -> None:
     nodes = sections(_CONFIG / name)
     bus = {setting.name for setting in BUS_SETTINGS}
     drive = {setting.name for setting in DRIVE_SETTINGS}
-    drive |= {parameter.key for parameter in load_model('sinus_g2').settings}
+    drive |= {parameter.key for parameter in load_family('sinus_g2').settings}
     drives = nodes['nfo_sinus_bus'].get('drives', ['nfo_sinus'])
     assert nodes.keys() - {'/**', 'nfo_sinus_bus'} <= set(drives)
     for node, parameters in nodes.items():

@@ -33,8 +33,8 @@ from support.wire import Request
 from support.wire import understand
 from ways import needs
 
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 _QUICK = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
 _REFUSING = ('--stop-in-tuning', 'refused')
@@ -158,7 +158,7 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
         assert not any(call.result().success for call in calls)
     requests = [frame for frame in bench.frames()[asked:] if frame['direction'] == 'request']
     asked_of = [understand(bytes.fromhex(frame['hex']), bench.way.protocol) for frame in requests]
-    place = load_model(bench.way.model)['fieldbus.scmd'].place(bench.way.bus).address
+    place = load_family(bench.way.model)['fieldbus.scmd'].at(bench.way.bus).index
     stop = asked_of.index(Request(1, place, 1, (Scmd.STOP,)))
     waits = [request for request in asked_of[:stop] if request and request.unit == 2]
     # each of them keeps the line for a time-out: one on its way, one while the call came in

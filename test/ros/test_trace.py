@@ -26,8 +26,8 @@ from support.wire import Request
 from support.wire import understand
 from ways import needs
 
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LineSettings
 
 pytestmark = needs('states')
@@ -67,7 +67,7 @@ def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
         assert client.enable().success
     driver.signal(signal.SIGTERM)
     assert driver.wait() == 0, driver.text
-    place = load_model(way.model)['fieldbus.scmd'].place(way.bus).address
+    place = load_family(way.model)['fieldbus.scmd'].at(way.bus).index
     run = Request(1, place, 1, (Scmd.FIELDBUS,))
     assert _requests(bench).count(run) == 5, (
         'every enable but the refused one, whose run command is withdrawn, too'

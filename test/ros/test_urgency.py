@@ -27,8 +27,8 @@ from support.wire import Request
 from support.wire import understand
 from ways import needs
 
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 pytestmark = needs('states')
 
@@ -47,7 +47,7 @@ def _asked(bench: Bench) -> list[tuple[float, Request | None]]:
 
 
 def _place(bench: Bench, key: str) -> int:
-    return load_model(bench.way.model)[key].place(bench.way.bus).address
+    return load_family(bench.way.model)[key].at(bench.way.bus).index
 
 
 def _write(place: int, word: int) -> Request:

@@ -23,8 +23,6 @@ from dataclasses import dataclass
 
 import pytest
 
-from nfo_sinus_driver.catalog import Protocol
-
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
     'rtu': 'it reads frames of Modbus RTU to a G2 by hand',
@@ -80,9 +78,9 @@ class Way:
     unmeasured: frozenset[str] = frozenset()
 
     @property
-    def bus(self) -> Protocol:
+    def bus(self) -> str:
         """How parameters are addressed."""
-        return Protocol.CLASSIC if self.protocol == 'classic' else Protocol.MODBUS
+        return 'classic' if self.protocol == 'classic' else 'modbus'
 
     @property
     def simulator(self) -> dict[str, str | int]:

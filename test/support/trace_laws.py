@@ -22,13 +22,11 @@ from dataclasses import dataclass
 import functools
 from typing import Any
 
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from support.wire import WITH_GAP
 from support.wire import Request
 from support.wire import understand
@@ -37,8 +35,8 @@ from support.wire import understand
 _EVERYBODY = 95
 #: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
 _SETPOINTS = {
-    Protocol.MODBUS: frozenset((0x03FC, 0x025C, 0x0408, 0x0410)),
-    Protocol.CLASSIC: frozenset((0x001E,)),
+    'modbus': frozenset((0x03FC, 0x025C, 0x0408, 0x0410)),
+    'classic': frozenset((0x001E,)),
 }
 
 Frame = dict[str, Any]
@@ -182,26 +180,26 @@ def _runs(request: Request, places: _Places) -> bool:
 
 @functools.cache
 def _places(model: str, protocol: str) -> _Places:
-    bus = Protocol.CLASSIC if protocol == 'classic' else Protocol.MODBUS
-    parameters = [parameter for parameter in load_model(model).values() if bus in parameter.places]
+    bus = 'classic' if protocol == 'classic' else 'modbus'
+    parameters = [row for row in load_family(model).values() if bus in row.addresses]
     whole = set()
     for parameter in parameters:
-        place = parameter.place(bus)
-        if bus is Protocol.CLASSIC:
-            whole |= {(number, 1) for number in place.addresses}
+        place = parameter.at(bus)
+        if bus == 'classic':
+            whole |= {(number, 1) for number in place.numbers}
         else:
-            whole.add((place.address, place.words))
-    if model == 'sinus_g2':
-        area = ERROR_LOG[bus]
-        for entry in range(area.entries if bus is Protocol.MODBUS else area.limit):
+            whole.add((place.index, place.words))
+    area = load_family(model).error_logs.get(bus)
+    if area is not None:
+        for entry in range(area.entries if bus == 'modbus' else area.limit):
             low = area.address(entry)
-            whole |= {(low, 1), (low + 1, 1)} if bus is Protocol.CLASSIC else {(low, 2)}
+            whole |= {(low, 1), (low + 1, 1)} if bus == 'classic' else {(low, 2)}
     acknowledging = frozenset(
-        parameter.place(bus).address
+        parameter.at(bus).index
         for parameter in parameters
         if parameter.access is Access.ACKNOWLEDGE
     )
-    at = {parameter.key: parameter.place(bus).address for parameter in parameters}
+    at = {parameter.key: parameter.at(bus).index for parameter in parameters}
     command = at.get('fieldbus.scmd', at.get('fieldbus.smode', -1))
     mask = at.get('fieldbus.drv_ctrl_write_mask', -1)
     word = at['fieldbus.drive_control']

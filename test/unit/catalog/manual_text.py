@@ -25,11 +25,10 @@ import re
 import pytest
 
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
 SHARED = Path(__file__).resolve().parents[4] / 'shared'
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 
 #: Names that the manuals spell in more than one way, or wrongly [C29], once they are squashed.
 SPELLINGS = {
@@ -135,8 +134,8 @@ def labels_in(text: str) -> dict[int, str]:
 
 def settings_of_m2() -> Iterator[tuple[Parameter, list[str]]]:
     """The rows of [M2 table 1], by their Classic id, with the group of the catalog."""
-    classic = [row for row in G2.values() if Protocol.CLASSIC in row.places]
-    by_id = {row.place(Protocol.CLASSIC).address: row for row in classic}
+    classic = [row for row in G2.values() if 'classic' in row.addresses]
+    by_id = {row.at('classic').index: row for row in classic}
     for cells in between(manual('M2'), 'ID\tName\tDescription', 'Table 1.'):
         if re.fullmatch(r'E[0-9A-F]{4}', cells[0]) and len(cells) == 7 and cells[1]:
             row = by_id[int(cells[0][1:], 16)]

@@ -21,14 +21,12 @@ from collections import Counter
 
 import pytest
 
-from nfo_sinus_driver.catalog import ERROR_LOG
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
-G2 = load_model('sinus_g2')
-MODBUS = [parameter for parameter in G2.values() if Protocol.MODBUS in parameter.places]
-CLASSIC = [parameter for parameter in G2.values() if Protocol.CLASSIC in parameter.places]
+G2 = load_family('sinus_g2')
+MODBUS = [parameter for parameter in G2.values() if 'modbus' in parameter.addresses]
+CLASSIC = [parameter for parameter in G2.values() if 'classic' in parameter.addresses]
 
 #: How many parameters each group has, counted on paper in [M0 table 4] and, for the field bus,
 #: [M0 table 3] and [M0 table 5]; Tuning is no parameter but a command.
@@ -73,8 +71,7 @@ MODBUS_ONLY = {
 
 def instance(parameter: Parameter) -> int:
     """The number that all buses count from (ADI)."""
-    assert parameter.pnu is not None
-    return parameter.pnu - 1000
+    return parameter.at('profibus').index - 1000
 
 
 def test_count_of_every_group() -> None:
@@ -87,24 +84,28 @@ def test_keys_and_addresses_are_unique() -> None:
         register
         for parameter in MODBUS
         for register in range(
-            parameter.place(Protocol.MODBUS).address,
-            parameter.place(Protocol.MODBUS).address + parameter.place(Protocol.MODBUS).words,
+            parameter.at('modbus').index,
+            parameter.at('modbus').index + parameter.at('modbus').words,
         )
     ]
-    ids = [number for p in CLASSIC for number in p.place(Protocol.CLASSIC).addresses]
+    ids = [number for p in CLASSIC for number in p.at('classic').numbers]
     assert len(set(registers)) == len(registers)
     assert len(set(ids)) == len(ids)
     assert len({(parameter.group, parameter.name) for parameter in G2.values()}) == len(G2)
 
 
 def test_numbers_of_profibus_and_canopen_are_unique() -> None:
-    for attribute in ('pnu', 'canopen'):
+    for protocol, first in (('profibus', 0), ('canopen', 1)):
         keys: dict[int, list[str]] = {}
         for key, row in G2.items():
-            if row.pnu is not None:
-                keys.setdefault(getattr(row, attribute), []).append(key)
+            if protocol in row.addresses:
+                keys.setdefault(row.at(protocol).index, []).append(key)
         shared = [names for names in keys.values() if len(names) > 1]
         assert sorted(shared) == sorted(ONE_OBJECT.values())
+        for names in shared:
+            # the elements of an array count from 0 on PROFIBUS, on CANopen 0 is their number
+            parts = [G2[key].at(protocol).sub_index for key in names]
+            assert parts == [first, first + 1]
 
 
 @pytest.mark.parametrize('parameter', MODBUS, ids=lambda parameter: parameter.key)
@@ -112,11 +113,11 @@ def test_the_three_formulas(parameter: Parameter) -> None:
     number = instance(parameter)
     assert number >= 1
     # PNU = 1000 + ADI, index = 2000h + ADI, register = 210h + 4 (ADI - 1)
-    assert parameter.canopen == 0x2000 + number
+    assert parameter.at('canopen').index == 0x2000 + number
     base = 0x210 + 4 * (number - 1)
     offset = OFFSETS.get(parameter.key, 0)
-    place = parameter.place(Protocol.MODBUS)
-    assert place.address == base + offset
+    place = parameter.at('modbus')
+    assert place.index == base + offset
     # no parameter reaches into the next instance
     assert offset + place.words <= 4
 
@@ -124,15 +125,15 @@ def test_the_three_formulas(parameter: Parameter) -> None:
 def test_what_only_one_bus_has() -> None:
     assert {row.key for row in CLASSIC if row not in MODBUS} == CLASSIC_ONLY
     assert {row.key for row in MODBUS if row not in CLASSIC} == MODBUS_ONLY
-    assert {key for key, row in G2.items() if row.pnu is None} == CLASSIC_ONLY
-    assert {key for key, row in G2.items() if row.canopen is None} == CLASSIC_ONLY
+    for protocol in ('profibus', 'canopen'):
+        assert {key for key, row in G2.items() if protocol not in row.addresses} == CLASSIC_ONLY
 
 
 def test_times_of_the_ramps_are_not_the_speeds_before_them() -> None:
     # the speed half of a ramp stands at the base and must never be written [C46]
-    registers = {register for p in MODBUS for register in p.place(Protocol.MODBUS).occupied}
-    assert registers.isdisjoint({0x27C, 0x27D, 0x280, 0x281})
-    assert G2['control.accel'].factor(Protocol.MODBUS) * 1000 == 1
+    taken = {number for p in MODBUS for number in p.at('modbus').occupied}
+    assert taken.isdisjoint({(0x27C,), (0x27D,), (0x280,), (0x281,)})
+    assert G2['control.accel'].factor('modbus') * 1000 == 1
 
 
 def test_ids_of_words_that_belong_together() -> None:
@@ -140,29 +141,29 @@ def test_ids_of_words_that_belong_together() -> None:
     descending = {
         row.key
         for row in CLASSIC
-        if list(row.place(Protocol.CLASSIC).addresses)
-        != sorted(row.place(Protocol.CLASSIC).addresses)
+        if list(row.at('classic').numbers)
+        != sorted(row.at('classic').numbers)
     }
     assert descending == {'fieldbus.spd_scl_numerator', 'fieldbus.spd_scl_denominator'}
 
 
 def test_error_log_is_where_no_parameter_is() -> None:
-    modbus = ERROR_LOG[Protocol.MODBUS]
+    modbus, classic = G2.error_logs['modbus'], G2.error_logs['classic']
     # C000h is instance 12157, P13157 on PROFIBUS [M0 table 4, table 9]
     assert modbus.address(0) == 0x210 + 4 * (13157 - 1000 - 1) == 0xC000
     assert [modbus.address(entry) for entry in (1, 30, 31)] == [0xC004, 0xC078, 0xC07C]
-    classic = ERROR_LOG[Protocol.CLASSIC]
     assert [classic.address(entry) for entry in (0, 1, 30, 31)] == [0x200, 0x202, 0x23C, 0x23E]
     # the last of 128, of which the older manual speaks [C4]
     assert classic.address(127) == 0x2FE
     assert modbus.entries == classic.entries == 32
+    assert G2.error_logs['profibus'].address(31) == 13188
     for area, rows, protocol in (
-        (modbus, MODBUS, Protocol.MODBUS),
-        (classic, CLASSIC, Protocol.CLASSIC),
+        (modbus, MODBUS, 'modbus'),
+        (classic, CLASSIC, 'classic'),
     ):
-        taken = {address for row in rows for address in row.place(protocol).occupied}
-        words = range(area.TYPE.words)
-        log = {area.address(n) + word for n in range(area.limit) for word in words}
+        taken = {number for row in rows for number in row.at(protocol).occupied}
+        words = range(area.words)
+        log = {(area.address(n) + word,) for n in range(area.limit) for word in words}
         assert taken.isdisjoint(log)
         for entry in (-1, area.limit):
             with pytest.raises(IndexError, match=f'the error log has {area.limit} entries'):

@@ -29,25 +29,30 @@ from manual_text import settings_of_m2
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
+from nfo_sinus_driver.catalog import Address
 
 #: What is misprinted, by key and table, with the reading that is followed.
 MISPRINTS = {
     ('motor.p_nom', 9): (1006, 1005),  # the number of U-Nom [C1]
 }
-#: Types that PROFIBUS has otherwise than Modbus [C23]; an ENUM of Modbus is a UINT16 there.
+#: What PROFIBUS has of another type than Modbus [C23].
 OTHER_TYPES = {
-    'control.st_mode': 'SINT16',
-    'freque.fr_min': 'UINT16',
-    'freque.fr_max': 'UINT16',
-    'pi_reg.reg_amp': 'SINT16',
-    'status.i_rms': 'SINT16',
-    'status.p_out': 'SINT16',
-    'error.overload_s_temp': 'UINT16',
-    'fieldbus.inv_st_with_ack': 'SINT16',
-    'fieldbus.inv_st': 'SINT16',
-    'fieldbus.spd_scl_numerator': 'UINT32',
-    'fieldbus.spd_scl_denominator': 'UINT32',
+    'control.st_mode',
+    'freque.fr_min',
+    'freque.fr_max',
+    'status.i_rms',
+    'status.p_out',
+    'fieldbus.inv_st_with_ack',
+    'fieldbus.inv_st',
+    'fieldbus.spd_scl_numerator',
+    'fieldbus.spd_scl_denominator',
+}
+#: The second elements of an array on PROFIBUS [M0 table 9, table 10].
+SECOND = {
+    'control.accel',
+    'control.retard',
+    'fieldbus.inv_st',
+    'fieldbus.spd_scl_denominator',
 }
 #: What the manual lets a master write and the driver never does.
 NEVER_WRITTEN = {
@@ -65,15 +70,22 @@ NO_LABELS = {
 }
 
 
-def keys_on(protocol: Protocol) -> set[str]:
+def keys_on(protocol: str) -> set[str]:
     """The parameters that one protocol reaches."""
-    return {key for key, row in G2.items() if protocol in row.places}
+    return {key for key, row in G2.items() if protocol in row.addresses}
+
+
+def type_of(place: Address) -> str:
+    """The type of a codec, as the manual prints it."""
+    return place.codec.name.partition('_')[0].upper()
 
 
 def on_bus(key: str, printed: str) -> set[str]:
     """What the catalog may call a type that the manual prints."""
     if printed == 'ENUM' and key in NO_LABELS:
         return {'SINT16' if key == 'pi_reg.reg_amp' else 'UINT16'}
+    if printed == 'ENUM':
+        return {'UINT16'}
     # two masks in one, to be written in one message
     return {'UINT32'} if printed == '2 * UINT16' else {printed}
 
@@ -86,13 +98,13 @@ def test_classic_ids_and_types() -> None:
             ids = tuple(int(number, 16) for number in re.findall(r'E([0-9A-F]{4})', line.cells[0]))
             if not ids:
                 assert 'TBD' in line.cells[0]  # to be defined, says the manual [C27]
-                assert Protocol.CLASSIC not in row.places
+                assert 'classic' not in row.addresses
                 continue
-            place = row.place(Protocol.CLASSIC)
-            assert place.addresses == ids, row.key
-            assert place.type.name in on_bus(row.key, line.cells[1]), row.key
+            place = row.at('classic')
+            assert place.numbers == ids, row.key
+            assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             seen.add(row.key)
-    assert seen == keys_on(Protocol.CLASSIC)
+    assert seen == keys_on('classic')
 
 
 def test_modbus_registers_and_types() -> None:
@@ -101,13 +113,13 @@ def test_modbus_registers_and_types() -> None:
         for line in lines_of(table):
             (row,) = line.parameters
             registers = [int(number, 16) for number in re.findall(r'([0-9A-F]{4})h', line.cells[0])]
-            place = row.place(Protocol.MODBUS)
-            assert place.address == registers[0], row.key
-            assert place.type.name in on_bus(row.key, line.cells[1]), row.key
+            place = row.at('modbus')
+            assert place.index == registers[0], row.key
+            assert type_of(place) in on_bus(row.key, line.cells[1]), row.key
             if line.cells[1] != '2 * UINT16':  # its second register has a line of its own
-                assert list(place.occupied) == registers, row.key
+                assert place.occupied == [(number,) for number in registers], row.key
             seen.add(row.key)
-    assert seen == keys_on(Protocol.MODBUS)
+    assert seen == keys_on('modbus')
 
 
 def test_profibus_numbers_types_and_access() -> None:
@@ -122,19 +134,30 @@ def test_profibus_numbers_types_and_access() -> None:
                 if misprint is not None:
                     assert printed == misprint[0], 'no misprint any more'
                     printed = misprint[1]
-                assert row.pnu == printed, row.key
-                type_ = row.place(Protocol.MODBUS).type.name
-                expected = OTHER_TYPES.get(row.key, 'UINT16' if type_ == 'ENUM' else type_)
-                if line.cells[2].startswith('Array') and expected == 'UINT32' == type_:
-                    expected = 'UINT16'  # the two masks are an array here
-                assert line.cells[2].split()[-1] == expected, row.key
+                place = row.at('profibus')
+                assert place.index == printed, row.key
+                sub_index = 0 if line.cells[2].startswith('Array') else None
+                if row.key in SECOND:
+                    sub_index = 1
+                assert place.sub_index == sub_index, row.key
+                assert place.factor == row.factor('modbus')
+                expected = line.cells[2].split()[-1]
+                if row.key == 'error.overload_s_temp':
+                    assert expected == 'UINT16'
+                    expected = 'SINT16'  # it goes down to -100 [C23]
+                elif row.key == 'fieldbus.drv_ctrl_write_mask':
+                    assert expected == 'UINT16'
+                    expected = 'UINT32'  # the two masks are an array here
+                assert type_of(place) == expected, row.key
+                modbus = type_of(row.at('modbus'))
+                assert (type_of(place) == modbus) == (row.key not in OTHER_TYPES), row.key
                 allowed = {'R/W': Access.READ_WRITE, 'R': Access.READ, 'W': Access.WRITE}
                 if row.access is Access.ACKNOWLEDGE or row.key in NEVER_WRITTEN:
                     assert 'R' in line.cells[1]
                 else:
                     assert row.access is allowed[line.cells[1]], row.key
                 seen.add(row.key)
-    assert seen == {key for key, row in G2.items() if row.pnu is not None}
+    assert seen == {key for key, row in G2.items() if 'profibus' in row.addresses}
 
 
 def test_canopen_indices() -> None:
@@ -146,9 +169,12 @@ def test_canopen_indices() -> None:
                 assert line.name == 'SetpointSource'
                 continue
             for row in line.parameters:
-                assert row.canopen == int(index[1], 16), row.key
+                place = row.at('canopen')
+                assert place.index == int(index[1], 16), row.key
+                # no type is printed
+                assert type_of(place) == type_of(row.at('modbus')), row.key
                 seen.add(row.key)
-    assert seen == {key for key, row in G2.items() if row.canopen is not None}
+    assert seen == {key for key, row in G2.items() if 'canopen' in row.addresses}
 
 
 @pytest.mark.parametrize('table', [2, 4, 9])
@@ -176,14 +202,14 @@ def test_enumerations(table: int) -> None:
 
 @pytest.mark.parametrize('table', [2, 3, 4, 5])
 def test_factors(table: int) -> None:
-    protocol = Protocol.CLASSIC if table < 4 else Protocol.MODBUS
+    protocol = 'classic' if table < 4 else 'modbus'
     units = {'kW': {'kW': 1, 'W': 1000}, 'kwh': {'kWh': 1}, 'mwh': {'kWh': 1000}}
     units |= {'Unit': {'': 1}, '1': {'': 1}}
     units |= {name: {name: 1} for name in ('A', 'Ω', 'H', 's', 'h', 'V', '°C', '%')}
     counts = {'divided': 0, 'scaled': 0, 'plain': 0}
     for line in lines_of(table):
         (row,) = line.parameters
-        if row.labels or protocol not in row.places:
+        if row.labels or protocol not in row.addresses:
             continue
         text = re.sub(r'</?sup>|\s|\*', '', line.cells[2]) if len(line.cells) > 2 else ''
         divided = re.search(r'(°C|%|1|[^\W\d_]+)/10(\d)', text)
@@ -231,7 +257,7 @@ def test_ranges_decimals_units_and_types() -> None:
     for row, cells in settings_of_m2():
         if '=' in cells[3]:
             continue  # an enumeration
-        place = row.place(Protocol.CLASSIC)
+        place = row.at('classic')
         decimals = int(cells[4] or 0)
         low, high = counts_of(cells[3])
         if row.key == 'serial.address':
@@ -314,7 +340,7 @@ def test_inverter_status() -> None:
     for cells in between(manual('M0'), '### 8.2', 'Table 19:'):
         if len(cells) < 4 or not cells[0].isdigit():
             continue
-        entry = G2.inv_st(int(cells[0]))
+        entry = G2.status_code(int(cells[0]))
         assert entry.text == cells[1]
         assert entry.requires_ack == (cells[2] == 'X')
         if cells[3] and entry.code:
@@ -327,6 +353,6 @@ def test_inverter_status_of_old_firmware() -> None:
     seen = set()
     for cells in between(manual('M2'), 'Value\tDisplay Text', 'Table 3 Values'):
         if cells[0].isdigit():
-            assert G2.inv_st(int(cells[0])).old_text == cells[1]
+            assert G2.status_code(int(cells[0])).old_text == cells[1]
             seen.add(int(cells[0]))
     assert seen == set(range(48))

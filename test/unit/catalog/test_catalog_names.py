@@ -25,9 +25,10 @@ from setting_names import SETTINGS
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import to_words
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 NAMES = Path(__file__).resolve().parents[4] / 'shared' / 'design' / 'parameter_names.csv'
 FROZEN = list(csv.reader(SETTINGS.strip().splitlines()))
 #: What a ROS parameter calls the type of a value.
@@ -36,9 +37,9 @@ ROS_TYPES = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
 
 @pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
 def test_zero_is_of_the_parameters_kind(parameter: Parameter) -> None:
-    for protocol, place in parameter.places.items():
+    for protocol, place in parameter.addresses.items():
         raw = next(iter(parameter.labels), 0)
-        value = parameter.decode(place.type.to_words(raw), protocol)
+        value = parameter.decode(to_words(place.number.encode(raw)), protocol)
         assert type(value) is parameter.kind
 
 

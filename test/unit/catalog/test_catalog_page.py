@@ -23,9 +23,8 @@ import sys
 
 import pytest
 
-from nfo_sinus_driver.catalog import MODELS
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog.page import page
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -71,14 +70,14 @@ def test_every_table_is_one() -> None:
         before = row
 
 
-@pytest.mark.parametrize('name', MODELS)
+@pytest.mark.parametrize('name', families())
 def test_every_parameter_has_its_row(name: str) -> None:
-    for row in load_model(name).values():
+    for row in load_family(name).values():
         first = f'`{row.key}`' if row.is_setting else row.name
         registers = [
-            f'{place.address:04X}h'
-            for protocol, place in row.places.items()
-            if protocol is Protocol.MODBUS
+            f'{place.index:04X}h'
+            for protocol, place in row.addresses.items()
+            if protocol == 'modbus'
         ]
         assert [
             found

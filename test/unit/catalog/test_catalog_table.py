@@ -22,15 +22,23 @@ from fractions import Fraction
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Model
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import RawType
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import to_words
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
+
+#: The types that the manual prints.
+CODECS = {
+    'UINT16': 'uint16_be',
+    'ENUM': 'uint16_be',
+    'SINT16': 'sint16_be',
+    'UINT32': 'uint32_ws',
+    'SINT32': 'sint32_ws',
+}
 
 #: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
 GOLDEN = [
@@ -164,11 +172,11 @@ SCALED_OTHERWISE = {
 }
 
 
-def words_of(parameter: Parameter, protocol: Protocol, value: Fraction) -> tuple[int, ...]:
+def words_of(parameter: Parameter, protocol: str, value: Fraction) -> tuple[int, ...]:
     """The words of an exact value; fails unless it is a whole number of counts that fits."""
     raw = value / parameter.factor(protocol)
     assert raw.denominator == 1, f'{parameter.key}: {value} is between two counts'
-    return parameter.place(protocol).type.to_words(raw.numerator)
+    return to_words(parameter.at(protocol).number.encode(raw.numerator))
 
 
 @ROWS
@@ -181,25 +189,30 @@ def test_row_is_consistent(parameter: Parameter) -> None:
     if parameter.access is Access.READ:
         # the drive says what is possible, so there is nothing to check
         assert parameter.minimum is parameter.maximum is None
-    for protocol, place in parameter.places.items():
-        count = place.words if protocol is Protocol.CLASSIC else 1
-        assert len(place.addresses) == count
-        assert all(0 <= address <= 0xFFFF for address in place.addresses)
+    for protocol, address in parameter.addresses.items():
+        assert protocol == address.protocol
+        assert all(0 <= number <= 0xFFFF for number in address.numbers)
+        if protocol in ('modbus', 'classic'):
+            assert len(address.numbers) == (address.words if protocol == 'classic' else 1)
+        assert address.source.startswith('M0 table ')
+        assert address.factor > 0
 
 
 @ROWS
 def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
-    for protocol in parameter.places:
+    for protocol in parameter.addresses:
         for bound in (parameter.minimum, parameter.maximum):
             if bound is not None:
                 words_of(parameter, protocol, bound)
         for code in parameter.labels:
-            assert parameter.place(protocol).type.to_words(code) == (code & 0xFFFF,)
+            codec = parameter.at(protocol).number
+            assert codec.size == 2
+            assert codec.decode(codec.encode(code)) == code
 
 
 def test_parameters_that_are_scaled_differently_on_the_two_buses() -> None:
-    both = [p for p in G2.values() if len(p.places) == 2]
-    differ = {p.key for p in both if p.factor(Protocol.MODBUS) != p.factor(Protocol.CLASSIC)}
+    both = [p for p in G2.values() if {'modbus', 'classic'} <= p.addresses.keys()]
+    differ = {p.key for p in both if p.factor('modbus') != p.factor('classic')}
     assert differ == SCALED_OTHERWISE
 
 
@@ -294,8 +307,8 @@ def test_golden_row(
     key: str, register: int, type_: str, unit: str, value: Value, words: tuple[int, ...]
 ) -> None:
     row = G2[key]
-    place = row.place(Protocol.MODBUS)
-    assert (place.address, place.type, row.unit) == (register, RawType[type_], unit)
+    place = row.at('modbus')
+    assert (place.index, place.codec.name, row.unit) == (register, CODECS[type_], unit)
     assert row.decode(words) == value
     assert row.encode(value) == words
 
@@ -305,21 +318,21 @@ def test_golden_row_of_classic(
     key: str, ids: tuple[int, ...], type_: str, value: Value, words: tuple[int, ...]
 ) -> None:
     row = G2[key]
-    place = row.place(Protocol.CLASSIC)
-    assert (place.addresses, place.type) == (ids, RawType[type_])
-    assert row.decode(words, Protocol.CLASSIC) == value
-    assert row.encode(value, Protocol.CLASSIC) == words
+    place = row.at('classic')
+    assert (place.numbers, place.codec.name) == (ids, CODECS[type_])
+    assert row.decode(words, 'classic') == value
+    assert row.encode(value, 'classic') == words
 
 
 def test_parameter_that_is_not_on_a_bus_says_so() -> None:
     with pytest.raises(KeyError, match=r'control\.any_bus cannot be reached over modbus'):
-        G2['control.any_bus'].place(Protocol.MODBUS)
+        G2['control.any_bus'].at('modbus')
     with pytest.raises(KeyError, match='cannot be reached over classic'):
-        G2['fieldbus.profidrive_status'].decode((0,), Protocol.CLASSIC)
+        G2['fieldbus.profidrive_status'].decode((0,), 'classic')
 
 
 def test_model_is_a_mapping_of_its_parameters() -> None:
-    assert isinstance(G2, Model)
+    assert isinstance(G2, Family)
     assert G2.name == 'sinus_g2'
     assert len(G2) == len(list(G2)) == 155
     assert all(G2[key].key == key for key in G2)

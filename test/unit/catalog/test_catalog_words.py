@@ -23,26 +23,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog import state_of
-from nfo_sinus_driver.catalog.inv_st import BRAKE_CHOPPER
-from nfo_sinus_driver.catalog.inv_st import BUS_FAIL
-from nfo_sinus_driver.catalog.inv_st import BUS_RUNNING
-from nfo_sinus_driver.catalog.inv_st import BUS_STANDBY
-from nfo_sinus_driver.catalog.inv_st import CURRENT_LIMIT
-from nfo_sinus_driver.catalog.inv_st import KEYPAD
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
-from nfo_sinus_driver.catalog.inv_st import START_DELAY
-from nfo_sinus_driver.catalog.inv_st import TERMINALS
-from nfo_sinus_driver.catalog.inv_st import TUNING
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.families.sinus_g2.words import state_of
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 
 #: The display texts of [M0 table 19]; 41 to 44 are from [M2 table 3].
 TEXTS = [
@@ -127,7 +118,7 @@ def fixed_bits(printed: str) -> tuple[int, int]:
 
 @pytest.mark.parametrize('code', range(48))
 def test_inverter_status(code: int) -> None:
-    entry = G2.inv_st(code)
+    entry = G2.status_code(code)
     assert (entry.code, entry.text) == (code, TEXTS[code])
     assert entry.old_text == OLD_TEXTS.get(code, TEXTS[code])
     assert entry.requires_ack == (1 <= code <= 23 and code != 15)
@@ -145,48 +136,57 @@ def test_inverter_status(code: int) -> None:
 def test_texts_of_old_firmware(firmware: str, old: bool) -> None:
     for code, text in enumerate(TEXTS):
         expected = OLD_TEXTS.get(code, text) if old else text
-        assert G2.inv_st_text(code, Fraction(firmware)) == expected
+        assert G2.status_code(code).shown(Fraction(firmware)) == expected
 
 
 def test_texts_of_firmware_as_it_is_read() -> None:
     # SWVer comes as a binary fraction, a hair beside 4.28
-    assert G2.inv_st_text(37, Fraction(G2['fieldbus.sw_ver'].decode((428,)))) == 'Bus Stby'
-    assert G2.inv_st_text(37, Fraction(G2['fieldbus.sw_ver'].decode((427,)))) == 'Sio Stby'
+    for raw, text in ((428, 'Bus Stby'), (427, 'Sio Stby')):
+        firmware = Fraction(G2['fieldbus.sw_ver'].decode((raw,)))
+        assert G2.status_code(37).shown(firmware) == text
 
 
 def test_texts_of_unknown_firmware() -> None:
-    assert [G2.inv_st_text(code) for code in range(48)] == TEXTS
+    assert [G2.status_code(code).shown(None) for code in range(48)] == TEXTS
 
 
 @pytest.mark.parametrize('code', [48, 99, 0xFFFF])
 def test_unlisted_status_code(code: int) -> None:
-    entry = G2.inv_st(code)
+    entry = G2.status_code(code)
     assert (entry.code, entry.text, entry.kind) == (code, f'Code {code}', Kind.STATUS)
     assert not entry.requires_ack
-    assert G2.inv_st_text(code, Fraction('4.20')) == f'Code {code}'
+    assert entry.shown(Fraction('4.20')) == f'Code {code}'
 
 
-def test_groups_of_status_codes() -> None:
-    assert {code for code in range(48) if 'Stby' in TEXTS[code]} == BUS_STANDBY | {33}
-    assert {code for code in range(48) if TEXTS[code].startswith('Bus ')} == (
-        BUS_RUNNING | BUS_STANDBY | {BUS_FAIL}
+def meaning(*meanings: Meaning) -> set[int]:
+    """The codes that mean one of these."""
+    return {code.code for one in meanings for code in G2.codes(one)}
+
+
+def called(*starts: str) -> set[int]:
+    """The codes whose texts begin so."""
+    return {code for code in range(48) if TEXTS[code].startswith(starts)}
+
+
+def test_meanings_of_status_codes() -> None:
+    assert called('Bus Stby') == meaning(Meaning.BUS_STANDBY)
+    assert called('Bus ') - called('Bus Stby', 'Bus Fail') == meaning(Meaning.BUS_RUNNING)
+    assert called('St still', 'Final', 'Loc ') == meaning(Meaning.KEYPAD)
+    assert called('Ext ') == meaning(Meaning.TERMINALS)
+    assert meaning(Meaning.KEYPAD, Meaning.TERMINALS) - called('Ext Stby') == meaning(
+        Meaning.LOCAL_RUNNING
     )
-    assert [TEXTS[code] for code in sorted(KEYPAD)] == [
-        'St still',
-        'Final fr',
-        'Loc Acc',
-        'Loc Ret',
-    ]
-    assert {code for code in range(48) if TEXTS[code].startswith('Ext ')} == TERMINALS
-    assert [TEXTS[code] for code in (BRAKE_CHOPPER, CURRENT_LIMIT)] == ['Brake Ch', 'Cur Limt']
-    assert [TEXTS[code] for code in (START_DELAY, TUNING, SIO_FAIL, BUS_FAIL)] == [
-        'Wait...',
-        'Tuning',
-        'Sio Fail',
-        'Bus Fail',
-    ]
-    assert not BUS_RUNNING & BUS_STANDBY
-    assert not (KEYPAD | TERMINALS) & (BUS_RUNNING | BUS_STANDBY)
+    assert called('Brake Ch', 'Cur Limt') == meaning(Meaning.RUNNING)
+    assert called('Brake Ch', 'Cur Limt', 'Wait') == meaning(Meaning.ANONYMOUS)
+    # the chopper takes what a motor gives back that slows down
+    assert called('Bus Ret', 'Brake Ch') == meaning(Meaning.SLOWING)
+    assert called('Cur Limt') == meaning(Meaning.CURRENT_LIMIT)
+    assert called('Wait') == meaning(Meaning.START_DELAY)
+    assert called('Tuning') - called('TuningOK') == meaning(Meaning.TUNING)
+    assert called('TuningOK', 'RsMeasOK', 'ParClcOK') == meaning(Meaning.TUNED)
+    assert called('TunFail') == meaning(Meaning.TUNING_FAILED)
+    assert called('Sio Fail') == meaning(Meaning.SERIAL_FAILURE)
+    assert called('Bus Fail') == meaning(Meaning.FIELDBUS_FAILURE)
 
 
 def test_codes_of_mode() -> None:

@@ -24,19 +24,18 @@ from support.parameter_ends import Ends
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 SETTINGS = pytest.mark.parametrize('ends', ENDS, ids=[ends.name for ends in ENDS])
 
 
-def parameter(ends: Ends) -> tuple[Parameter, Protocol]:
+def parameter(ends: Ends) -> tuple[Parameter, str]:
     """Return the catalog's row, and Modbus, or Classic for what Modbus lacks."""
-    return G2[ends.name], Protocol.CLASSIC if ends.register is None else Protocol.MODBUS
+    return G2[ends.name], 'classic' if ends.register is None else 'modbus'
 
 
-def refusal(ends: Ends, value: float | int | str | bool, protocol: Protocol) -> str:
+def refusal(ends: Ends, value: float | int | str | bool, protocol: str) -> str:
     """Return what the catalog says against a value."""
     with pytest.raises(ValueError) as refused:
         G2[ends.name].encode(value, protocol)
@@ -54,11 +53,11 @@ def test_the_same_settings_and_no_others() -> None:
 def test_where_it_stands(ends: Ends) -> None:
     row, protocol = parameter(ends)
     if ends.register is None:
-        assert Protocol.MODBUS not in row.places
+        assert 'modbus' not in row.addresses
     else:
-        assert row.place(Protocol.MODBUS).address == ends.register
-    assert row.place(protocol).words == ends.words
-    assert tuple(f'E{id_:04X}' for id_ in row.place(Protocol.CLASSIC).addresses) == ends.classic
+        assert row.at('modbus').index == ends.register
+    assert row.at(protocol).words == ends.words
+    assert tuple(f'E{id_:04X}' for id_ in row.at('classic').numbers) == ends.classic
 
 
 @SETTINGS
@@ -89,7 +88,7 @@ def test_one_step_beyond_each_end(ends: Ends) -> None:
         if value is not None:
             assert refusal(ends, value, protocol)
             # the ranges of M2 are those of Classic in the first place
-            assert 'M2' not in ends.note or refusal(ends, value, Protocol.CLASSIC)
+            assert 'M2' not in ends.note or refusal(ends, value, 'classic')
 
 
 @pytest.mark.parametrize('ends', [pytest.param(e, id=e.name) for e in ENDS if e.neighbours])

@@ -25,15 +25,14 @@ import re
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog.words_optimal import Control
-from nfo_sinus_driver.catalog.words_optimal import Mode
-from nfo_sinus_driver.catalog.words_optimal import Smode
-from nfo_sinus_driver.catalog.words_optimal import Status
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import Mode
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
+from nfo_sinus_driver.families.sinus_optimal.words import Status
 
 MANUALS = Path(__file__).resolve().parents[4] / 'shared' / 'manuals'
-OPTIMAL = load_model('sinus_optimal')
+OPTIMAL = load_family('sinus_optimal')
 #: What the scaling column says, as unit and factor.
 SCALES = {
     'mA (A x 10^3)': ('A', '0.001'),
@@ -78,11 +77,11 @@ def test_registers(lines: list[str]) -> None:
     ):
         assert row.name == name.split(' (')[0]
         numbers = [int(number, 16) for number in re.findall(r'([0-9A-F]{4})h', addresses)]
-        place = row.place(Protocol.MODBUS)
-        assert [place.occupied[0], place.occupied[-1]] == [numbers[0], numbers[-1]], name
+        place = row.at('modbus')
+        assert [*place.occupied[0], *place.occupied[-1]] == [numbers[0], numbers[-1]], name
         assert (numbers[0] - 0x210) // 4 + 1 == int(adi), name
         assert row.source.split('; ')[0] == f'M1 ADI {adi}', name
-        assert place.type.name == type_, name
+        assert place.codec.name.startswith(type_.lower()), name
         assert (remark == 'Read only') == (row.access in (Access.READ, Access.ACKNOWLEDGE)), name
         scaling = re.sub(r'\$|\\mathrm|[{}]', '', coding)
         scaling = re.sub(r'\\times|\u00d7', 'x', scaling)
@@ -115,7 +114,7 @@ def status_codes(lines: list[str]) -> Iterator[tuple[int, str, str]]:
 def test_inverter_status(lines: list[str]) -> None:
     seen = []
     for code, text, description in status_codes(lines):
-        entry = OPTIMAL.inv_st(code)
+        entry = OPTIMAL.status_code(code)
         assert (entry.text, entry.description) == (text, description), code
         seen.append(code)
     assert sorted(seen) == list(range(64))

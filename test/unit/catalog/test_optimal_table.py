@@ -18,7 +18,6 @@
 from __future__ import annotations
 
 from collections import Counter
-import csv
 from pathlib import Path
 
 from hypothesis import example
@@ -26,15 +25,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog import model
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import family
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.settings import DriveSettings
 
-G2 = load_model('sinus_g2')
-OPTIMAL = load_model('sinus_optimal')
+G2 = load_family('sinus_g2')
+OPTIMAL = load_family('sinus_optimal')
 #: All registers that [M1] prints: key, ADI, first and last register, type, access, a value in its
 #: unit and the words that mean it.
 ROWS = [
@@ -80,12 +79,12 @@ def test_register(
     words: tuple[int, ...],
 ) -> None:
     row = OPTIMAL[key]
-    place = row.place(Protocol.MODBUS)
-    assert list(place.occupied) == list(range(first, last + 1))
+    place = row.at('modbus')
+    assert place.occupied == [(number,) for number in range(first, last + 1)]
     # the status without acknowledging is the second register of its ADI
-    assert place.address == 0x210 + 4 * (adi - 1) + (key == 'fieldbus.inv_st')
+    assert place.index == 0x210 + 4 * (adi - 1) + (key == 'fieldbus.inv_st')
     assert f'M1 ADI {adi}' in row.source.split('; ')
-    assert place.type.name == type_
+    assert place.codec.name == f'{type_.lower()}_{"ws" if last > first else "be"}'
     assert row.access is Access(access)
     assert row.unit == unit
     assert row.decode(words) == pytest.approx(value, abs=1e-9)
@@ -93,16 +92,15 @@ def test_register(
 
 
 def test_registers_are_used_once() -> None:
-    used = [number for row in OPTIMAL.values() for number in row.place(Protocol.MODBUS).occupied]
+    used = [number for row in OPTIMAL.values() for number in row.at('modbus').occupied]
     assert max(Counter(used).values()) == 1
     assert len(used) == 21
 
 
 def test_nothing_that_is_not_printed() -> None:
     for row in OPTIMAL.values():
-        assert set(row.places) == {Protocol.MODBUS}, row.key  # of Classic [M1] says nothing
+        assert set(row.addresses) == {'modbus'}, row.key  # of Classic [M1] says nothing
         assert (row.minimum, row.maximum, row.since) == (None, None, None), row.key
-        assert (row.pnu, row.canopen) == (None, None), row.key
         assert row.scale == '', row.key  # nor of FrqScl and its like
         assert not row.stopped, row.key
         assert not row.labels, row.key
@@ -111,8 +109,8 @@ def test_nothing_that_is_not_printed() -> None:
 
 def test_the_same_thing_has_the_same_key() -> None:
     # the same register and the same key on both, but for what only looks alike [C52] [C53]
-    modbus = [row for row in G2.values() if Protocol.MODBUS in row.places]
-    g2 = {row.place(Protocol.MODBUS).address: row.key for row in modbus}
+    modbus = [row for row in G2.values() if 'modbus' in row.addresses]
+    g2 = {row.at('modbus').index: row.key for row in modbus}
     other = {
         0x518: ('status.control_freq', None),
         0x260: ('status.control_speed', None),
@@ -121,7 +119,7 @@ def test_the_same_thing_has_the_same_key() -> None:
         0x25C: ('fieldbus.input_speed_setpoint', 'status.spd_set'),
     }
     for row in OPTIMAL.values():
-        address = row.place(Protocol.MODBUS).address
+        address = row.at('modbus').index
         mine, theirs = other.get(address, (row.key, row.key))
         assert (row.key, g2.get(address)) == (mine, theirs)
         assert theirs is None or row.unit == G2[theirs].unit
@@ -144,27 +142,27 @@ def test_counters_are_not_those_of_the_g2() -> None:
 @example(0xFFFF, 0x7FFF)
 def test_every_register_there_and_back(low: int, high: int) -> None:
     for row in OPTIMAL.values():
-        place = row.place(Protocol.MODBUS)
+        place = row.at('modbus')
         words = (low, high)[: place.words]
         value = row.decode(words)
         assert type(value) is row.kind
         assert isinstance(value, (int, float))
-        assert value == float(place.type.to_raw(words) * row.factor(Protocol.MODBUS))
+        assert value == float(place.number.decode(to_bytes(words)) * row.factor('modbus'))
         assert row.encode(value) == words
         assert row.quantise(value) == words
 
 
 def test_it_is_one_of_the_models() -> None:
     assert OPTIMAL.name == 'sinus_optimal'
-    assert OPTIMAL.name in MODELS
+    assert OPTIMAL.name in families()
     assert DriveSettings(model='sinus_optimal').model == OPTIMAL.name
 
 
 def test_the_tables_have_the_columns_of_the_others() -> None:
-    folder = Path(model.__file__).parent
-    for name in ('{}.csv', 'inv_st_{}.csv'):
-        headers = []
-        for drive in MODELS:
-            with (folder / name.format(drive)).open(encoding='utf-8', newline='') as stream:
-                headers.append(next(csv.reader(stream)))
-        assert headers[0] == headers[1]
+    folder = Path(family.__file__).parents[1] / 'families'
+    for name in ('parameters', 'addresses', 'status_codes', 'roles'):
+        headers = set()
+        for drive in families():
+            with (folder / drive / f'{name}.csv').open(encoding='utf-8', newline='') as stream:
+                headers.add(stream.readline())
+        assert len(headers) == 1, name

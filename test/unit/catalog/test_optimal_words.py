@@ -24,20 +24,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import MODELS
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog import words
-from nfo_sinus_driver.catalog.words_optimal import Control
-from nfo_sinus_driver.catalog.words_optimal import Mode
-from nfo_sinus_driver.catalog.words_optimal import Smode
-from nfo_sinus_driver.catalog.words_optimal import Status
-from nfo_sinus_driver.catalog.words_optimal import state_of
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families.sinus_g2 import words
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import Mode
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
+from nfo_sinus_driver.families.sinus_optimal.words import Status
+from nfo_sinus_driver.families.sinus_optimal.words import state_of
 
-G2 = load_model('sinus_g2')
-OPTIMAL = load_model('sinus_optimal')
+G2 = load_family('sinus_g2')
+OPTIMAL = load_family('sinus_optimal')
 DRIVE_STATUS = Path(__file__).resolve().parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
 WORD = st.integers(0, 0xFFFF)
 KIND = st.sampled_from(Kind)
@@ -139,7 +140,7 @@ STATES = [
 
 @pytest.mark.parametrize('code', range(64))
 def test_inverter_status(code: int) -> None:
-    entry = OPTIMAL.inv_st(code)
+    entry = OPTIMAL.status_code(code)
     assert (entry.code, entry.text) == (code, TEXTS[code][2:])
     assert entry.old_text == entry.text
     assert entry.kind is KINDS[TEXTS[code][0]]
@@ -151,53 +152,47 @@ def test_inverter_status(code: int) -> None:
 
 def test_there_are_64_codes() -> None:
     assert len(TEXTS) == 64
-    assert OPTIMAL.inv_st(64).text == 'Code 64'
+    assert OPTIMAL.status_code(64).text == 'Code 64'
 
 
 def test_remedies_name_no_parameter_of_the_g2() -> None:
     # the Optimal's list of parameters is not available [C58]
     for code in range(64):
-        assert not set(re.findall(r'\w+\.\w+', OPTIMAL.inv_st(code).remedy)), code
+        assert not set(re.findall(r'\w+\.\w+', OPTIMAL.status_code(code).remedy)), code
 
 
 def test_codes_that_mean_something_else_than_on_the_g2() -> None:
     # [C49]
     for code in (1, 9, *range(18, 24), 29, 31, 32, *range(41, 45)):
-        assert OPTIMAL.inv_st(code).text != G2.inv_st(code).text, code
+        assert OPTIMAL.status_code(code).text != G2.status_code(code).text, code
 
 
-def test_groups_of_status_codes() -> None:
+def meaning(*meanings: Meaning) -> set[int]:
+    """The codes that mean one of these."""
+    return {code.code for one in meanings for code in OPTIMAL.codes(one)}
+
+
+def test_meanings_of_status_codes() -> None:
     def called(*starts: str) -> set[int]:
         return {code for code in range(64) if TEXTS[code][2:].startswith(starts)}
 
-    codes = OPTIMAL.dialect.codes
-    assert codes.bus_standby == called('Bus Stby')
-    assert codes.bus_running == called('Bus ') - called('Bus Stby', 'Bus Fail')
-    assert codes.terminals == called('Ext ')
-    assert codes.keypad == called('Final Freq', 'Accel', 'Decel')
-    assert codes.local_running == codes.terminals - called('Ext Stby')
+    assert meaning(Meaning.BUS_STANDBY) == called('Bus Stby')
+    assert meaning(Meaning.BUS_RUNNING) == called('Bus ') - called('Bus Stby', 'Bus Fail')
+    assert meaning(Meaning.TERMINALS) == called('Ext ')
+    # of Final Freq, Accel and Decel [M1] does not say who controls: nobody else is left
+    assert meaning(Meaning.KEYPAD) == called('Final Freq', 'Accel', 'Decel')
+    assert meaning(Meaning.LOCAL_RUNNING) == called('Ext ') - called('Ext Stby')
     unknown = called('Brake Ch', 'Cur Limit', 'Final Freq', 'Accel', 'Decel')
-    assert codes.running == unknown
-    assert codes.anonymous == unknown | called('Stop', 'Wait', 'Delay ')
-    assert {codes.current_limit} == called('Cur Limit')
-    assert {codes.start_delay} == called('Delay Run')
-    assert {codes.tuning} == called('Tuning')
-    assert codes.tuned == called('BasicTun', 'Full Tun', 'RsMeas Ok', 'ParCalc')
-    assert codes.tuning_failed == called('Tun Fail', 'RsMeasFail', 'TuneCnvFail')
-    assert {codes.sio_fail} == called('Sio Fail')
-    assert {codes.bus_fail} == called('Bus Fail')
-
-
-def test_groups_of_status_codes_of_the_g2() -> None:
-    codes = G2.dialect.codes
-    assert (codes.bus_standby, codes.bus_running) == ({37, 41}, {38, 39, 40, 42, 43, 44})
-    assert (codes.keypad, codes.terminals) == (set(range(29, 33)), set(range(33, 37)))
-    assert codes.local_running == {29, 30, 31, 32, 34, 35, 36}
-    assert (codes.running, codes.anonymous) == ({26, 27}, {25, 26, 27})
-    assert codes.current_limit == 27
-    assert (codes.start_delay, codes.tuning, codes.sio_fail, codes.bus_fail) == (25, 28, 14, 15)
-    assert {G2.inv_st(code).text for code in codes.tuned} == {'TuningOK', 'RsMeasOK', 'ParClcOK'}
-    assert {G2.inv_st(code).text for code in codes.tuning_failed} == {'TunFailP', 'TunFailM'}
+    assert meaning(Meaning.RUNNING) == unknown
+    assert meaning(Meaning.ANONYMOUS) == unknown | called('Stop', 'Wait', 'Delay ')
+    assert meaning(Meaning.SLOWING) == called('Brake Ch', 'Decel', 'Bus Ret')
+    assert meaning(Meaning.CURRENT_LIMIT) == called('Cur Limit')
+    assert meaning(Meaning.START_DELAY) == called('Delay Run')
+    assert meaning(Meaning.TUNING) == called('Tuning')
+    assert meaning(Meaning.TUNED) == called('BasicTun', 'Full Tun', 'RsMeas Ok', 'ParCalc')
+    assert meaning(Meaning.TUNING_FAILED) == called('Tun Fail', 'RsMeasFail', 'TuneCnvFail')
+    assert meaning(Meaning.SERIAL_FAILURE) == called('Sio Fail')
+    assert meaning(Meaning.FIELDBUS_FAILURE) == called('Bus Fail')
 
 
 def test_codes_of_mode_and_smode() -> None:
@@ -287,7 +282,7 @@ def test_facts_are_those_of_the_message() -> None:
 )
 def test_fact_of_a_bit(bit: int, facts: Fact) -> None:
     for listed in Kind:
-        assert OPTIMAL.dialect.facts(1 << bit, listed) == facts
+        assert OPTIMAL.status_word.facts(1 << bit, listed) == facts
 
 
 @pytest.mark.parametrize(
@@ -312,23 +307,23 @@ def test_fact_of_a_bit(bit: int, facts: Fact) -> None:
     ],
 )
 def test_fact_of_a_bit_of_the_g2(bit: int, facts: Fact) -> None:
-    assert G2.dialect.facts(1 << bit, Kind.STATUS) == facts
+    assert G2.status_word.facts(1 << bit, Kind.STATUS) == facts
 
 
 @pytest.mark.parametrize(
     ('word', 'quick'), [(0x8007, True), (0xC003, True), (0x8027, False), (0x0000, False)]
 )
 def test_quick_stop_of_the_g2_is_told_by_the_state(word: int, quick: bool) -> None:
-    assert (Fact.QUICK_STOP_ACTIVE in G2.dialect.facts(word, Kind.STATUS)) == quick
+    assert (Fact.QUICK_STOP_ACTIVE in G2.status_word.facts(word, Kind.STATUS)) == quick
 
 
 def test_facts_that_a_model_does_not_tell() -> None:
     everything = Fact(0x1FFFF)
-    assert everything & ~G2.dialect.valid == (
+    assert everything & ~G2.status_word.valid == (
         Fact.SLEEPING | Fact.STOP_MODE_BRAKE | Fact.RUN_INPUT_MISSING
     )
     # C55: bits 4 and 5 are echoes, 6 is the RUN input, 8 is not used
-    assert everything & ~OPTIMAL.dialect.valid == (
+    assert everything & ~OPTIMAL.status_word.valid == (
         Fact.VOLTAGE_ENABLED
         | Fact.QUICK_STOP_ACTIVE
         | Fact.SWITCH_ON_DISABLED
@@ -336,14 +331,14 @@ def test_facts_that_a_model_does_not_tell() -> None:
     )
 
 
-@pytest.mark.parametrize('name', MODELS)
+@pytest.mark.parametrize('name', families())
 @given(word=WORD, listed=KIND)
 def test_nothing_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -> None:
-    dialect = load_model(name).dialect
-    facts = dialect.facts(word, listed)
-    assert not facts & ~dialect.valid
+    tells = load_family(name).status_word
+    facts = tells.facts(word, listed)
+    assert not facts & ~tells.valid
     # the bits and the kind never contradict each other
-    kind = dialect.kind(word, listed)
+    kind = tells.kind(word, listed)
     assert (kind is Kind.FAULT) == (Fact.FAULT in facts)
     assert kind is not Kind.ALARM or Fact.ALARM in facts
 
@@ -363,25 +358,12 @@ def test_nothing_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -
 )
 def test_the_bits_have_the_last_word(word: int, listed: Kind, g2: Kind, optimal: Kind) -> None:
     # [C50], [C95]
-    assert G2.dialect.kind(word, listed) is g2
-    assert OPTIMAL.dialect.kind(word, listed) is optimal
+    assert G2.status_word.kind(word, listed) is g2
+    assert OPTIMAL.status_word.kind(word, listed) is optimal
 
 
-def test_each_model_has_its_own_words() -> None:
-    g2, optimal = G2.dialect, OPTIMAL.dialect
-    assert (g2.control, g2.status, g2.mode, g2.command) == (
-        words.Control,
-        words.Status,
-        words.Mode,
-        words.Scmd,
-    )
-    assert (optimal.control, optimal.status, optimal.mode, optimal.command) == (
-        Control,
-        Status,
-        Mode,
-        Smode,
-    )
-    assert g2.state is words.state_of
-    assert optimal.state is state_of
+def test_each_family_has_its_own_words() -> None:
+    assert (G2.modes, OPTIMAL.modes) == (set(words.Mode), set(Mode))
     # an Optimal that is enabled and waits looks to the G2's eyes like no state at all
-    assert (g2.state(0x0205), optimal.state(0x0205)) == (State.UNKNOWN, State.SWITCHED_ON)
+    assert G2.status_word.state(0x0205) is State.UNKNOWN
+    assert OPTIMAL.status_word.state(0x0205) is State.SWITCHED_ON

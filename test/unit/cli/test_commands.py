@@ -32,9 +32,9 @@ from cli_bench import MakeBench
 from cli_bench import wait_until
 import pytest
 
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import words_optimal
 from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.simulator.refusal import Reason
 
 Nfo = Callable[..., Done]

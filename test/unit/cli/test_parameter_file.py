@@ -23,26 +23,26 @@ import pytest
 import yaml
 
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.cli.parameter_file import HEADER
 from nfo_sinus_driver.cli.parameter_file import format_file
 from nfo_sinus_driver.cli.parameter_file import parse_file
 from nfo_sinus_driver.cli.trouble import Trouble
 
-G2 = load_model('sinus_g2')
+G2 = load_family('sinus_g2')
 
 
 def values_of(parameter: Parameter) -> st.SearchStrategy[Value]:
     """Whatever a drive may have for a parameter, sensible or not."""
-    protocol = Protocol.MODBUS if Protocol.MODBUS in parameter.places else Protocol.CLASSIC
-    type_ = parameter.place(protocol).type
+    protocol = 'modbus' if 'modbus' in parameter.addresses else 'classic'
+    codec = parameter.at(protocol).number
     if parameter.labels and parameter.kind is not str:
         raws = st.sampled_from(sorted(parameter.labels))
     else:
-        raws = st.integers(type_.minimum, type_.maximum)
-    return raws.map(lambda raw: parameter.decode(type_.to_words(raw), protocol))
+        raws = st.integers(codec.minimum, codec.maximum)
+    return raws.map(lambda raw: parameter.decode(to_words(codec.encode(raw)), protocol))
 
 
 EVERYTHING = st.fixed_dictionaries(

@@ -30,14 +30,14 @@ from cli_bench import Done
 from cli_bench import wait_until
 import pytest
 
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import loading
 from nfo_sinus_driver.cli.parameter_file import parse_file
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
 Nfo = Callable[..., Done]
-REACHED = [p for p in load_model('sinus_g2').settings if len(p.places) == 2]
+REACHED = [p for p in load_family('sinus_g2').settings if {*p.addresses} >= {'modbus', 'classic'}]
 
 #: Other than the factory's, of every group.
 OTHERS = {
@@ -228,7 +228,7 @@ def test_from_g2_to_optimal(nfo: Nfo, bench: Bench, tmp_path: Path) -> None:
     assert nfo('dump', path).status == 0
     done = nfo('load', path, '--model', 'sinus_optimal', '--port', '/dev/no-such-port')
     assert done.status == 1 and done.out == ''
-    missing = {p.key for p in REACHED} - {p.key for p in load_model('sinus_optimal').settings}
+    missing = {p.key for p in REACHED} - {p.key for p in load_family('sinus_optimal').settings}
     assert missing
     assert {line.split()[0] for line in done.err.splitlines()[1:]} == missing
     assert 'nothing was written' in done.err

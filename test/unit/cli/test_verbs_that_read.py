@@ -28,13 +28,13 @@ from cli_bench import Done
 import pytest
 import yaml
 
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
 from nfo_sinus_driver.cli.trouble import Trouble
 
 Nfo = Callable[..., Done]
-G2 = load_model('sinus_g2')
-REACHED = [parameter for parameter in G2.settings if len(parameter.places) == 2]
+G2 = load_family('sinus_g2')
+REACHED = [p for p in G2.settings if {*p.addresses} >= {'modbus', 'classic'}]
 
 
 def test_info(nfo: Nfo, bench: Bench) -> None:

@@ -30,8 +30,8 @@ from test_any_order import G2ModeScmd
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Words
 

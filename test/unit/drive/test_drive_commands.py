@@ -31,10 +31,11 @@ import pytest
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Mode
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -131,9 +132,9 @@ def test_telemetry(rig: Rig) -> None:
     rig.connect()
     wait_until(lambda: rig.notes.telemetry)
     values = rig.notes.telemetry[0].values
-    assert values['status.dc_link'] == pytest.approx(565, abs=5)
-    assert values['status.op_time'] == pytest.approx(1234.5, abs=0.1)
-    assert values['status.e_out'] == pytest.approx(1.234)
+    assert values[Role.DC_LINK_VOLTAGE] == pytest.approx(565, abs=5)
+    assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.1)
+    assert values[Role.ENERGY] == pytest.approx(1.234)
     assert not any(math.isnan(value) for value in values.values())
 
 
@@ -143,9 +144,9 @@ def test_telemetry_of_older_firmware(make_rig: MakeRig) -> None:
     rig.connect()
     wait_until(lambda: rig.notes.telemetry)
     values = rig.notes.telemetry[0].values
-    assert {key for key, value in values.items() if math.isnan(value)} == {
-        'status.e_out',
-        'status.sigma_e_out',
+    assert {role for role, value in values.items() if math.isnan(value)} == {
+        Role.ENERGY,
+        Role.TOTAL_ENERGY,
     }
     asked = {bytes.fromhex(frame['hex'])[2:4].hex() for frame in rig.trace() if is_request(frame)}
     assert '02a8' in asked

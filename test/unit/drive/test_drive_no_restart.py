@@ -30,12 +30,12 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import watch as watch_module
 from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused

@@ -27,13 +27,13 @@ from ros.ways import WAYS
 from ros.ways import Way
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog import Control
-from nfo_sinus_driver.catalog import Mode
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.faults import LogEntry
@@ -298,7 +298,7 @@ def test_tuning(rig: Rig, procedure: Procedure) -> None:
     codes = [snapshot.status.code for snapshot, _ in told]
     assert list(dict.fromkeys(codes))[-1] == _DONE[procedure]
     assert _TUNING in codes or procedure is Procedure.CALCULATE
-    assert told[-1][0].text == rig.far.model.inv_st_text(_DONE[procedure], rig.far.version)
+    assert told[-1][0].text == rig.far.model.status_code(_DONE[procedure]).shown(rig.far.version)
     times = [elapsed for _, elapsed in told]
     assert times == sorted(times)
     assert not rig.far.faults

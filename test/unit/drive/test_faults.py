@@ -24,15 +24,15 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Model
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import load_model
-from nfo_sinus_driver.catalog.inv_st import SIO_FAIL
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.self_restart import TRIES
 
-OVERLOAD, OVERHEATED = 5, 3
+OVERLOAD, OVERHEATED, SIO_FAIL = 5, 3, 14
 MODE, CONTROL, MASK = 0x294, 0x254, 0x250
 WITH_ACK = 0x2A4
 
@@ -47,8 +47,8 @@ every_way = pytest.mark.parametrize(('model', 'method', 'reference'), WAYS, ids=
 pytestmark = pytest.mark.usefixtures('hasty')
 
 
-def codes(model: Model, kind: Kind) -> list[int]:
-    return [code for code in range(64) if model.inv_st(code).kind is kind]
+def codes(model: Family, kind: Kind) -> list[int]:
+    return [code for code in range(64) if model.status_code(code).kind is kind]
 
 
 def show(rig: Rig, code: int) -> None:
@@ -63,10 +63,10 @@ def test_every_fault(make_rig: MakeRig, model: str, method: str, reference: str)
     rig.connect()
     rig.enable()
     rig.drive.stop().result(PATIENCE)
-    known = load_model(model)
+    known = load_family(model)
     rig.next_snapshots(2)
     for code in codes(known, Kind.FAULT):
-        listed = known.inv_st(code)
+        listed = known.status_code(code)
         rig.notes.events.clear()
         rig.simulator.inject('fault', code)
         show(rig, code)
@@ -107,12 +107,12 @@ def test_every_alarm_of_the_optimal(make_rig: MakeRig, method: str) -> None:
     rig.connect()
     rig.enable()
     rig.wait_for_frequency(25.0)
-    known = load_model('sinus_optimal')
-    limit = known.dialect.codes.current_limit
+    known = load_family('sinus_optimal')
+    (limit,) = known.codes(Meaning.CURRENT_LIMIT)
     for code in codes(known, Kind.ALARM):
-        if code == limit:
+        if code == limit.code:
             continue
-        listed = known.inv_st(code)
+        listed = known.status_code(code)
         rig.notes.events.clear()
         rig.simulator.inject('fault', code)
         show(rig, code)

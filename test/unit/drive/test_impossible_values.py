@@ -23,6 +23,7 @@ import pytest
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -150,8 +151,8 @@ def test_a_value_that_was_busy_is_measured_again(make_virtual: MakeVirtual) -> N
     told = measured(rig)
     rig.be_busy(rig.register('status.dc_link'), 11)
     rig.pass_time(2.0)
-    assert any(math.isnan(one.values['status.dc_link']) for one in told)
-    assert told[-1].values['status.dc_link'] > 100
+    assert any(math.isnan(one.values[Role.DC_LINK_VOLTAGE]) for one in told)
+    assert told[-1].values[Role.DC_LINK_VOLTAGE] > 100
 
 
 @pytest.mark.parametrize('code', [Refused.DEVICE_FAILURE, Refused.ILLEGAL_ADDRESS])
@@ -170,8 +171,8 @@ def test_a_value_that_was_refused_once_is_measured_again(
 
     rig.before = refuse
     rig.pass_time(2.0)
-    assert math.isnan(told[0].values['status.dc_link'])
-    assert told[-1].values['status.dc_link'] > 100
+    assert math.isnan(told[0].values[Role.DC_LINK_VOLTAGE])
+    assert told[-1].values[Role.DC_LINK_VOLTAGE] > 100
 
 
 def test_a_value_that_the_drive_does_not_have_is_not_asked_for_ever(

@@ -27,8 +27,8 @@ import pytest
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.variant import ALL
 from nfo_sinus_driver.simulator.variant import DROPS

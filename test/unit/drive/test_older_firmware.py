@@ -26,6 +26,7 @@ import pytest
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
@@ -199,9 +200,9 @@ def test_counters_have_24_bits_over_classic(
     before = len(notes.telemetry)
     wait_until(lambda: len(notes.telemetry) > before + 8)
     values = notes.telemetry[-1].values
-    assert values['status.op_time'] == pytest.approx(1234.5, abs=0.2)
-    assert 0 <= values['status.rn_time'] < 1e5
-    assert 0 <= values['status.br_time'] < 1e5
+    assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.2)
+    assert 0 <= values[Role.RUNNING_TIME] < 1e5
+    assert 0 <= values[Role.BRAKE_TIME] < 1e5
 
 
 def test_current_limit_is_no_stop() -> None:

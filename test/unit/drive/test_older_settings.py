@@ -31,12 +31,12 @@ from drive_rig import wait_until
 import pytest
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive.tuning import Procedure
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive

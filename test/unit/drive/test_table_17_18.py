@@ -29,13 +29,13 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog.words_optimal import Smode
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
 
 pytestmark = pytest.mark.usefixtures('hasty')
 

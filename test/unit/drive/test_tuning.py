@@ -27,11 +27,11 @@ from drive_rig import wait_until
 import pytest
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog import Scmd
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.faults import LogEntry

@@ -24,8 +24,7 @@ from hypothesis import strategies as st
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import classic_link
 from nfo_sinus_driver.link import doubts
@@ -119,13 +118,13 @@ def test_a_question_is_certain_when_each_of_its_answers_is() -> None:
 
 
 def test_what_is_asked_over_classic_is_in_the_table_of_every_firmware_and_does_nothing() -> None:
-    model = load_model('sinus_g2')
+    model = load_family('sinus_g2')
     for number in classic_link._EVERYWHERE:
         (parameter,) = (
             parameter
             for parameter in model.values()
-            if Protocol.CLASSIC in parameter.places
-            and parameter.place(Protocol.CLASSIC).addresses == (number,)
+            if 'classic' in parameter.addresses
+            and parameter.at('classic').numbers == (number,)
         )
         assert parameter.since is None
         assert parameter.access in (Access.READ, Access.READ_WRITE)

@@ -23,7 +23,6 @@ import tty
 
 import pytest
 
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -38,12 +37,12 @@ class Bench:
     def write(self, key, value):
         parameter = self.drive.model[key]
         words = parameter.encode(value)
-        self.drive.write(parameter.place(Protocol.MODBUS).address, words)
+        self.drive.write(parameter.at('modbus').index, words)
 
     def read(self, key):
         parameter = self.drive.model[key]
-        place = parameter.place(Protocol.MODBUS)
-        return parameter.decode(self.drive.read(place.address, place.words))
+        place = parameter.at('modbus')
+        return parameter.decode(self.drive.read(place.index, place.words))
 
     def mode(self, code):
         self.write('fieldbus.mode', code)

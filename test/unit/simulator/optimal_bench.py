@@ -87,7 +87,7 @@ class OptimalBench:
 
     @property
     def text(self):
-        return self.drive.model.inv_st_text(self.code)
+        return self.drive.model.status_code(self.code).text
 
     @property
     def running(self):

@@ -25,7 +25,6 @@ from classic_bench import reply
 from classic_bench import select
 import pytest
 
-from nfo_sinus_driver.catalog import Protocol
 from nfo_sinus_driver.simulator.variant import Variant
 
 BLOCKED, CHECK_SUM, STRUCTURE, TIMEOUT, PREFIX = 0x1, 0x4, 0x8, 0x10, 0x20
@@ -119,18 +118,18 @@ def test_a_finer_value_is_rounded(fine, coarse):
 def test_every_parameter_agrees_with_the_catalog():
     bench = ClassicBench()
     for key, parameter in bench.drive.model.items():
-        if Protocol.CLASSIC not in parameter.places or parameter.access.value not in ('r', 'rw'):
+        if 'classic' not in parameter.addresses or parameter.access.value not in ('r', 'rw'):
             continue
-        place = parameter.place(Protocol.CLASSIC)
-        words = [bench.read(f'E{id_:04X}') for id_ in place.addresses]
+        place = parameter.at('classic')
+        words = [bench.read(f'E{id_:04X}') for id_ in place.numbers]
         value = bench.drive.peek(key)
         if isinstance(value, float):
-            step = float(parameter.factor(Protocol.CLASSIC)) + 1e-9
-            if Protocol.MODBUS in parameter.places:
-                step = max(step, float(parameter.factor(Protocol.MODBUS)))
-            assert parameter.decode(words, Protocol.CLASSIC) == pytest.approx(value, abs=step), key
+            step = float(parameter.factor('classic')) + 1e-9
+            if 'modbus' in parameter.addresses:
+                step = max(step, float(parameter.factor('modbus')))
+            assert parameter.decode(words, 'classic') == pytest.approx(value, abs=step), key
         else:
-            assert parameter.decode(words, Protocol.CLASSIC) == value, key
+            assert parameter.decode(words, 'classic') == value, key
 
 
 def test_what_is_measured_is_as_fine_as_classic_is():

@@ -21,9 +21,9 @@ from optimal_bench import STATOR_FREQUENCY
 from optimal_bench import OptimalBench
 import pytest
 
-from nfo_sinus_driver.catalog import Mode
-from nfo_sinus_driver.catalog import Scmd
-from nfo_sinus_driver.catalog import words_optimal
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.simulator.refusal import Reason
 
 

@@ -16,7 +16,7 @@
 
 import pytest
 
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
 from nfo_sinus_driver.simulator.refusal import Reason
 

@@ -17,14 +17,13 @@
 import pytest
 
 from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Protocol
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.report import describe
 
-MODEL = load_model('sinus_g2')
-ON_MODBUS = [p for p in MODEL.values() if Protocol.MODBUS in p.places]
+MODEL = load_family('sinus_g2')
+ON_MODBUS = [p for p in MODEL.values() if 'modbus' in p.addresses]
 
 
 # ---- factory settings ----
@@ -57,28 +56,28 @@ def test_it_comes_as_from_the_factory(bench):
 
 @pytest.mark.parametrize('parameter', ON_MODBUS, ids=lambda p: p.key)
 def test_every_register_of_the_catalog_answers_as_its_access_says(bench, parameter):
-    place = parameter.place(Protocol.MODBUS)
+    place = parameter.at('modbus')
     if parameter.access is Access.WRITE:
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.read(place.address, place.words)
+            bench.drive.read(place.index, place.words)
         return
-    words = bench.drive.read(place.address, place.words)
+    words = bench.drive.read(place.index, place.words)
     assert len(words) == place.words
     if parameter.access is not Access.READ_WRITE:
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.write(place.address, words)
+            bench.drive.write(place.index, words)
     elif not parameter.key.startswith('fieldbus.'):
-        bench.drive.write(place.address, words)
-        assert bench.drive.read(place.address, place.words) == words
+        bench.drive.write(place.index, words)
+        assert bench.drive.read(place.index, place.words) == words
 
 
 @pytest.mark.parametrize('parameter', ON_MODBUS, ids=lambda p: p.key)
 def test_a_parameter_is_read_and_written_whole_or_not_at_all(bench, parameter):
-    place = parameter.place(Protocol.MODBUS)
+    place = parameter.at('modbus')
     for register, count in [
-        (place.address, place.words + 1),
-        (place.address, place.words - 1),
-        (place.address + 1, place.words - 1),
+        (place.index, place.words + 1),
+        (place.index, place.words - 1),
+        (place.index + 1, place.words - 1),
     ]:
         if register == 0x2A5 and count == 1:
             continue  # the other InvSt begins here

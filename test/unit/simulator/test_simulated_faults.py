@@ -17,14 +17,14 @@
 import pytest
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import load_model
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.self_restart import TRIES
 from nfo_sinus_driver.simulator.variant import CHOICES
 from nfo_sinus_driver.simulator.variant import Variant
 
-MODEL = load_model('sinus_g2')
-FAULTS = [code for code in range(48) if MODEL.inv_st(code).kind is Kind.FAULT]
+MODEL = load_family('sinus_g2')
+FAULTS = [code for code in range(48) if MODEL.status_code(code).kind is Kind.FAULT]
 SERIAL = {14, 15}
 KEEPS = Variant(run_command_in_fault='keeps')
 

@@ -17,7 +17,7 @@
 
 import pytest
 
-from nfo_sinus_driver.catalog import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.tuning import PROCEDURES
 from nfo_sinus_driver.simulator.variant import Variant

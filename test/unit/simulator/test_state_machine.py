@@ -18,10 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Control
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import Status
-from nfo_sinus_driver.catalog import state_of
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.families.sinus_g2.words import state_of
 from nfo_sinus_driver.simulator.state_machine import Conditions
 from nfo_sinus_driver.simulator.state_machine import Phase
 from nfo_sinus_driver.simulator.state_machine import StateMachine

@@ -19,6 +19,14 @@ from __future__ import annotations
 import enum
 import functools
 
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusWord
+
+TITLE = 'NFO Sinus G2'
+#: It has Modbus function 23 ([M0 §6.2.3], [C57]).
+WRITES_AND_READS = True
+
 
 class Mode(enum.IntEnum):
     """Who controls the drive [M0 table 17]."""
@@ -98,22 +106,6 @@ class Status(enum.IntFlag):
     STOPPING = 1 << 15
 
 
-class State(enum.Enum):
-    """States of the generic state machine [M0 table 16]."""
-
-    UNKNOWN = 0
-    NOT_READY_TO_SWITCH_ON = 1
-    SWITCH_ON_DISABLED = 2
-    READY_TO_SWITCH_ON = 3
-    SWITCHED_ON = 4
-    OPERATION_ENABLED = 5
-    #: DISABLE or SHUTDOWN: the status word does not tell them apart [C37].
-    STOPPING = 6
-    QUICK_STOP = 7
-    FAULT_REACTION_ACTIVE = 8
-    FAULTED = 9
-
-
 @functools.lru_cache(maxsize=256)
 def state_of(word: int) -> State:
     """Return the state that a DriveStatus word shows; UNKNOWN for a pattern not in table 16."""
@@ -145,4 +137,24 @@ _STATES = (
     _pattern('10XX XXXX X0XX 1111', State.FAULT_REACTION_ACTIVE),
     _pattern('11XX XXXX X0XX 1011', State.FAULT_REACTION_ACTIVE),
     _pattern('00XX XXXX X0XX 1000', State.FAULTED),
+)
+
+STATUS_WORD = StatusWord(
+    state=state_of,
+    by_bit={
+        Status.READY_TO_SWITCH_ON: Fact.READY,
+        Status.SWITCHED_ON: Fact.SWITCHED_ON,
+        Status.OP_ENABLED: Fact.OPERATION_ENABLED,
+        Status.FAULTED: Fact.FAULT,
+        Status.VOLTAGE_ENABLED: Fact.VOLTAGE_ENABLED,
+        Status.SWITCH_ON_DISABLED: Fact.SWITCH_ON_DISABLED,
+        Status.REF_FROM_NET: Fact.NETWORK_REFERENCE,
+        Status.CTRL_FROM_NET: Fact.NETWORK_CONTROL,
+        Status.SETPOINT_REACHED: Fact.SETPOINT_REACHED,
+        Status.LIMIT_ACTIVE: Fact.LIMIT_ACTIVE,
+        Status.REV_OP_ENABLED: Fact.OPERATION_ENABLED | Fact.REVERSE,
+        Status.STOPPING: Fact.STOPPING,
+    },
+    # bit 5 is undefined outside the driven states [M0 table 16]
+    by_state={State.QUICK_STOP: Fact.QUICK_STOP_ACTIVE},
 )

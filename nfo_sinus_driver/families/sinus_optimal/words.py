@@ -17,7 +17,7 @@
 Control and status words of the Sinus Optimal, and the codes of its MODE and SMODE [M1].
 
 The registers are those of the G2, the meaning is not ([C51], [C52], [C54], [C55]): never mix these
-with those of ``words.py``.
+with those.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ from __future__ import annotations
 import enum
 import functools
 
-from nfo_sinus_driver.catalog.words import State
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusWord
+
+TITLE = 'NFO Sinus Optimal'
+#: It has Modbus function 23 ([M0 §6.2.3], [C57]).
+WRITES_AND_READS = False
 
 
 class Mode(enum.IntEnum):
@@ -114,4 +120,26 @@ _STATES = (
     # enabled comes before switched on here, the other way round than on the G2 [C54]
     (Status.ENABLED, State.SWITCHED_ON),
     (Status.READY, State.READY_TO_SWITCH_ON),
+)
+
+STATUS_WORD = StatusWord(
+    state=state_of,
+    by_bit={
+        Status.READY: Fact.READY,
+        Status.SWITCHED_ON: Fact.SWITCHED_ON,
+        Status.FAULT_ACTIVE: Fact.FAULT,
+        Status.DISABLED: Fact.RUN_INPUT_MISSING,
+        Status.ALARM_ACTIVE: Fact.ALARM,
+        Status.CONTROL_FROM_BUS: Fact.NETWORK_CONTROL,
+        Status.SETPOINT_REACHED: Fact.SETPOINT_REACHED,
+        Status.LIMIT_ACTIVE: Fact.LIMIT_ACTIVE,
+        Status.SLEEP_ACTIVE: Fact.SLEEPING,
+        Status.STOPMODE_BRAKE: Fact.STOP_MODE_BRAKE,
+        Status.REVERSE: Fact.REVERSE,
+        Status.STOPPING: Fact.STOPPING,
+    },
+    # its bit Enabled only says that a run command would be taken [C55]
+    by_state={State.OPERATION_ENABLED: Fact.OPERATION_ENABLED},
+    # [M1] describes bits and no states
+    stateless=True,
 )

@@ -1,0 +1,243 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A drive family: its parameters, status codes and words, read from its folder in ``families/``.
+
+Nobody imports such a folder: its name is all that is known of it, and :func:`load_family` reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+import functools
+import importlib
+from pathlib import Path
+
+from nfo_sinus_driver.catalog import table
+from nfo_sinus_driver.catalog.codec import Number
+from nfo_sinus_driver.catalog.codec import codec_of
+from nfo_sinus_driver.catalog.error_log import ErrorLogArea
+from nfo_sinus_driver.catalog.parameter import Access
+from nfo_sinus_driver.catalog.parameter import Address
+from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Kind
+from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+
+_FAMILIES = Path(__file__).parents[1] / 'families'
+
+
+@dataclass(frozen=True)
+class Family(Mapping[str, Parameter]):
+    """
+    A drive family: its parameters by key, and what it says of itself.
+
+    :ivar name: the name of its folder.
+    :ivar title: what its maker calls it.
+    :ivar parameters: its parameters, in the order of the manual.
+    :ivar roles: which of them has which role.
+    :ivar status_codes: its inverter status codes, by number.
+    :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
+    :ivar status_word: what its status word means.
+    :ivar modes: the codes of who controls it.
+    :ivar writes_and_reads: it has Modbus function 23.
+    """
+
+    name: str
+    title: str
+    parameters: Mapping[str, Parameter]
+    roles: Mapping[Role, str]
+    status_codes: Mapping[int, StatusCode]
+    error_logs: Mapping[str, ErrorLogArea]
+    status_word: StatusWord
+    modes: Collection[int]
+    writes_and_reads: bool
+
+    def __getitem__(self, key: str) -> Parameter:
+        return self.parameters[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    # one is loaded once: it is equal to none but itself
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    @property
+    def settings(self) -> tuple[Parameter, ...]:
+        """The parameters that become ROS parameters, in the order of the manual."""
+        return tuple(parameter for parameter in self.values() if parameter.is_setting)
+
+    def key(self, role: Role) -> str:
+        """Return the key of the parameter that has a role; ``''`` if this family has none."""
+        return self.roles.get(role, '')
+
+    @functools.cached_property
+    def role_of(self) -> Mapping[str, Role]:
+        """The roles of the parameters that have one, by key."""
+        return {key: role for role, key in self.roles.items()}
+
+    def status_code(self, code: int) -> StatusCode:
+        """Return what an inverter status code means; an unknown code is shown as its number."""
+        unlisted = 'Status code that the manual does not list'
+        found = self.status_codes.get(code)
+        return found or StatusCode(code, f'Code {code}', description=unlisted)
+
+    def codes(self, meaning: Meaning) -> tuple[StatusCode, ...]:
+        """Return the inverter status codes that mean something."""
+        return tuple(code for code in self.status_codes.values() if meaning in code.meanings)
+
+
+def families() -> tuple[str, ...]:
+    """Return the names of the families that there are folders of."""
+    return tuple(sorted(path.parent.name for path in _FAMILIES.glob('*/parameters.csv')))
+
+
+@functools.cache
+def load_family(name: str) -> Family:
+    """
+    Read and check the tables of one drive family.
+
+    :raises ValueError: there is no such family; the message lists those there are.
+    :raises CatalogError: a table contradicts itself, or another one.
+    """
+    if name not in families():
+        raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
+    folder = _FAMILIES / name
+    keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
+    addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
+
+    def known(row: table.Row) -> str:
+        if row['parameter'] not in addresses:
+            raise ValueError(f'no parameter is {row["parameter"]}')
+        return row['parameter']
+
+    def address(row: table.Row) -> tuple[str, Address]:
+        return known(row), _address(row)
+
+    def role(row: table.Row) -> tuple[Role, str]:
+        return Role(row['role']), known(row)
+
+    def parameter(row: table.Row) -> Parameter:
+        return _parameter(row, addresses[row['parameter']])
+
+    for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes):
+        addresses[key][found.protocol] = found
+    parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
+    roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
+    codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
+    log = folder / 'error_log.csv'
+    logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
+    words = importlib.import_module(f'nfo_sinus_driver.families.{name}.words')
+    return Family(
+        name=name,
+        title=words.TITLE,
+        parameters={row.key: row for row in parameters},
+        roles=dict(roles),
+        status_codes={row.code: row for row in codes},
+        error_logs={row.protocol: row for row in logs},
+        status_word=words.STATUS_WORD,
+        modes=frozenset(words.Mode),
+        writes_and_reads=words.WRITES_AND_READS,
+    )
+
+
+def _address(row: table.Row) -> Address:
+    return Address(
+        protocol=row['protocol'],
+        space=row['space'],
+        index=int(row['index'], 0),
+        sub_index=table.number(row['sub_index']),
+        codec=codec_of(row['codec']),
+        factor=Fraction(row['factor']),
+        source=row['source'],
+    )
+
+
+def _what_it_takes(row: tuple[str, Address]) -> Iterator[str]:
+    key, address = row
+    yield f'{key} on {address.protocol}'
+    for numbers in address.occupied:
+        shown = '.'.join(f'{number:04X}h' for number in numbers)
+        yield f'{address.protocol} {address.space} {shown}'
+
+
+def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
+    if not addresses:
+        raise ValueError('no address on any bus')
+    minimum = table.fraction(row['minimum'])
+    maximum = table.fraction(row['maximum'])
+    if minimum is not None and maximum is not None and minimum >= maximum:
+        raise ValueError('the minimum is not below the maximum')
+    pairs = [pair.split('=', 1) for pair in row['labels'].split('|') if pair]
+    labels = {int(code, 0): label for code, label in pairs}
+    if len(labels) != len(pairs) or len(set(labels.values())) != len(pairs):
+        raise ValueError('a code or a label stands twice')
+    return Parameter(
+        key=row['parameter'],
+        name=row['name'],
+        group=row['group'],
+        addresses=addresses,
+        scale=row['scale'],
+        unit=row['unit'],
+        minimum=minimum,
+        maximum=maximum,
+        decimals=int(row['decimals']),
+        labels=labels,
+        access=Access(row['access']),
+        stopped={'init': True, 'run': False, '': False}[row['when']],
+        since=table.fraction(row['since']),
+        description=row['description'],
+        source=row['source'],
+    )
+
+
+def _status_code(row: table.Row) -> StatusCode:
+    return StatusCode(
+        code=int(row['code']),
+        text=row['text'],
+        old_text=row['old_text'] or row['text'],
+        renamed=table.fraction(row['renamed']),
+        kind=Kind(row['kind']),
+        requires_ack={'yes': True, 'no': False}[row['requires_ack']],
+        meanings=frozenset(map(Meaning, row['meanings'].split())),
+        description=row['description'],
+        remedy=row['remedy'],
+    )
+
+
+def _area(row: table.Row) -> ErrorLogArea:
+    codec = codec_of(row['codec'])
+    if not isinstance(codec, Number):
+        raise ValueError(f'an entry is no {codec.name}')
+    return ErrorLogArea(
+        protocol=row['protocol'],
+        space=row['space'],
+        first=int(row['index'], 0),
+        stride=int(row['stride']),
+        entries=int(row['entries']),
+        limit=int(row['limit']),
+        codec=codec,
+    )

@@ -1,0 +1,201 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a drive says of itself, in terms that mean the same in every family.
+
+The same bit and the same code say different things ([C49] to [C55]): a family's tables and a
+:class:`StatusWord` turn them into facts, states and meanings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass
+import enum
+from fractions import Fraction
+import functools
+
+
+class Kind(enum.Enum):
+    """How grave an inverter status is; the drive's fault bit has the last word [C95]."""
+
+    STATUS = 'status'
+    ALARM = 'alarm'
+    FAULT = 'fault'
+
+
+class Meaning(enum.Enum):
+    """What an inverter status code means; one may mean several of these, or none."""
+
+    #: Motor off, waiting for a command over the bus.
+    BUS_STANDBY = 'bus_standby'
+    #: Running under bus control.
+    BUS_RUNNING = 'bus_running'
+    #: The speed may decrease under bus control, be it to a stop.
+    SLOWING = 'slowing'
+    #: Standing by or running under terminal control.
+    TERMINALS = 'terminals'
+    #: Running where neither the bus nor the terminals have control.
+    KEYPAD = 'keypad'
+    #: Of these two: the motor is driven.
+    LOCAL_RUNNING = 'local_running'
+    #: The motor is driven, whoever commands.
+    RUNNING = 'running'
+    #: It does not say who controls.
+    ANONYMOUS = 'anonymous'
+    #: The run command is there and the start is delayed.
+    START_DELAY = 'start_delay'
+    #: A tuning procedure is going on; has ended well; has not.
+    TUNING = 'tuning'
+    TUNED = 'tuned'
+    TUNING_FAILED = 'tuning_failed'
+    #: The current limit holds the motor back.
+    CURRENT_LIMIT = 'current_limit'
+    #: The serial line was silent for too long, or damaged; the same of the fieldbus.
+    SERIAL_FAILURE = 'serial_failure'
+    FIELDBUS_FAILURE = 'fieldbus_failure'
+
+
+@dataclass(frozen=True)
+class StatusCode:
+    """
+    One inverter status code of one family.
+
+    :ivar text: what the display shows.
+    :ivar old_text: what it shows before firmware :attr:`renamed`, where that is otherwise [C3].
+    """
+
+    code: int
+    text: str
+    old_text: str = ''
+    renamed: Fraction | None = None
+    kind: Kind = Kind.STATUS
+    requires_ack: bool = False
+    meanings: frozenset[Meaning] = frozenset()
+    description: str = ''
+    remedy: str = ''
+
+    def shown(self, firmware: Fraction | None) -> str:
+        """Return the text on the display of a drive with this firmware; ``None``: unknown."""
+        old = self.renamed is not None and firmware is not None and firmware < self.renamed
+        return self.old_text if old else self.text
+
+
+class Fact(enum.IntFlag):
+    """What a drive may say of itself; names and values are those of the message DriveStatus."""
+
+    READY = 1 << 0
+    SWITCHED_ON = 1 << 1
+    OPERATION_ENABLED = 1 << 2
+    FAULT = 1 << 3
+    ALARM = 1 << 4
+    VOLTAGE_ENABLED = 1 << 5
+    QUICK_STOP_ACTIVE = 1 << 6
+    SWITCH_ON_DISABLED = 1 << 7
+    NETWORK_REFERENCE = 1 << 8
+    NETWORK_CONTROL = 1 << 9
+    SETPOINT_REACHED = 1 << 10
+    LIMIT_ACTIVE = 1 << 11
+    SLEEPING = 1 << 12
+    STOP_MODE_BRAKE = 1 << 13
+    REVERSE = 1 << 14
+    STOPPING = 1 << 15
+    RUN_INPUT_MISSING = 1 << 16
+
+
+class State(enum.Enum):
+    """States of the generic state machine [M0 table 16]."""
+
+    UNKNOWN = 0
+    NOT_READY_TO_SWITCH_ON = 1
+    SWITCH_ON_DISABLED = 2
+    READY_TO_SWITCH_ON = 3
+    SWITCHED_ON = 4
+    OPERATION_ENABLED = 5
+    #: DISABLE or SHUTDOWN: the status word does not tell them apart [C37].
+    STOPPING = 6
+    QUICK_STOP = 7
+    FAULT_REACTION_ACTIVE = 8
+    FAULTED = 9
+
+
+@dataclass(frozen=True)
+class StatusWord:
+    """
+    What the status word of one family means.
+
+    :ivar state: gives the state that a status word shows.
+    :ivar by_bit: which facts each bit tells.
+    :ivar by_state: which facts only the state tells.
+    :ivar stateless: a status word may show none; where not, such a word is none of this drive.
+    """
+
+    state: Callable[[int], State]
+    by_bit: Mapping[int, Fact]
+    by_state: Mapping[State, Fact]
+    stateless: bool = False
+
+    def may_say(self, word: int) -> bool:
+        """Tell whether a status word is one of those that the manual knows."""
+        return self.stateless or self.state(word) is not State.UNKNOWN
+
+    @functools.cached_property
+    def valid(self) -> Fact:
+        """The facts that this family tells at all; of the others nothing is known."""
+        valid = Fact.ALARM  # where no bit tells it, the inverter status does
+        for fact in (*self.by_bit.values(), *self.by_state.values()):
+            valid |= fact
+        return valid
+
+    def facts(self, word: int, listed: Kind) -> Fact:
+        """
+        Return what a status word says.
+
+        :param listed: the kind of the inverter status code read with it, as its table has it.
+        """
+        facts = self._bits(word) | self.by_state.get(self.state(word), Fact(0))
+        return facts | Fact.ALARM if self.kind(word, listed) is Kind.ALARM else facts
+
+    def kind(self, word: int, listed: Kind) -> Kind:
+        """
+        Return how grave the inverter status is: the bits have the last word ([C50], [C95]).
+
+        :param listed: as its table has it.
+        """
+        facts = self._bits(word)
+        if Fact.FAULT in facts:
+            return Kind.FAULT
+        if self.tells_alarms:
+            return Kind.ALARM if Fact.ALARM in facts else Kind.STATUS
+        return Kind.ALARM if listed is Kind.FAULT else listed
+
+    @property
+    def tells_alarms(self) -> bool:
+        """It has a bit for alarms."""
+        return Fact.ALARM in self.by_bit.values()
+
+    @functools.cached_property
+    def _pairs(self) -> tuple[tuple[int, int], ...]:
+        # plain numbers: this is done with every poll, and flags take their time
+        return tuple((int(bit), int(fact)) for bit, fact in self.by_bit.items())
+
+    def _bits(self, word: int) -> Fact:
+        facts = 0
+        for bit, fact in self._pairs:
+            if word & bit:
+                facts |= fact
+        return Fact(facts)

@@ -1,0 +1,80 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Reading the tables of a family; whatever is wrong in one is named by its file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterable
+import csv
+from fractions import Fraction
+from pathlib import Path
+from typing import TypeVar
+
+_T = TypeVar('_T')
+Row = dict[str, str]
+
+
+class CatalogError(Exception):
+    """A table contradicts itself; the message names the file and the line."""
+
+
+def read(
+    path: Path, parse: Callable[[Row], _T], unique: Callable[[_T], Iterable[str]]
+) -> list[_T]:
+    """
+    Read a table.
+
+    :param parse: makes something of a row; ``KeyError`` and ``ValueError`` say what is wrong.
+    :param unique: names what no two rows may share.
+    :raises CatalogError: there is no such file, or a row is wrong, or says what another one has.
+    """
+    found: list[_T] = []
+    lines: dict[str, int] = {}
+    try:
+        text = path.read_text(encoding='utf-8')
+    except (OSError, UnicodeError) as error:
+        raise CatalogError(f'{_name(path)}: {error}') from error
+    rows = csv.DictReader(text.splitlines(), strict=True)
+    try:
+        for row in rows:
+            if None in row or None in row.values():
+                raise ValueError('too many or too few columns')
+            made = parse(row)
+            for name in unique(made):
+                if name in lines:
+                    raise ValueError(f'{name} stands in line {lines[name]} already')
+                lines[name] = rows.reader.line_num
+            found.append(made)
+    except (KeyError, ValueError, ZeroDivisionError, csv.Error) as error:
+        said = f'no {error}' if isinstance(error, KeyError) else error
+        # the dictionary reader's own count lags behind in a row that has no end
+        raise CatalogError(f'{_name(path)}, line {rows.reader.line_num}: {said}') from error
+    return found
+
+
+def fraction(text: str) -> Fraction | None:
+    """Return a number of a table; ``None`` for an empty cell."""
+    return Fraction(text) if text else None
+
+
+def number(text: str) -> int | None:
+    """Return a whole number, decimal or ``0x`` hexadecimal; ``None`` for an empty cell."""
+    return int(text, 0) if text else None
+
+
+def _name(path: Path) -> str:
+    return f'{path.parent.name}/{path.name}'
