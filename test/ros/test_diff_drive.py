@@ -136,7 +136,9 @@ def test_worked_numbers_of_the_belt() -> None:
     parameters = SimpleNamespace(values=nominal)
     for mode, value in (('Speed', 955), ('Freque', 31.8)):
         drive = SimpleNamespace(
-            snapshot=SimpleNamespace(control_mode=mode), parameters=parameters
+            snapshot=SimpleNamespace(control_mode=mode),
+            parameters=parameters,
+            model=load_family('sinus_g2'),
         )
         assert joint.setpoint(2 * belt / drum, drive) == pytest.approx(value, rel=0.002)
 
