@@ -169,7 +169,7 @@ def _stop_summary(stop: dict[str, float]) -> str:
 
 def _cycle_summary(few: dict[str, float], many: dict[str, float]) -> str:
     return (
-        f'* **Cycle:** status, frequency and speed of one drive every {few["time"]:.0f} ms, of 32 '
+        f'* **Cycle:** status and frequency of one drive every {few["time"]:.0f} ms, of 32 '
         f'drives every {many["time"]:.0f} ms (57600 bit/s): {few["ratio"]:.2f} and '
         f'{many["ratio"]:.2f} times what the bytes themselves take on the wire.\n'
         f'* **Processor:** {many["cpu"]:.0f} % of a core with 32 drives on a full line, and '

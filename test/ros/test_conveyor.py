@@ -42,6 +42,7 @@ _RARE = (
 #: For how long an idle driver is watched, s, and how often it may be woken meanwhile.
 _WATCHED = 10.0
 _WAKE_UPS = 20
+_SETPOINTS = 100
 #: All parameters of all drives are read first, which takes as long as the machine makes it, s.
 _START = 6 * PATIENCE
 #: A read, and SCMD = Stop, by Modbus.
@@ -128,6 +129,18 @@ class Conveyor:
         assert self.client.call(f'/{NAMES[1]}/stop').success
         assert self._wakes.stat().st_size > counts[-1] + woken
 
+    def takes_setpoints_in_its_sleep(self) -> None:
+        """See that a set-point wakes who takes it, and no executor."""
+        before = self._wakes.stat().st_size
+        for number in range(_SETPOINTS):
+            self._setpoints[0].publish(Float32(data=20.0 + number / _SETPOINTS))
+            # so that they are taken one by one
+            time.sleep(0.02)
+        wait_until(lambda: self.status[1].actual > 20.5, 'the last is followed', period=0.1)
+        assert 0 < self._wakes.stat().st_size - before <= _SETPOINTS + _WAKE_UPS
+        self._setpoints[0].publish(Float32(data=20.0))
+        wait_until(self.all_but(), 'all follow', period=0.1)
+
     def turning(self) -> set[int]:
         """Return whose motors turn."""
         return {at for at in NAMES if self.simulator.state(at)['turning']}
@@ -140,6 +153,7 @@ def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:
     conveyor = Conveyor(bench)
     conveyor.sleeps()
     conveyor.run()
+    conveyor.takes_setpoints_in_its_sleep()
     faulty, unplugged = 7, 23
     conveyor.simulator.inject('fault', 5, address=faulty)
     wait_until(lambda: not conveyor.status[faulty].enabled, 'its fault has stopped it')
