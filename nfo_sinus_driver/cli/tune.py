@@ -97,7 +97,7 @@ class _Tuning:
         except DriveError as error:
             tuned = Tuned(False, str(error), ())
         text = in_our_words(tuned.text)
-        if self._drive.stop_unconfirmed and not self._drive.held_by_fault:
+        if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
             # a fault keeps it still; else nobody tries on when this command has ended
             screen.say(text)
             Stopping(self._helm, self._drive, self._show).confirmed_late()

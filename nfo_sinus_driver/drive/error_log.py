@@ -27,11 +27,11 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
@@ -104,10 +104,10 @@ def _local(at: float) -> str:
 class ErrorLog:
     """The error log and the kWh counter of one drive; used on the bus alone."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = registers
-        self._errands = errands
+        self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
         self._sightings: list[tuple[int, float]] = []
@@ -176,10 +176,10 @@ class ErrorLog:
         :raises DriveError: it was not erased, and why.
         """
         what = 'erasing the error log'
-        with self._errands.lent(what) as loan:
+        with self._procedures.begun(what) as access:
             area = self._area()
-            async with self._errands.sent(loan):
-                await self._errands.tell(loan, Scmd.ERASE_E_LOG)
+            async with self._procedures.in_standby(access):
+                await self._procedures.command(access, Scmd.ERASE_E_LOG)
                 if code_of(await self._entry(area, 0)):
                     raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
@@ -191,17 +191,17 @@ class ErrorLog:
         :raises DriveError: it was not reset, and why.
         """
         what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
-        self._errands.require(what)
+        self._procedures.require(what)
         if not self._inverter.has(energy):
             told = self._inverter.identity
             raise DriveError(
                 f'{what} came with firmware 4.38; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        with self._errands.lent(what) as loan:
-            async with self._errands.sent(loan):
+        with self._procedures.begun(what) as access:
+            async with self._procedures.in_standby(access):
                 before = await self._registers.read_number(energy, Priority.SERVICE)
-                await self._errands.tell(loan, Scmd.RESET_E_OUT)
+                await self._procedures.command(access, Scmd.RESET_E_OUT)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a drive does on an SCMD while its motor stands: tune, erase, reset [M0 table 18]."""
+"""What a drive does on a command while its motor stands: tune, erase, reset [M0 table 18]."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive import stop_sequence
 from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.loan import Loan
-from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -43,31 +44,36 @@ _BUSY_PERIOD = 0.05
 _LONGEST_BUSY = 0.5
 
 
-class Errands:
+class Procedures:
     """
-    Sends one drive on errands; used on the bus alone.
+    Has one drive carry out procedures; used on the bus alone.
 
-    :param motion: who commands the drive else; ``None`` if this driver only reads.
+    :param controller: who commands the drive else; ``None`` if this driver only reads.
     """
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, registers: Registers, motion: Motion | None
+        self, bus: Bus, inverter: Inverter, registers: Registers, controller: Controller | None
     ) -> None:
         self._bus = bus
         self._inverter = inverter
         self._registers = registers
-        self._motion = motion
+        self._controller = controller
 
-    def require(self, what: str) -> Motion:
-        """
-        Return who lends the drive for an errand.
-
-        :param what: the errand, in words that go before "needs SCMD".
-        :raises DriveError: the drive has no such errand, or its control method is another.
-        """
-        if self._motion is None:
+    @property
+    def _commands(self) -> Controller:
+        if self._controller is None:
             raise DriveError(MONITOR_REFUSAL)
-        inverter = self._inverter
+        return self._controller
+
+    def require(self, what: str) -> None:
+        """
+        See to it that a procedure may begin.
+
+        :param what: the procedure, in words that go before "needs SCMD".
+        :raises DriveError: the drive has no such procedure, or its control method is another; or
+            somebody has the drive.
+        """
+        controller, inverter = self._commands, self._inverter
         if not inverter.connected:
             raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
         if not inverter.has(inverter.model.key(Role.START_COMMAND)):
@@ -80,36 +86,28 @@ class Errands:
                 f'{what} needs SCMD, and one session does not mix control methods: '
                 'clean up, set control_method to mode_scmd and configure again'
             )
-        self._require_idle(what, self._motion)
-        return self._motion
+        controller.require_idle(what)
 
     @contextlib.contextmanager
-    def lent(self, what: str) -> Iterator[Loan]:
+    def begun(self, what: str) -> Iterator[ExclusiveAccess]:
         """
-        Have the drive for an errand, from its first preparations on: whoever stops it ends both.
+        Have the drive for a procedure, from its first preparations on.
 
         :raises DriveError: it cannot be had, and why.
         """
         self.require(what)
-        with self.had(what) as loan:
-            yield loan
+        with self.exclusive(what) as access:
+            yield access
 
     @contextlib.contextmanager
-    def had(self, what: str) -> Iterator[Loan]:
+    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
         """
-        Do as :meth:`lent` for what every control method may do, also while connecting.
+        Have the drive for what every control method may do, also while connecting.
 
         :raises DriveError: somebody has the drive.
         """
-        motion = self._motion
-        if motion is None:
-            raise DriveError(MONITOR_REFUSAL)
-        self._require_idle(what, motion)
-        motion.loan = loan = Loan(what)
-        try:
-            yield loan
-        finally:
-            motion.loan = None
+        with self._commands.exclusive(what) as access:
+            yield access
 
     async def in_control(self, priority: Priority) -> bool:
         """
@@ -117,12 +115,10 @@ class Errands:
 
         :raises DriveError: this driver only reads.
         """
-        if self._motion is None:
-            raise DriveError(MONITOR_REFUSAL)
-        return await self._motion.method.in_control(priority)
+        return await self._commands.method.in_control(priority)
 
     @contextlib.asynccontextmanager
-    async def sent(self, loan: Loan) -> AsyncIterator[None]:
+    async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
@@ -131,29 +127,29 @@ class Errands:
 
         :raises DriveError: it cannot be had, and why.
         """
-        motion = self._motion
-        assert motion is not None and motion.loan is loan
-        found = await self._take(loan, motion)
+        found = await self._take(access)
         try:
             yield
         except Exception:
             # who asked is told what went wrong first; what comes of it is logged
             with contextlib.suppress(DriveError, LinkError):
-                await self._give_back(motion, found)
+                await self._give_back(found)
             raise
-        await self._give_back(motion, found)
+        await self._give_back(found)
 
-    async def recall(self) -> str:
+    async def abort(self) -> str:
         """
-        End what the drive does on an errand; anything else goes on.
+        End the procedure that has the drive; anything else goes on.
 
-        :raises DriveError: the drive does not confirm it; it is tried on and on.
+        :raises DriveError: the drive does not confirm it; it is retried until it does.
         """
-        if self._motion is None or self._motion.loan is None:
+        controller = self._controller
+        procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
+        if controller is None or controller.state not in procedure:
             return ''
-        return await self._motion.stop()
+        return await controller.stop()
 
-    async def tell(self, loan: Loan, command: Scmd) -> None:
+    async def command(self, access: ExclusiveAccess, command: Scmd) -> None:
         """
         Write SCMD; once, for nobody knows what has happened before a second one.
 
@@ -171,7 +167,7 @@ class Errands:
                     command,
                     Priority.STOP,
                     once=True,
-                    require_wanted=loan.require_wanted,
+                    require_wanted=access.require_wanted,
                 )
                 return
             except Refused as error:
@@ -179,18 +175,8 @@ class Errands:
                     raise
             await self._bus.sleep(_BUSY_PERIOD)
 
-    @staticmethod
-    def _require_idle(what: str, motion: Motion) -> None:
-        if motion.loan is not None:
-            raise DriveError(f'{what}: {motion.loan.what} is going on already')
-        if motion.ours:
-            raise DriveError(f'{what}: the motor is enabled: stop it first')
-        # a fault that holds the stop is told of later, with what to do
-        if motion.stopping and not motion.taking_back.held_by_fault:
-            raise DriveError(f'{what}: a stop is not confirmed yet')
-
-    async def _take(self, loan: Loan, motion: Motion) -> Mode:
-        inverter, what = self._inverter, loan.what
+    async def _take(self, access: ExclusiveAccess) -> Mode:
+        controller, inverter, what = self._commands, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
         key = self._inverter.model.key(Role.CONTROL_SOURCE)
@@ -207,22 +193,23 @@ class Errands:
                 f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
                 'back to them could start the motor: press STOP at the drive first'
             )
-        loan.require_wanted()
+        access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
-        await motion.take_control(control_mode)
-        deadline = time.monotonic() + withdrawal.PATIENCE
+        await controller.take_control(control_mode)
+        deadline = time.monotonic() + stop_sequence.CONFIRMATION_TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
-                    await self._give_back(motion, Mode(mode))
+                    await self._give_back(Mode(mode))
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
             # no manual says that a drive has forgotten what it was told before
-            await motion.method.stop(control_mode)
-            await self._bus.sleep(withdrawal.LOOK_PERIOD)
+            await controller.method.stop(control_mode)
+            await self._bus.sleep(stop_sequence.LOOK_PERIOD)
         return Mode(mode)
 
-    async def _give_back(self, motion: Motion, found: Mode) -> None:
-        """Take the command back, and control too where nobody had it; not while a fault stands."""
-        await motion.take_back()
-        if found is Mode.STOP and not motion.taking_back.held_by_fault:
-            await motion.method.release()
+    async def _give_back(self, found: Mode) -> None:
+        """Remove the command, and give control back where nobody had it; not while faulted."""
+        controller = self._commands
+        await controller.withdraw_run_command()
+        if found is Mode.STOP and not controller.blocked_by_fault:
+            await controller.method.release()
