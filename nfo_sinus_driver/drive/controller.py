@@ -32,17 +32,15 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import control_state
-from nfo_sinus_driver.drive import stop_sequence
-from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
 from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
@@ -52,6 +50,7 @@ from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.start_sequence import StartSequence
 from nfo_sinus_driver.drive.stop_sequence import StopSequence
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -105,6 +104,8 @@ class Controller:
         #: What enables, and who has the drive, while there is one.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
+        self._confirmation = Confirmation(bus, inverter)
+        self._starting = StartSequence(bus, inverter, method)
         self._sequence = StopSequence(bus, inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, str] | None = None
@@ -276,7 +277,11 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            await self._start(prepare)
+            if self._refusal is not None:
+                self._explain_refusal(await self._inverter.look(Priority.SERVICE))
+            control_mode = await self._starting.start(prepare)
+            self._happened(ControlEvent.RUNNING)
+            self._setpoint.arm(control_mode)
         except Cancelled:
             raise DriveError('it was stopped while it was being enabled') from None
         except Exception as error:
@@ -318,17 +323,11 @@ class Controller:
 
     async def take_control(self, control_mode: str) -> None:
         """
-        Put the drive under bus control, with no run command standing.
-
-        The set-point of an earlier session is removed before, where the drive lets us: one that has
-        kept its run command, too, would turn the motor at once.
+        Put the drive under bus control for a procedure, with no run command standing.
 
         :raises DriveError: it lets nobody take control.
         """
-        if not self._inverter.settings_need_control:
-            with contextlib.suppress(DriveError, Refused):
-                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control(self._await_step)
+        await self._starting.take_control(control_mode)
 
     async def withdraw_run_command(self) -> None:
         """
@@ -356,10 +355,10 @@ class Controller:
                 may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
                 if may_run:
                     await self._method.quick_stop(self._inverter.control_mode)
-                    await self._await_status(
+                    await self._confirmation.wait(
                         lambda seen: not seen.driven,
                         Priority.STOP,
-                        stop_sequence.CONFIRMATION_TIMEOUT,
+                        confirmation.TIMEOUT,
                     )
             except (DriveError, LinkError) as error:
                 self._sequence.request()
@@ -401,10 +400,10 @@ class Controller:
         if seen.state is State.FAULT_REACTION_ACTIVE:
             # what comes before FAULTED acknowledges nothing [M0 table 16]
             with contextlib.suppress(DriveError):
-                await self._await_status(
+                await self._confirmation.wait(
                     lambda now: now.state is not State.FAULT_REACTION_ACTIVE,
                     Priority.SERVICE,
-                    stop_sequence.CONFIRMATION_TIMEOUT,
+                    confirmation.TIMEOUT,
                 )
         try:
             why = await self._method.acknowledge(seen.code, inverter.control_mode)
@@ -413,7 +412,7 @@ class Controller:
             if may_run:
                 self._sequence.request_anew()
         try:
-            await self._await_status(
+            await self._confirmation.wait(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
             )
             await self._settle()
@@ -449,7 +448,7 @@ class Controller:
                 'a run command may still stand in it when the fault is acknowledged'
             )
         try:
-            await self._await_status(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+            await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
             if not self._inverter.sio_tot:
@@ -552,69 +551,6 @@ class Controller:
             self._tell(Severity.WARNING, f'stopped: {reason}; then call ~/enable to go on')
 
     # --- how --------------------------------------------------------------------------------
-
-    async def _start(self, prepare: Callable[[], Awaitable[None]]) -> None:
-        inverter = self._inverter
-        seen = await inverter.look(Priority.SERVICE)
-        self._explain_refusal(seen)
-        require_no_fault(inverter, seen)
-        control_mode = await inverter.read_control_mode()
-        expected = inverter.settings.expected_control_mode
-        if expected and control_mode != expected:
-            raise DriveError(
-                f'the drive is in control mode {control_mode}, expected is {expected}: '
-                'set control.mode in the drive or expected_control_mode in the driver'
-            )
-        await self.take_control(control_mode)
-        await self._await_step(lambda now: now.from_bus)
-        if inverter.settings.follows_setpoints:
-            await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await prepare()
-        await self._method.run(self._await_start)
-        await self._await_start(lambda now: now.runs)
-        self._happened(ControlEvent.RUNNING)
-        self._setpoint.arm(control_mode)
-
-    async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
-        """
-        Wait until the drive has made a step on its way to run.
-
-        :raises DriveError: it does not.
-        """
-        deadline = time.monotonic() + stop_sequence.CONFIRMATION_TIMEOUT
-        delayed = False
-        while True:
-            seen = await self._inverter.look(Priority.SERVICE)
-            if wanted(seen):
-                return
-            if seen.faulted:
-                raise DriveError(f'the drive did not start: {self._inverter.describe()}')
-            # in standby after the start delay it has forgotten the start, and must not wait for
-            # another one
-            if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(NO_RUN_INPUT)
-            if seen.means(Meaning.START_DELAY) and not delayed:
-                delayed = True
-                deadline += await self._inverter.read_start_delay()
-            if time.monotonic() > deadline:
-                raise DriveError(
-                    NO_RUN_INPUT
-                    if seen.standby
-                    else f'the drive does not start: {self._inverter.describe()}'
-                )
-            await self._bus.sleep(stop_sequence.LOOK_PERIOD)
-
-    async def _await_step(self, wanted: Callable[[InverterStatus], bool]) -> None:
-        await self._await_status(wanted, Priority.SERVICE, stop_sequence.CONFIRMATION_TIMEOUT)
-
-    async def _await_status(
-        self, wanted: Callable[[InverterStatus], bool], priority: Priority, timeout: float
-    ) -> None:
-        deadline = time.monotonic() + timeout
-        while not wanted(await self._inverter.look(priority)):
-            if time.monotonic() > deadline:
-                raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
-            await self._bus.sleep(stop_sequence.LOOK_PERIOD)
 
     async def _settle(self) -> None:
         """Let a stop that comes with something else be confirmed, so that enable can follow."""

@@ -25,7 +25,7 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import stop_sequence
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
@@ -196,7 +196,7 @@ class Procedures:
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
-        deadline = time.monotonic() + stop_sequence.CONFIRMATION_TIMEOUT
+        deadline = time.monotonic() + confirmation.TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
@@ -204,7 +204,7 @@ class Procedures:
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
-            await self._bus.sleep(stop_sequence.LOOK_PERIOD)
+            await self._bus.sleep(confirmation.LOOK_PERIOD)
         return Mode(mode)
 
     async def _give_back(self, found: Mode) -> None:

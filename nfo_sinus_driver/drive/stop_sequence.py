@@ -25,6 +25,7 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.control_method import Removal
 from nfo_sinus_driver.drive.control_state import ControlEvent
@@ -36,10 +37,6 @@ from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
-#: How long a drive may take to do what it was told, its start delay not counted, s.
-CONFIRMATION_TIMEOUT = 2.0
-#: How often the status is looked at while something is awaited, s.
-LOOK_PERIOD = 0.02
 #: How often a stop is written again that was heard and is not confirmed, s.
 _RETRY_PERIOD = 0.2
 #: How often one is that a lost drive does not hear, for its neighbours' sake, s.
@@ -139,7 +136,7 @@ class StopSequence:
         if self._task is None:
             self._outcome = None
             self._unconfirmed = _NOT_ANSWERED
-            self._due = time.monotonic() + CONFIRMATION_TIMEOUT
+            self._due = time.monotonic() + confirmation.TIMEOUT
             self._task = self._bus.spawn(self._keep_trying())
 
     def request_anew(self) -> None:
@@ -160,8 +157,8 @@ class StopSequence:
         :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
-        deadline = time.monotonic() + (CONFIRMATION_TIMEOUT if patience is None else patience)
-        while task is not None and not await self._bus.join(task, LOOK_PERIOD):
+        deadline = time.monotonic() + (confirmation.TIMEOUT if patience is None else patience)
+        while task is not None and not await self._bus.join(task, confirmation.LOOK_PERIOD):
             if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
@@ -179,7 +176,7 @@ class StopSequence:
         while await self._attempt() is not _Outcome.CONFIRMED:
             if self.blocked_by_fault:
                 await self._fault_gone()
-                self._due = complain_at = time.monotonic() + CONFIRMATION_TIMEOUT
+                self._due = complain_at = time.monotonic() + confirmation.TIMEOUT
                 continue
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
@@ -222,7 +219,7 @@ class StopSequence:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif self._outcome is _Outcome.BUSY:
-            await self._bus.sleep(LOOK_PERIOD)
+            await self._bus.sleep(confirmation.LOOK_PERIOD)
         elif self._outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 

@@ -25,7 +25,7 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.drive import stop_sequence
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -166,7 +166,7 @@ class Tuning:
                     f'{what} ended, and the drive does not say that it has finished ({told}): '
                     'was the RUN input lost, or STOP pressed?'
                 )
-            elif elapsed > stop_sequence.CONFIRMATION_TIMEOUT:
+            elif elapsed > confirmation.TIMEOUT:
                 return False, (
                     f'{what} does not begin ({told}): is its RUN input (DIN1) active?'
                 )
