@@ -62,7 +62,7 @@ LOST          .         OFFLINE   STOPPING STOPPING ABORTING  .        .        
 ENABLE        .         ENABLING  .        .        .         .        .        .        .
 RUNNING       .         .         ENABLED  .        .         .        .        .        .
 STOP          STOPPING  STOPPING  STOPPING STOPPING ABORTING  .        .        .        .
-STOPPED       .         .         .        .        .         .        IDLE     IDLE     .
+STOPPED       .         .         .        .        .         .        IDLE     .        .
 FAULT_BLOCKS  .         .         .        .        .         .        BLOCKED  .        .
 FAULT_OVER    .         .         .        .        .         .        .        STOPPING .
 BEGIN         PROCEDURE PROCEDURE .        .        .         .        .        .        .
