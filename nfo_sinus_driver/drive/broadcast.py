@@ -41,7 +41,6 @@ async def broadcast_stop(bus: Bus) -> None:
     :raises LinkError: the port is lost.
     """
     g2 = load_family('sinus_g2')
-    place = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
-    await bus.write(
-        EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
-    )
+    mode = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
+    data = mode.number.encode(Mode.STOP)
+    await bus.write(EVERYBODY, Address(*mode.place), data, Priority.STOP)

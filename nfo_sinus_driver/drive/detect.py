@@ -40,11 +40,11 @@ async def detect_model(bus: Bus, unit: int) -> str:
     if bus.space == 'classic':
         return 'sinus_g2'
     g2 = load_family('sinus_g2')
-    place = g2[g2.key(Role.FIRMWARE)].at('modbus')
+    firmware = g2[g2.key(Role.FIRMWARE)].at('modbus')
     try:
         if await bus.identify(unit, Priority.SERVICE) != Identification():
             return 'sinus_g2'
-        await bus.read(unit, Address(place.numbers, place.words), Priority.SERVICE)
+        await bus.read(unit, Address(*firmware.place), Priority.SERVICE)
     except Refused:
         return 'sinus_optimal'
     except Cancelled:

@@ -206,8 +206,8 @@ class DriveControl:
         """Change some bits of the control word and leave the others to who has control."""
         if self._registers.reaches(_MASK):
             # in one transaction: the AND mask first, then the OR mask [M0 §7.1]
-            masks = (int(keep) & 0xFFFF, int(add))
-            await self._registers.write_words(_MASK, masks, priority, once=once)
+            masks = int(keep) & 0xFFFF | int(add) << 16
+            await self._registers.write(_MASK, masks, priority, once=once)
             return
         word = Control(int(await self._registers.read_number(_WORD, priority)))
         await self._registers.write(_WORD, word & keep | add, priority, once=once)

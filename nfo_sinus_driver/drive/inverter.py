@@ -41,7 +41,6 @@ from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
@@ -161,7 +160,7 @@ class Inverter:
         if told is None:
             word, at = await self._read_word(priority, once)
         else:
-            word, at = self.status_word(told.words), told.arrived
+            word, at = self.status_word(told.data), told.arrived
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -191,11 +190,11 @@ class Inverter:
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
         reply = await self._registers.read_reply(STATUS_WORD, priority, once=once)
-        return self.status_word(reply.words), reply.arrived
+        return self.status_word(reply.data), reply.arrived
 
-    def status_word(self, words: Words) -> int:
+    def status_word(self, data: bytes) -> int:
         """Return what counts of a status word: the upper half is described nowhere [C24]."""
-        return int(self._registers.number(STATUS_WORD, words)) & 0xFFFF
+        return int(self._registers.number(STATUS_WORD, data)) & 0xFFFF
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
@@ -244,8 +243,8 @@ class Inverter:
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
-        words = await self._registers.read_words(key, priority, once=True)
-        value = self._registers.number(key, words)
+        data = await self._registers.read_data(key, priority, once=True)
+        value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
             return value
         if key not in self._told_impossible:
@@ -285,9 +284,9 @@ class Inverter:
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
         stop = self.model.key(Role.STOP_AT_TIMEOUT)
         self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
-        words = await self._registers.read_words(stop, Priority.SERVICE)
+        data = await self._registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = words == self._registers.words(stop, True)
+        self.auto_stop = data == self._registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """

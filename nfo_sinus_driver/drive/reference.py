@@ -24,7 +24,6 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Words
 
 #: What takes the set-point, by control mode.
 _ROLES: Mapping[str, Role] = {
@@ -69,25 +68,25 @@ class Reference:
         written = common if registers.reaches(common) else self._key
         self.address: Address = registers.address(written)
 
-    def words(self, value: float) -> Words:
+    def encode(self, value: float) -> bytes:
         """
-        Return the words of the drive's step nearest to a set-point.
+        Return the bytes of the drive's step nearest to a set-point.
 
         :raises ValueError: out of range or not finite.
         """
-        return self._registers.nearest_words(self._key, value)
+        return self._registers.encode_nearest(self._key, value)
 
-    def value(self, words: Words) -> float:
-        """Return the set-point that words mean to the drive, after its own rounding."""
-        return self._registers.number(self._key, words)
+    def value(self, data: bytes) -> float:
+        """Return the set-point that bytes mean to the drive, after its own rounding."""
+        return self._registers.number(self._key, data)
 
-    async def read(self, priority: Priority) -> Words:
+    async def read(self, priority: Priority) -> bytes:
         """
         Read back what stands there; a request that nobody answers is not repeated.
 
         :raises LinkError: the drive does not answer, or refuses.
         """
-        return await self._registers.read_words(self._key, priority, once=True)
+        return await self._registers.read_data(self._key, priority, once=True)
 
     async def write_zero(self, priority: Priority, *, once: bool = True) -> None:
         """
@@ -96,7 +95,7 @@ class Reference:
         :param once: do not repeat the request when nobody answers.
         :raises LinkError: the drive does not answer, or refuses.
         """
-        await self._registers.write_at(self.address, self.words(0.0), priority, once=once)
+        await self._registers.write_at(self.address, self.encode(0.0), priority, once=once)
 
     async def set_to_zero(self, priority: Priority) -> None:
         """

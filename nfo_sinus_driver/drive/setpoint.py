@@ -38,7 +38,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s: somebody else may
 #: have changed it meanwhile.
@@ -113,7 +112,7 @@ class Setpoint:
         self.control_mode = ''
         self._reference: Reference | None = None
         self._armed_at = math.inf
-        self._written: tuple[int, ...] = ()
+        self._written = b''
         self._written_at = 0.0
         self._watch: Task | None = None
         #: What reads back whether the drive took what was told to all, and when it last did.
@@ -172,7 +171,7 @@ class Setpoint:
         follows = self._inverter.settings.follows_setpoints
         self._reference = Reference(self._registers, control_mode) if follows else None
         self._armed_at = time.monotonic()
-        self._written = () if self._reference is None else self._reference.words(0.0)
+        self._written = b'' if self._reference is None else self._reference.encode(0.0)
         self._written_at = self._armed_at
         self.commanded = NAN if self._reference is None else 0.0
         self.clamped = False
@@ -252,25 +251,25 @@ class Setpoint:
         self._shared = request
         self._bus.request(self._slot)
 
-    def words(self, request: Request) -> tuple[Address, Words]:
+    def encode(self, request: Request) -> tuple[Address, bytes]:
         """Return what is to be written for a request, and where."""
         assert self._reference is not None
-        return self._reference.address, self._reference.words(self._limited(request))
+        return self._reference.address, self._reference.encode(self._limited(request))
 
-    def needs(self, words: Words) -> bool:
+    def needs(self, data: bytes) -> bool:
         """Tell whether this has to be written, for something else stands in the drive, or long."""
         fresh = time.monotonic() - self._written_at < self._rewrite_period
-        return words != self._written or not fresh
+        return data != self._written or not fresh
 
-    def was_told(self, words: Words) -> None:
+    def was_told(self, data: bytes) -> None:
         """Take note of what was written to all drives; it is read back whether this one took it."""
         if not self._inverter.answering:
             # it gets its own when it answers
-            self._written = ()
+            self._written = b''
             self._waits_for_answer = True
             return
-        changed = words != self._written
-        self._take_note(words)
+        changed = data != self._written
+        self._take_note(data)
         if changed and self._reading_back is None:
             self._reading_back = self._bus.spawn(self._read_back())
 
@@ -297,7 +296,7 @@ class Setpoint:
                 f'it did not take the set-point for all drives: it keeps {self._value(kept):g}; '
                 'it is given its own',
             )
-        self._written = ()
+        self._written = b''
         self._bus.request(self._slot)
 
     # --- to this drive ------------------------------------------------------------------------
@@ -332,39 +331,39 @@ class Setpoint:
                 '(setpoint_max, or the limit of the drive)',
             )
         self._clamp_told = self.clamped
-        words = reference.words(limited)
-        if not self.needs(words):
+        data = reference.encode(limited)
+        if not self.needs(data):
             return None
         if self._combining is _Combining.GIVEN_UP:
-            return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
+            return self._bus.write(self._unit, reference.address, data, Priority.SETPOINT)
         status = self._registers.address(STATUS_WORD)
         return self._bus.write_and_read(
-            self._unit, reference.address, words, status, Priority.SETPOINT
+            self._unit, reference.address, data, status, Priority.SETPOINT
         )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
-            assert transfer.words is not None
+            assert transfer.data is not None
             if transfer.source is not None:
                 self._combining = _Combining.TAKEN
-            self._take_note(transfer.words)
+            self._take_note(transfer.data)
         elif transfer.source is not None and self._gives_up_combining(error):
             # what is wrong with the set-point itself, if anything is, the drive says now
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
-            assert transfer.words is not None
-            self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
+            assert transfer.data is not None
+            self._refused(f'it refused set-point {self._value(transfer.data):g}: {error}')
         else:
             self.was_missed(error)
 
-    def _take_note(self, words: Words) -> None:
-        """Take note that these words stand in the drive now."""
+    def _take_note(self, data: bytes) -> None:
+        """Take note that these bytes stand in the drive now."""
         self._busy_since = math.inf
-        self._written = words
+        self._written = data
         self._written_at = time.monotonic()
-        self.commanded = self._value(words)
+        self.commanded = self._value(data)
 
     def was_missed(self, error: LinkError) -> None:
         """Take note that nobody knows what stands in the drive; it is written when it answers."""
@@ -372,7 +371,7 @@ class Setpoint:
         # take from its neighbours
         self._registers.unanswered += isinstance(error, NoAnswer)
         self._waits_for_answer = True
-        self._written = ()
+        self._written = b''
         self._inverter.missed()
 
     def _gives_up_combining(self, error: LinkError) -> bool:
@@ -401,10 +400,10 @@ class Setpoint:
         self._busy_since = min(self._busy_since, now)
         return now < self._busy_since + _LONGEST_BUSY
 
-    def _value(self, words: Words) -> float:
-        """Return the set-point that words mean to the drive, after its own rounding."""
+    def _value(self, data: bytes) -> float:
+        """Return the set-point that bytes mean to the drive, after its own rounding."""
         assert self._reference is not None
-        return self._reference.value(words)
+        return self._reference.value(data)
 
     async def _watch_age(self) -> None:
         try:
@@ -446,7 +445,7 @@ class Setpoint:
             if self._request is before:
                 self.commanded = 0.0
             self._busy_since = math.inf
-            self._written = self._reference.words(0.0)
+            self._written = self._reference.encode(0.0)
             self._written_at = time.monotonic()
         self._expired = True
 

@@ -105,16 +105,16 @@ class SetpointAll:
             return None
         for setpoint in members:
             setpoint.take(request)
-        address, words = members[0].words(request)
-        if not any(setpoint.needs(words) for setpoint in members):
+        address, data = members[0].encode(request)
+        if not any(setpoint.needs(data) for setpoint in members):
             return None
-        return self._bus.write(EVERYBODY, address, words, Priority.SETPOINT)
+        return self._bus.write(EVERYBODY, address, data, Priority.SETPOINT)
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         for setpoint in self._setpoints().values():
             if error is None:
-                assert transfer.words is not None
-                setpoint.was_told(transfer.words)
+                assert transfer.data is not None
+                setpoint.was_told(transfer.data)
             else:
                 setpoint.was_missed(error)
 
