@@ -36,7 +36,7 @@ from rosbags.highlevel import AnyReader
 from ways import needs
 import yaml
 
-_DEMO = (sys.executable, '-m', 'nfo_sinus_driver.node.demo')
+_DEMO = (sys.executable, '-m', 'nfo_sinus_driver.demo')
 _DEMO_TIME = 110.0
 #: A busy machine may leave out every other message of what comes at a steady rate.
 _SHARE = 0.5
