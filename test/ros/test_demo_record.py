@@ -115,7 +115,7 @@ def test_the_demo_leaves_the_drive_of_another_driver_alone(bench: Bench, tmp_pat
     client = bench.client().connected()
     program = f"""
 import contextlib, sys
-from nfo_sinus_driver.node import demo
+from nfo_sinus_driver.demo import __main__ as demo
 demo.own_domain = lambda: contextlib.nullcontext({bench.domain})
 sys.exit(demo.main())
 """
