@@ -38,9 +38,9 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.demo.definitions import definition_of
 from nfo_sinus_driver.demo.definitions import hash_of
 from nfo_sinus_driver.demo.definitions import name_of
-from nfo_sinus_driver.node.line import LATCHED
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import NEWEST
+from nfo_sinus_driver.node.qos import RELIABLE
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection

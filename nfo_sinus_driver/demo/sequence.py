@@ -32,9 +32,9 @@ from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.demo.bench import Bench
-from nfo_sinus_driver.node.line import LATCHED
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import NEWEST
+from nfo_sinus_driver.node.qos import RELIABLE
 
 #: A shared machine may be very slow; a step that takes longer has failed, s.
 PATIENCE = 30.0
