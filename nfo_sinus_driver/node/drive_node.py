@@ -211,16 +211,18 @@ class DriveNode(LifecycleNodeMixin, Node):
         One that does not answer is let go: it is told to stop as soon as it answers again.
         """
         drive = self.managed.drive
-        self._stop_for(what, drive.deactivate)
-        return not (drive.stop_overdue and drive.snapshot.connected)
+        confirmed = self._stop_for(what, drive.deactivate)
+        return confirmed or not (drive.stop_unconfirmed and drive.snapshot.connected)
 
-    def _stop_for(self, what: str, command: Callable[[], Future[str]]) -> None:
+    def _stop_for(self, what: str, command: Callable[[], Future[str]]) -> bool:
+        """Give a command that stops the motor; return whether the drive has confirmed it."""
         try:
             answer = command().result(_LONGEST_STOP + self.managed.settings.shutdown_timeout)
         except (DriveError, FutureTimeoutError) as error:
             self.get_logger().error(f'{what}, but: {error}')
-        else:
-            self.get_logger().info(f'{what}: {answer}' if answer else what)
+            return False
+        self.get_logger().info(f'{what}: {answer}' if answer else what)
+        return True
 
     # --- settings -----------------------------------------------------------------------------
 

@@ -229,16 +229,16 @@ MUTANTS = (
         3,
         'deactivate does not stop the motor',
         _NODE,
-        '        self._stop_for(what, self._drive.deactivate)\n',
-        '',
+        'confirmed = self._stop_for(what, drive.deactivate)',
+        'confirmed = True',
         (_WAYS_OUT, '-k', 'deactivate'),
     ),
     Mutant(
         3,
         'a lifecycle shutdown does not stop the motor',
         _NODE,
-        "            self._stop_for('shut down', self._drive.stop)\n"
-        "            self._stop_for('shut down', self._disconnect)\n",
+        "            self._stop_for('shut down', self.managed.drive.stop)\n"
+        "            self._stop_for('shut down', self.managed.disconnect)\n",
         '            pass\n',
         (_WAYS_OUT, '-k', 'lifecycle_shutdown'),
     ),
@@ -683,7 +683,7 @@ MUTANTS = (
         'an exit does not count a drive that is just being connected to',
         _MAIN,
         '            if self._may_be_there(node) and not',
-        '            if node.drive.identity is not None and not',
+        '            if node.managed.drive.identity is not None and not',
         ('test/ros/test_no_false_success.py', '-k', 'before_the_first_answer'),
     ),
 )
