@@ -302,7 +302,7 @@ class DriveNode(LifecycleNodeMixin, Node):
                 raise DriveError(f'drive_timeout: {error or "not in time"}') from None
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
-        self.managed.settings = self._settings_with(parameters)
+        self.managed.change_settings(self._settings_with(parameters))
 
 
 def _require_gear_ratio(values: Mapping[str, object]) -> None:

@@ -70,8 +70,8 @@ class ManagedDrive:
         """What is asked for; the drive goes by it once it is connected."""
         return self._settings
 
-    @settings.setter
-    def settings(self, settings: DriveSettings) -> None:
+    def change_settings(self, settings: DriveSettings) -> None:
+        """Ask for something else; a drive that is connected goes by it at once."""
         self._settings = settings
         if not self.may_be_another:
             self._drive.settings = self._concrete
