@@ -49,8 +49,8 @@ from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.methods import method_in_charge
 from nfo_sinus_driver.drive.parameters import Parameters
