@@ -30,6 +30,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
@@ -61,7 +62,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.statistics import Statistics
 
 _T = TypeVar('_T')
 

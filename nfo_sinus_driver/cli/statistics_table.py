@@ -20,8 +20,8 @@ from collections.abc import Sequence
 import dataclasses
 import math
 
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.statistics import Statistics
 
 #: The columns: what stands above, and the width.
 _COLUMNS = (

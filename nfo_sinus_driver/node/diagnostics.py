@@ -24,12 +24,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
-from nfo_sinus_driver.statistics import Statistics
 
 _LEVELS = {
     Kind.STATUS: DiagnosticStatus.OK,

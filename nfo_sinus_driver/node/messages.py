@@ -26,6 +26,7 @@ from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
 from std_msgs.msg import Header
 
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
@@ -34,7 +35,6 @@ from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.statistics import Statistics
 
 _CONTROL_METHODS = {
     'mode_scmd': DriveStatus.MODE_SCMD,

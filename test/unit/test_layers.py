@@ -35,19 +35,14 @@ MAY_IMPORT = {
     # the words of a family; the catalog finds it by its name
     'families': {'catalog'},
     'link': set(),
-    'statistics': {'link'},
-    'bus': {'jobs', 'link', 'silence', 'statistics', 'timers', 'turns'},
-    'silence': {'link'},
-    'timers': set(),
+    'bus': {'link'},
     'signals': set(),
-    'jobs': {'link'},
-    'turns': {'jobs'},
     # who knows a family's words by their names, until these are its profile and its simulator
     'drive': {'bus', 'catalog', 'families', 'link'},
     'simulator': {'catalog', 'families'},
-    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
+    'node': {'bus', 'catalog', 'drive', 'link', 'signals'},
     'demo': {'node'},
-    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
+    'cli': {'bus', 'catalog', 'drive', 'link', 'signals'},
 }
 #: Rooms that may import ROS, and anything else.
 WITH_ROS = {'demo', 'node'}

@@ -34,14 +34,15 @@ import pytest
 from support.addresses import packed
 from support.addresses import register
 
-from nfo_sinus_driver import bus as bus_module
-from nfo_sinus_driver import statistics as statistics_module
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.bus import statistics as statistics_module
+from nfo_sinus_driver.bus import worker as bus_module
+from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
@@ -49,7 +50,6 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.turns import BACKGROUND_SHARE
 
 UNIT = 1
 OTHER = 2

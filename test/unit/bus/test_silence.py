@@ -20,12 +20,12 @@ import math
 
 import pytest
 
+from nfo_sinus_driver.bus.silence import Silences
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.silence import Silences
 
 
 def test_who_is_not_asked_is_not_silent() -> None:

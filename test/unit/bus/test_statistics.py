@@ -23,12 +23,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from nfo_sinus_driver import statistics as module
+from nfo_sinus_driver.bus import statistics as module
+from nfo_sinus_driver.bus.statistics import Recorder
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.statistics import Recorder
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ import pytest
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
-from nfo_sinus_driver import bus as bus_module
+from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import stop_sequence
 from nfo_sinus_driver.drive import watch as watch_module

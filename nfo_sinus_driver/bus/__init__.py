@@ -11,20 +11,14 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+"""Who talks next on one line: the scheduler, what it is given to do, and what it counts."""
 
-"""How exactly a thread is woken."""
+from nfo_sinus_driver.bus.statistics import Statistics
+from nfo_sinus_driver.bus.tasks import Cancelled
+from nfo_sinus_driver.bus.tasks import Priority
+from nfo_sinus_driver.bus.tasks import Slot
+from nfo_sinus_driver.bus.tasks import Task
+from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.bus.worker import Bus
 
-from __future__ import annotations
-
-import ctypes
-
-_PR_SET_TIMERSLACK = 29
-
-
-def tighten_timers() -> None:
-    """Have this thread woken when it asked to be, not 50 microseconds later."""
-    try:
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    except (OSError, AttributeError):
-        # only a little precision is lost
-        return
+__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Statistics', 'Task', 'Transfer']

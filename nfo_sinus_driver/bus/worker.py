@@ -37,16 +37,22 @@ import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.jobs import Cancelled
-from nfo_sinus_driver.jobs import Pause
-from nfo_sinus_driver.jobs import Priority
-from nfo_sinus_driver.jobs import Sleepers
-from nfo_sinus_driver.jobs import Slot
-from nfo_sinus_driver.jobs import Task
-from nfo_sinus_driver.jobs import Transfer
-from nfo_sinus_driver.jobs import inquire
-from nfo_sinus_driver.jobs import log_unexpected
-from nfo_sinus_driver.jobs import read_in_parts
+from nfo_sinus_driver.bus.scheduler import Scheduler
+from nfo_sinus_driver.bus.scheduler import Waiting
+from nfo_sinus_driver.bus.silence import Silences
+from nfo_sinus_driver.bus.statistics import Recorder
+from nfo_sinus_driver.bus.statistics import Statistics
+from nfo_sinus_driver.bus.tasks import Cancelled
+from nfo_sinus_driver.bus.tasks import Pause
+from nfo_sinus_driver.bus.tasks import Priority
+from nfo_sinus_driver.bus.tasks import Sleepers
+from nfo_sinus_driver.bus.tasks import Slot
+from nfo_sinus_driver.bus.tasks import Task
+from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.bus.tasks import inquire
+from nfo_sinus_driver.bus.tasks import log_unexpected
+from nfo_sinus_driver.bus.tasks import read_in_parts
+from nfo_sinus_driver.bus.timers import set_timer_slack
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Keeper
@@ -55,14 +61,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.silence import Silences
-from nfo_sinus_driver.statistics import Recorder
-from nfo_sinus_driver.statistics import Statistics
-from nfo_sinus_driver.timers import tighten_timers
-from nfo_sinus_driver.turns import Turns
-from nfo_sinus_driver.turns import Waiting
-
-__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Statistics', 'Task', 'Transfer']
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -85,7 +83,7 @@ class Bus:
         self._awake = threading.Event()
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
-        self._turns = Turns(
+        self._scheduler = Scheduler(
             self.silences.is_silent,
             lambda unit: self.silences.is_missing(unit, time.monotonic()),
         )
@@ -213,7 +211,7 @@ class Bus:
         awaited = task.awaited
         if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
             return False
-        self._turns.remove(Waiting(task, awaited))
+        self._scheduler.remove(Waiting(task, awaited))
         self._advance(task, reply, None)
         return True
 
@@ -286,7 +284,7 @@ class Bus:
         if task.running:
             task.cancel_due = True
             return
-        self._turns.withdraw(task)
+        self._scheduler.withdraw(task)
         task.asleep = False
         task.pause += 1
         self._advance(task, None, Cancelled())
@@ -306,7 +304,7 @@ class Bus:
             self._take_in()
 
     def _work(self) -> None:
-        tighten_timers()
+        set_timer_slack()
         while not self._stopping:
             try:
                 self._rest(self.step())
@@ -338,7 +336,7 @@ class Bus:
             return min(self._sleepers.next_moment, self._port.reopen_at)
         if self._send_next():
             return -math.inf
-        missing_from = self.silences.missing_from if self._turns.missing_wait else math.inf
+        missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
         return min(self._sleepers.next_moment, missing_from)
 
     def _take_in(self) -> None:
@@ -347,7 +345,7 @@ class Bus:
             if isinstance(item, Task):
                 self._advance(item, None, Cancelled() if self._closed else None)
             elif isinstance(item, Slot):
-                self._turns.add(item)
+                self._scheduler.add(item)
             else:
                 item()
 
@@ -382,13 +380,13 @@ class Bus:
             return
         self._tasks.add(task)
         if isinstance(awaited, Transfer):
-            self._turns.add(Waiting(task, awaited))
+            self._scheduler.add(Waiting(task, awaited))
         else:
             self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
         """Send what is most urgent; false if there is nothing to send."""
-        entry = self._turns.take(missing=time.monotonic() >= self.silences.missing_from)
+        entry = self._scheduler.take(missing=time.monotonic() >= self.silences.missing_from)
         if isinstance(entry, Slot):
             self._write_slot(entry)
         elif entry is not None:
@@ -424,7 +422,7 @@ class Bus:
 
     def _resume(self, task: Task, transfer: Transfer) -> None:
         if task.awaited is transfer:
-            self._turns.add(Waiting(task, transfer))
+            self._scheduler.add(Waiting(task, transfer))
 
     def _later(self, until: float, function: Callable[[], None]) -> None:
         async def wait() -> None:
@@ -461,7 +459,7 @@ class Bus:
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = time.monotonic()
         self.silences.note(unit, now, error, now - started)
-        self._turns.took(now - started)
+        self._scheduler.took(now - started)
         if isinstance(error, PortError):
             self._port.lose(error, now + REOPEN_PERIOD)
         else:
@@ -474,7 +472,7 @@ class Bus:
 
     def _fail_all(self, error: PortError) -> None:
         """Tell everyone who waits that the port is not there."""
-        for entry in self._turns.clear():
+        for entry in self._scheduler.clear():
             if isinstance(entry, Slot):
                 self._fail_slot(entry, error)
             elif entry.task.awaited is entry.transfer:

@@ -26,12 +26,12 @@ from collections.abc import Iterator
 from typing import Literal
 from typing import NamedTuple
 
-from nfo_sinus_driver.jobs import Priority
-from nfo_sinus_driver.jobs import Slot
-from nfo_sinus_driver.jobs import Task
-from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.bus.tasks import Priority
+from nfo_sinus_driver.bus.tasks import Slot
+from nfo_sinus_driver.bus.tasks import Task
+from nfo_sinus_driver.bus.tasks import Transfer
 
-__all__ = ['BACKGROUND_SHARE', 'Turns', 'Waiting']
+__all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 
 #: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above asks
 #: for more; of the time that set-points leave, for else these would take nearly all from the polls.
@@ -70,7 +70,7 @@ class Waiting(NamedTuple):
     transfer: Transfer
 
 
-class Turns:
+class Scheduler:
     """
     What waits for the line, the next one in front.
 

@@ -25,13 +25,13 @@ import pytest
 from support.addresses import packed
 from support.addresses import register
 
-from nfo_sinus_driver.jobs import Priority
-from nfo_sinus_driver.jobs import Slot
-from nfo_sinus_driver.jobs import Task
-from nfo_sinus_driver.jobs import Transfer
-from nfo_sinus_driver.turns import BACKGROUND_SHARE
-from nfo_sinus_driver.turns import Turns
-from nfo_sinus_driver.turns import Waiting
+from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE
+from nfo_sinus_driver.bus.scheduler import Scheduler
+from nfo_sinus_driver.bus.scheduler import Waiting
+from nfo_sinus_driver.bus.tasks import Priority
+from nfo_sinus_driver.bus.tasks import Slot
+from nfo_sinus_driver.bus.tasks import Task
+from nfo_sinus_driver.bus.tasks import Transfer
 
 _SLOT = 'slot'
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
@@ -57,15 +57,15 @@ def kind_of(taken: Slot | Waiting | None) -> object:
 
 def without_end(kinds: Iterable[object], took: dict[object, float]) -> list[object]:
     """Return who goes when each asks again as soon as it has been on the line."""
-    turns = Turns()
+    scheduler = Scheduler()
     for kind in kinds:
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     went = []
     for _ in range(_TURNS):
-        kind = kind_of(turns.take())
-        turns.took(took.get(kind, _READ))
+        kind = kind_of(scheduler.take())
+        scheduler.took(took.get(kind, _READ))
         went.append(kind)
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     return went
 
 
@@ -78,13 +78,13 @@ def share(went: list[object], took: dict[object, float]) -> dict[Any, float]:
 
 
 def test_most_urgent_goes_first() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for kind in (*sorted(Priority, reverse=True), _SLOT):
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     went = []
-    while (taken := turns.take()) is not None:
+    while (taken := scheduler.take()) is not None:
         went.append(kind_of(taken))
-        turns.took(0.0)
+        scheduler.took(0.0)
     assert went[:6] == [
         Priority.STOP,
         _SLOT,
@@ -98,15 +98,15 @@ def test_most_urgent_goes_first() -> None:
 
 @pytest.mark.parametrize('kind', [*Priority, _SLOT])
 def test_equals_go_in_the_order_they_came(kind: object) -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     entries = [entry(kind, str(number)) for number in range(5)]
     for waiting in entries:
-        turns.add(waiting)
-    assert [turns.take() for _ in range(6)] == [*entries, None]
+        scheduler.add(waiting)
+    assert [scheduler.take() for _ in range(6)] == [*entries, None]
 
 
 def test_who_is_told_to_stop_goes_before_who_is_asked_whether_he_does() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     look = entry(Priority.STOP, 'look')
     address = register(1)
     stops = [
@@ -114,8 +114,8 @@ def test_who_is_told_to_stop_goes_before_who_is_asked_whether_he_does() -> None:
         for name in ('1', '2')
     ]
     for waiting in (look, *stops):
-        turns.add(waiting)
-    assert [turns.take() for _ in range(3)] == [*stops, look]
+        scheduler.add(waiting)
+    assert [scheduler.take() for _ in range(3)] == [*stops, look]
 
 
 # --- the background -------------------------------------------------------------------------------
@@ -150,22 +150,22 @@ def test_set_points_without_end_halve_the_turns_of_polls_and_background_alike(
 
 def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     silent, timeout = {7, 8}, 0.2
-    turns = Turns(silent.__contains__)
+    scheduler = Scheduler(silent.__contains__)
     polls = {unit: Transfer(unit, register(1), Priority.POLL) for unit in (1, 2, 7, 8)}
     for transfer in polls.values():
-        turns.add(Waiting(cast(Task, ''), transfer))
+        scheduler.add(Waiting(cast(Task, ''), transfer))
     took: Counter[int] = Counter()
     gaps, gap = [], 0.0
     while sum(took.values()) < 60.0:
-        taken = turns.take()
+        taken = scheduler.take()
         assert isinstance(taken, Waiting)
         unit = taken.transfer.unit
         seconds = timeout if unit in silent else _READ
-        turns.took(seconds)
+        scheduler.took(seconds)
         took[unit] += seconds
         gap = gap + seconds if unit in silent else 0.0
         gaps.append(gap)
-        turns.add(taken)
+        scheduler.add(taken)
     assert took[7] + took[8] == pytest.approx(30.0, rel=0.02)
     assert took[7] == pytest.approx(took[8], rel=0.02)
     # and one time-out at a time
@@ -173,11 +173,11 @@ def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
 
 
 def test_units_that_do_not_answer_wait_for_nobody_when_nobody_else_waits() -> None:
-    turns = Turns(lambda unit: True)
+    scheduler = Scheduler(lambda unit: True)
     for _ in range(10):
-        turns.add(entry(Priority.POLL))
-        assert kind_of(turns.take()) == Priority.POLL
-        turns.took(0.2)
+        scheduler.add(entry(Priority.POLL))
+        assert kind_of(scheduler.take()) == Priority.POLL
+        scheduler.took(0.2)
 
 
 def test_what_only_a_part_of_the_background_wants_goes_to_no_other() -> None:
@@ -186,49 +186,49 @@ def test_what_only_a_part_of_the_background_wants_goes_to_no_other() -> None:
 
 
 def test_who_asked_for_nothing_is_owed_little() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for _ in range(1000):
-        turns.add(entry(Priority.POLL))
-        turns.take()
-        turns.took(0.2)
+        scheduler.add(entry(Priority.POLL))
+        scheduler.take()
+        scheduler.took(0.2)
     for kind in (Priority.POLL, *_BACKGROUND):
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     went = []
     for _ in range(3):
-        went.append(kind_of(turns.take()))
-        turns.took(_READ)
+        went.append(kind_of(scheduler.take()))
+        scheduler.took(_READ)
     # one request of each
     assert set(went[:2]) == set(_BACKGROUND)
     assert went[2] == Priority.POLL
 
 
 def test_background_that_waited_long_does_not_keep_the_line_for_long() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for kind in (*[Priority.STOP] * 1000, *[Priority.TELEMETRY] * 1000, Priority.POLL):
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     for _ in range(1000):
-        turns.take()
-        turns.took(_READ)
+        scheduler.take()
+        scheduler.took(_READ)
     passed = 0.0
-    while kind_of(turns.take()) != Priority.POLL:
-        turns.took(_READ)
+    while kind_of(scheduler.take()) != Priority.POLL:
+        scheduler.took(_READ)
         passed += _READ
     # what it earns in half a second
     assert passed <= 0.1 + _READ
 
 
 def test_background_on_an_idle_line_makes_no_debt() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for _ in range(1000):
-        turns.add(entry(Priority.TELEMETRY))
-        turns.take()
-        turns.took(_READ)
-    turns.add(entry(Priority.TELEMETRY))
+        scheduler.add(entry(Priority.TELEMETRY))
+        scheduler.take()
+        scheduler.took(_READ)
+    scheduler.add(entry(Priority.TELEMETRY))
     went = []
     for _ in range(10):
-        turns.add(entry(Priority.POLL))
-        went.append(kind_of(turns.take()))
-        turns.took(_READ)
+        scheduler.add(entry(Priority.POLL))
+        went.append(kind_of(scheduler.take()))
+        scheduler.took(_READ)
     assert went.index(Priority.TELEMETRY) <= 7
 
 
@@ -236,49 +236,49 @@ def test_background_on_an_idle_line_makes_no_debt() -> None:
 
 
 def test_set_point_goes_before_all_that_the_background_is_owed() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for kind in (Priority.POLL, *[Priority.TELEMETRY] * 10):
-        turns.add(entry(kind))
-    turns.take()
-    turns.took(10.0)
-    turns.take()
-    turns.took(_READ)
-    turns.add(entry(_SLOT))
-    assert kind_of(turns.take()) == _SLOT
-    turns.took(_READ)
+        scheduler.add(entry(kind))
+    scheduler.take()
+    scheduler.took(10.0)
+    scheduler.take()
+    scheduler.took(_READ)
+    scheduler.add(entry(_SLOT))
+    assert kind_of(scheduler.take()) == _SLOT
+    scheduler.took(_READ)
     # and then it goes on with what it is owed
-    turns.add(entry(_SLOT))
-    turns.add(entry(Priority.POLL))
-    assert kind_of(turns.take()) == Priority.TELEMETRY
+    scheduler.add(entry(_SLOT))
+    scheduler.add(entry(Priority.POLL))
+    assert kind_of(scheduler.take()) == Priority.TELEMETRY
 
 
 @pytest.mark.parametrize('kind', [Priority.SERVICE, Priority.POLL])
 def test_set_points_without_end_leave_every_other_turn_to_the_others(kind: Priority) -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for _ in range(20):
-        turns.add(entry(_SLOT))
-        turns.add(entry(kind))
+        scheduler.add(entry(_SLOT))
+        scheduler.add(entry(kind))
     went = []
     for _ in range(10):
-        went.append(kind_of(turns.take()))
-        turns.took(_READ)
+        went.append(kind_of(scheduler.take()))
+        scheduler.took(_READ)
     assert went == [_SLOT, kind] * 5
 
 
 def test_stop_goes_before_a_set_point() -> None:
-    turns = Turns()
-    turns.add(entry(_SLOT))
-    turns.add(entry(Priority.STOP))
-    assert kind_of(turns.take()) == Priority.STOP
+    scheduler = Scheduler()
+    scheduler.add(entry(_SLOT))
+    scheduler.add(entry(Priority.STOP))
+    assert kind_of(scheduler.take()) == Priority.STOP
 
 
 def test_set_point_that_was_not_sent_had_no_turn() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     for kind in (_SLOT, _SLOT, Priority.POLL):
-        turns.add(entry(kind))
+        scheduler.add(entry(kind))
     # the first has nothing to say any more
-    turns.take()
-    assert kind_of(turns.take()) == _SLOT
+    scheduler.take()
+    assert kind_of(scheduler.take()) == _SLOT
 
 
 def stop_of(unit: int) -> Waiting:
@@ -289,53 +289,53 @@ def stop_of(unit: int) -> Waiting:
 
 def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
     silent, poll, other = stop_of(2), entry(Priority.POLL), stop_of(3)
-    turns = Turns(lambda unit: unit == 2)
-    turns.add(silent)
-    assert turns.take() is silent
-    turns.took(0.2)
+    scheduler = Scheduler(lambda unit: unit == 2)
+    scheduler.add(silent)
+    assert scheduler.take() is silent
+    scheduler.took(0.2)
     for waiting in (silent, poll):
-        turns.add(waiting)
-    assert turns.take() is poll
-    turns.took(_READ)
-    assert turns.take() is silent
-    turns.took(0.2)
+        scheduler.add(waiting)
+    assert scheduler.take() is poll
+    scheduler.took(_READ)
+    assert scheduler.take() is silent
+    scheduler.took(0.2)
     # nobody else waits
-    turns.add(silent)
-    assert turns.take() is silent
-    turns.took(0.2)
+    scheduler.add(silent)
+    assert scheduler.take() is silent
+    scheduler.took(0.2)
     # a stop of somebody else goes first of all
     for waiting in (silent, poll, other):
-        turns.add(waiting)
-    assert turns.take() is other
+        scheduler.add(waiting)
+    assert scheduler.take() is other
 
 
 @pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE, Priority.SETPOINT])
 def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
     kind: Priority,
 ) -> None:
-    turns = Turns({2, 4}.__contains__)
+    scheduler = Scheduler({2, 4}.__contains__)
     urgent, silent = entry(kind), stop_of(2)
     retry = Waiting(cast(Task, 'retry'), Transfer(4, register(1), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
-        turns.add(waiting)
+        scheduler.add(waiting)
     # it costs so much that everybody else has a claim on the line
     for _ in range(5):
-        turns.add(silent)
-        assert turns.take() is silent
-        turns.took(0.2)
-        turns.add(urgent)
-        assert turns.take() is urgent
-        turns.took(_READ)
+        scheduler.add(silent)
+        assert scheduler.take() is silent
+        scheduler.took(0.2)
+        scheduler.add(urgent)
+        assert scheduler.take() is urgent
+        scheduler.took(_READ)
 
 
 def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
-    turns = Turns(lambda unit: False)
+    scheduler = Scheduler(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]
     for waiting in (*stops, entry(Priority.POLL)):
-        turns.add(waiting)
+        scheduler.add(waiting)
     for stop in stops:
-        assert turns.take() is stop
-        turns.took(_READ)
+        assert scheduler.take() is stop
+        scheduler.took(_READ)
 
 
 # --- leaving --------------------------------------------------------------------------------------
@@ -348,16 +348,16 @@ def poll_of(unit: int) -> Waiting:
 
 def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
     missing, other = poll_of(7), poll_of(1)
-    turns = Turns({7}.__contains__, {7}.__contains__)
-    assert not turns.missing_wait
-    turns.add(missing)
-    turns.add(other)
-    assert turns.missing_wait
-    assert turns.take(missing=False) is other
-    assert turns.take(missing=False) is None
-    turns.add(other)
-    assert turns.take() is missing
-    assert not turns.missing_wait
+    scheduler = Scheduler({7}.__contains__, {7}.__contains__)
+    assert not scheduler.missing_wait
+    scheduler.add(missing)
+    scheduler.add(other)
+    assert scheduler.missing_wait
+    assert scheduler.take(missing=False) is other
+    assert scheduler.take(missing=False) is None
+    scheduler.add(other)
+    assert scheduler.take() is missing
+    assert not scheduler.missing_wait
 
 
 @pytest.mark.parametrize('kind', [Priority.POLL, *_BACKGROUND])
@@ -365,45 +365,45 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
     kind: Priority,
 ) -> None:
     missing: set[int] = set()
-    turns = Turns(missing.__contains__, missing.__contains__)
+    scheduler = Scheduler(missing.__contains__, missing.__contains__)
     waiting = Waiting(cast(Task, 'asks'), Transfer(7, register(1), kind))
-    turns.add(waiting)
+    scheduler.add(waiting)
     missing.add(7)
-    assert turns.take(missing=False) is None
-    assert turns.missing_wait
-    assert turns.take() is waiting
-    turns.add(waiting)
+    assert scheduler.take(missing=False) is None
+    assert scheduler.missing_wait
+    assert scheduler.take() is waiting
+    scheduler.add(waiting)
     missing.clear()
     # it answers again, and is nothing special any more
-    assert turns.take() is waiting
+    assert scheduler.take() is waiting
 
 
 def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() -> None:
     silent: set[int] = {7}
-    turns = Turns(silent.__contains__, silent.__contains__)
+    scheduler = Scheduler(silent.__contains__, silent.__contains__)
     first, again, other = stop_of(7), stop_of(7), stop_of(2)
-    turns.add(first)
-    assert turns.take(missing=False) is first
-    turns.took(0.2)
-    turns.add(again)
-    turns.add(other)
-    assert turns.take(missing=False) is other
-    turns.took(_READ)
-    assert turns.take(missing=False) is None
-    assert turns.take() is again
-    turns.took(0.2)
+    scheduler.add(first)
+    assert scheduler.take(missing=False) is first
+    scheduler.took(0.2)
+    scheduler.add(again)
+    scheduler.add(other)
+    assert scheduler.take(missing=False) is other
+    scheduler.took(_READ)
+    assert scheduler.take(missing=False) is None
+    assert scheduler.take() is again
+    scheduler.took(0.2)
     # it has been back meanwhile: this stop is a first one again
     silent.clear()
-    turns.add(poll_of(7))
-    assert turns.take(missing=False) is not None
-    turns.took(_READ)
+    scheduler.add(poll_of(7))
+    assert scheduler.take(missing=False) is not None
+    scheduler.took(_READ)
     silent.add(7)
-    turns.add(again)
-    assert turns.take(missing=False) is again
+    scheduler.add(again)
+    assert scheduler.take(missing=False) is again
 
 
 def test_what_a_task_waits_for_can_be_withdrawn() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     slot = entry(_SLOT)
     for waiting in (
         entry(Priority.POLL, 'mine'),
@@ -412,37 +412,37 @@ def test_what_a_task_waits_for_can_be_withdrawn() -> None:
         entry(Priority.STOP, 'mine'),
         entry(Priority.POLL, 'mine'),
     ):
-        turns.add(waiting)
-    turns.withdraw(cast(Task, 'mine'))
-    assert turns.take() is slot
-    left = turns.take()
+        scheduler.add(waiting)
+    scheduler.withdraw(cast(Task, 'mine'))
+    assert scheduler.take() is slot
+    left = scheduler.take()
     assert isinstance(left, Waiting) and left.task == cast(Task, 'other')
-    assert turns.take() is None
+    assert scheduler.take() is None
 
 
 def test_everything_can_be_taken_out_at_once() -> None:
-    turns = Turns()
+    scheduler = Scheduler()
     entries = [entry(kind, str(kind)) for kind in (*Priority, _SLOT)]
     for waiting in entries:
-        turns.add(waiting)
-    cleared = turns.clear()
+        scheduler.add(waiting)
+    cleared = scheduler.clear()
     assert sorted(map(id, cleared)) == sorted(map(id, entries))
-    assert turns.take() is None
+    assert scheduler.take() is None
 
 
 def test_a_stop_in_vain_goes_ahead_again_once_the_unit_answers() -> None:
     missing = {7}
-    turns = Turns(missing.__contains__, missing.__contains__)
-    turns.add(stop_of(7))
-    turns.take()
-    turns.took(0.1)
+    scheduler = Scheduler(missing.__contains__, missing.__contains__)
+    scheduler.add(stop_of(7))
+    scheduler.take()
+    scheduler.took(0.1)
     repeated, before, other = stop_of(7), poll_of(1), poll_of(1)
-    turns.add(repeated)
-    turns.add(before)
-    assert turns.take(missing=False) is before
-    turns.took(_READ)
-    turns.add(other)
+    scheduler.add(repeated)
+    scheduler.add(before)
+    assert scheduler.take(missing=False) is before
+    scheduler.took(_READ)
+    scheduler.add(other)
     # somebody else has asked it meanwhile
     missing.clear()
-    assert turns.take(missing=False) is repeated
-    assert turns.take(missing=False) is other
+    assert scheduler.take(missing=False) is repeated
+    assert scheduler.take(missing=False) is other
