@@ -24,7 +24,9 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.errors import DriveError
@@ -33,14 +35,25 @@ from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 #: How often a busy drive is told again, and for how long, s.
 _BUSY_PERIOD = 0.05
 _LONGEST_BUSY = 0.5
+
+
+def require_known(procedure: Procedure, model: Family) -> None:
+    """
+    See to it that a model has a procedure.
+
+    :raises DriveError: it has no command for it.
+    """
+    if not model.profile.methods_with(procedure):
+        raise DriveError(
+            f'{procedure.value} is not known of this model ({model.name}): its manual lists no '
+            'command for it; do it at the keypad'
+        )
 
 
 class Errands:
@@ -58,11 +71,10 @@ class Errands:
         self._registers = registers
         self._motion = motion
 
-    def require(self, what: str) -> Motion:
+    def require(self, procedure: Procedure) -> Motion:
         """
         Return who lends the drive for an errand.
 
-        :param what: the errand, in words that go before "needs SCMD".
         :raises DriveError: the drive has no such errand, or its control method is another.
         """
         if self._motion is None:
@@ -70,28 +82,26 @@ class Errands:
         inverter = self._inverter
         if not inverter.connected:
             raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
-        if not inverter.has(inverter.model.key(Role.START_COMMAND)):
+        require_known(procedure, inverter.model)
+        profile, what = inverter.model.profile, procedure.value
+        have = profile.methods_with(procedure)
+        if inverter.settings.control_method not in have:
             raise DriveError(
-                f'{what} is not known of this model ({inverter.model.name}): [M1] lists no command '
-                'for it; do it at the keypad'
-            )
-        if inverter.settings.control_method != 'mode_scmd':
-            raise DriveError(
-                f'{what} needs SCMD, and one session does not mix control methods: '
-                'clean up, set control_method to mode_scmd and configure again'
+                f'{what} needs {profile.methods[have[0]].means}, and one session does not mix '
+                f'control methods: clean up, set control_method to {have[0]} and configure again'
             )
         self._require_idle(what, self._motion)
         return self._motion
 
     @contextlib.contextmanager
-    def lent(self, what: str) -> Iterator[Loan]:
+    def lent(self, procedure: Procedure) -> Iterator[Loan]:
         """
         Have the drive for an errand, from its first preparations on: whoever stops it ends both.
 
         :raises DriveError: it cannot be had, and why.
         """
-        self.require(what)
-        with self.had(what) as loan:
+        self.require(procedure)
+        with self.had(procedure.value) as loan:
             yield loan
 
     @contextlib.contextmanager
@@ -153,9 +163,9 @@ class Errands:
             return ''
         return await self._motion.stop()
 
-    async def tell(self, loan: Loan, command: Scmd) -> None:
+    async def tell(self, loan: Loan, procedure: Procedure) -> None:
         """
-        Write SCMD; once, for nobody knows what has happened before a second one.
+        Have the drive begin; once, for nobody knows what has happened before a second time.
 
         It waits for its turn with the stops, so that one which comes later does not overtake it,
         and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
@@ -163,16 +173,12 @@ class Errands:
 
         :raises DriveError: it was stopped meanwhile.
         """
+        motion = self._motion
+        assert motion is not None
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
             try:
-                await self._registers.write(
-                    self._inverter.model.key(Role.START_COMMAND),
-                    command,
-                    Priority.STOP,
-                    once=True,
-                    require_wanted=loan.require_wanted,
-                )
+                await motion.method.begin(procedure, loan.require_wanted)
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
@@ -189,20 +195,18 @@ class Errands:
         if motion.stopping and not motion.taking_back.held_by_fault:
             raise DriveError(f'{what}: a stop is not confirmed yet')
 
-    async def _take(self, loan: Loan, motion: Motion) -> Mode:
+    async def _take(self, loan: Loan, motion: Motion) -> Holder:
         inverter, what = self._inverter, loan.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
-        key = self._inverter.model.key(Role.CONTROL_SOURCE)
-        mode = int(await self._registers.read_number(key, Priority.SERVICE))
-        if mode == Mode.INHIBIT:
+        found = await motion.method.holder(Priority.SERVICE)
+        if found is Holder.INHIBITED:
             raise DriveError(
-                f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
-                'Inhibit)'
+                f'{what}: the drive lets nobody take control now ({inverter.describe()})'
             )
         if seen.driven:
             raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')
-        if mode not in (Mode.STOP, Mode.BUS):
+        if found not in (Holder.NOBODY, Holder.BUS):
             raise DriveError(
                 f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
                 'back to them could start the motor: press STOP at the drive first'
@@ -214,15 +218,15 @@ class Errands:
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
-                    await self._give_back(motion, Mode(mode))
+                    await self._give_back(motion, found)
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
             # no manual says that a drive has forgotten what it was told before
             await motion.method.stop(control_mode)
             await self._bus.sleep(withdrawal.LOOK_PERIOD)
-        return Mode(mode)
+        return found
 
-    async def _give_back(self, motion: Motion, found: Mode) -> None:
+    async def _give_back(self, motion: Motion, found: Holder) -> None:
         """Take the command back, and control too where nobody had it; not while a fault stands."""
         await motion.take_back()
-        if found is Mode.STOP and not motion.taking_back.held_by_fault:
+        if found is Holder.NOBODY and not motion.taking_back.held_by_fault:
             await motion.method.release()

@@ -25,6 +25,7 @@ import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.errand import Errands
@@ -33,7 +34,6 @@ from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -175,11 +175,11 @@ class ErrorLog:
 
         :raises DriveError: it was not erased, and why.
         """
-        what = 'erasing the error log'
-        with self._errands.lent(what) as loan:
+        procedure = Procedure.ERASE_ERROR_LOG
+        with self._errands.lent(procedure) as loan:
             area = self._area()
             async with self._errands.sent(loan):
-                await self._errands.tell(loan, Scmd.ERASE_E_LOG)
+                await self._errands.tell(loan, procedure)
                 if code_of(await self._entry(area, 0)):
                     raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
@@ -190,18 +190,18 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
-        self._errands.require(what)
+        procedure, energy = Procedure.RESET_ENERGY, self._inverter.model.key(Role.ENERGY)
+        self._errands.require(procedure)
         if not self._inverter.has(energy):
-            told = self._inverter.identity
+            since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                f'{what} came with firmware 4.38; this drive has '
+                f'{procedure.value} came with firmware {float(since or 0):.2f}; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        with self._errands.lent(what) as loan:
+        with self._errands.lent(procedure) as loan:
             async with self._errands.sent(loan):
                 before = await self._registers.read_number(energy, Priority.SERVICE)
-                await self._errands.tell(loan, Scmd.RESET_E_OUT)
+                await self._errands.tell(loan, procedure)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')

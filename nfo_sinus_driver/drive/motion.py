@@ -42,7 +42,7 @@ from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
 from nfo_sinus_driver.drive.advice import require_no_fault
-from nfo_sinus_driver.drive.control_method import ControlMethod
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.loan import Loan
@@ -58,7 +58,7 @@ class Motion:
     """Arms, stops and watches one drive."""
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, method: ControlMethod, setpoint: Setpoint
+        self, bus: Bus, inverter: Inverter, method: Commands, setpoint: Setpoint
     ) -> None:
         self._bus = bus
         self._inverter = inverter
@@ -96,7 +96,7 @@ class Motion:
         return self._withdrawal
 
     @property
-    def method(self) -> ControlMethod:
+    def method(self) -> Commands:
         """How the drive is commanded, for who has it on loan."""
         return self._method
 

@@ -23,8 +23,8 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.drive.control_method import ControlMethod
-from nfo_sinus_driver.drive.control_method import Removal
+from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -77,7 +77,7 @@ class Withdrawal:
         self,
         bus: Bus,
         inverter: Inverter,
-        method: ControlMethod,
+        method: Commands,
         done: Callable[[], None],
     ) -> None:
         self._bus = bus
