@@ -43,6 +43,6 @@ async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
         stop = model.profile.broadcast_stop
         if stop is not None:
             parameter = model[stop.key]
-            place = parameter.at(bus.space)
-            words = parameter.encode(stop.value, bus.space)
-            await bus.write(EVERYBODY, Address(place.numbers, place.words), words, Priority.STOP)
+            address = Address(*parameter.at(bus.space).place)
+            data = parameter.encode(stop.value, bus.space)
+            await bus.write(EVERYBODY, address, data, Priority.STOP)

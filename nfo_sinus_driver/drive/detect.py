@@ -64,9 +64,9 @@ def _speaks(model: Family, protocol: str) -> bool:
 
 
 async def _has(bus: Bus, unit: int, model: Family, key: str) -> bool:
-    place = model[key].at(bus.space)
+    address = Address(*model[key].at(bus.space).place)
     try:
-        await bus.read(unit, Address(place.numbers, place.words), Priority.SERVICE)
+        await bus.read(unit, address, Priority.SERVICE)
     except Refused:
         return False
     return True

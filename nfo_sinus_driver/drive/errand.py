@@ -202,7 +202,8 @@ class Errands:
         found = await motion.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
             raise DriveError(
-                f'{what}: the drive lets nobody take control now ({inverter.describe()})'
+                f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
+                'Inhibit)'
             )
         if seen.driven:
             raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')

@@ -27,7 +27,6 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -126,8 +125,8 @@ class ErrorLog:
         """
         area = self._area()
         limit = min(most or area.entries, area.limit)
-        words = await self._read(area, limit, 0, Priority.POLL)
-        return self.understood(words, await self.read_time(Priority.POLL))
+        entries = await self._read(area, limit, 0, Priority.POLL)
+        return self.understood(entries, await self.read_time(Priority.POLL))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
@@ -219,10 +218,10 @@ class ErrorLog:
     ) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
         for _ in range(_TRIES):
-            words = await self._read_down(area, limit, known, priority)
+            entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
-            if not words or await self._entry(area, 0, priority) == words[0]:
-                return words
+            if not entries or await self._entry(area, 0, priority) == entries[0]:
+                return entries
         raise DriveError('the drive writes into its error log all the time: try again')
 
     async def _read_down(
@@ -247,10 +246,10 @@ class ErrorLog:
     ) -> int:
         """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
         # nobody waits for what is read in the background, so it is not asked for again at once
-        words = await self._registers.read_from(
-            Address(area.numbers(number), area.words), priority, once=priority > Priority.POLL
+        data = await self._registers.read_from(
+            Address(*area.place(number)), priority, once=priority > Priority.POLL
         )
-        return area.codec.decode(to_bytes(words))
+        return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
         code, then = code_of(entry), hours_of(entry)

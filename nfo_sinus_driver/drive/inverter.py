@@ -42,7 +42,6 @@ from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
@@ -158,7 +157,7 @@ class Inverter:
         if told is None:
             word, at = await self._read_word(priority, once)
         else:
-            word, at = self.status_word(told.words), told.arrived
+            word, at = self.status_word(told.data), told.arrived
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -188,16 +187,16 @@ class Inverter:
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
         reply = await self._registers.read_reply(self.word_key, priority, once=once)
-        return self.status_word(reply.words), reply.arrived
+        return self.status_word(reply.data), reply.arrived
 
     @property
     def word_key(self) -> str:
         """The parameter that a status begins with; ``''`` if the model has none."""
         return self.model.key(Role.STATUS_WORD)
 
-    def status_word(self, words: Words) -> int:
+    def status_word(self, data: bytes) -> int:
         """Return what counts of a status word: the upper half is described nowhere [C24]."""
-        return int(self._registers.number(self.word_key, words)) & 0xFFFF
+        return int(self._registers.number(self.word_key, data)) & 0xFFFF
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
@@ -247,8 +246,8 @@ class Inverter:
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
-        words = await self._registers.read_words(key, priority, once=True)
-        value = self._registers.number(key, words)
+        data = await self._registers.read_data(key, priority, once=True)
+        value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
             return value
         if key not in self._told_impossible:
@@ -288,9 +287,9 @@ class Inverter:
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
         stop = self.model.key(Role.STOP_AT_TIMEOUT)
         self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
-        words = await self._registers.read_words(stop, Priority.SERVICE)
+        data = await self._registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = words == self._registers.words(stop, True)
+        self.auto_stop = data == self._registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """

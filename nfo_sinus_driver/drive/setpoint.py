@@ -39,7 +39,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s: somebody else may
 #: have changed it meanwhile.
@@ -117,7 +116,7 @@ class Setpoint:
         self._keys: dict[Address, str] = {}
         self._armed_at = math.inf
         #: What stands in the drive and since when, by where; nothing where that is not known.
-        self._written: dict[Address, tuple[Words, float]] = {}
+        self._written: dict[Address, tuple[bytes, float]] = {}
         self._watch: Task | None = None
         #: What reads back whether the drive took what was told to all, and when it last did.
         self._reading_back: Task | None = None
@@ -178,9 +177,9 @@ class Setpoint:
         self._keys, self._written = {}, {}
         if self._target is not None:
             for step in self._target.writes(0.0):
-                address, words = self._registers.target(step)
+                address, data = self._registers.target(step)
                 self._keys[address] = step.key
-                self._written[address] = words, self._armed_at
+                self._written[address] = data, self._armed_at
         self.commanded = 0.0 if follows else NAN
         self.clamped = False
         self._expired = False
@@ -261,27 +260,27 @@ class Setpoint:
         self._shared = request
         self._bus.request(self._slot)
 
-    def due(self, request: Request) -> list[tuple[Address, Words]]:
+    def due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
         assert self._target is not None
         now, period = time.monotonic(), self._rewrite_period
-        found: list[tuple[Address, Words]] = []
+        found: list[tuple[Address, bytes]] = []
         for step in self._target.writes(self._limited(request)):
-            address, words = self._registers.target(step)
-            before, since = self._written.get(address, ((), -math.inf))
-            if words != before or now - since >= period:
-                found.append((address, words))
+            address, data = self._registers.target(step)
+            before, since = self._written.get(address, (b'', -math.inf))
+            if data != before or now - since >= period:
+                found.append((address, data))
         return found
 
-    def was_told(self, address: Address, words: Words) -> None:
+    def was_told(self, address: Address, data: bytes) -> None:
         """Take note of what was written to all drives; it is read back whether this one took it."""
         if not self._inverter.answering:
             # it gets its own when it answers
             self._written = {}
             self._waits_for_answer = True
             return
-        changed = address not in self._written or words != self._written[address][0]
-        self._take_note(address, words)
+        changed = address not in self._written or data != self._written[address][0]
+        self._take_note(address, data)
         if changed and self._reading_back is None:
             self._reading_back = self._bus.spawn(self._read_back())
 
@@ -291,7 +290,7 @@ class Setpoint:
         await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - time.monotonic())
         self._read_back_at = time.monotonic()
         try:
-            kept = await self._registers.read_words(key, Priority.POLL, once=True)
+            kept = await self._registers.read_data(key, Priority.POLL, once=True)
         except LinkError as error:
             self.was_missed(error)
             return
@@ -346,36 +345,36 @@ class Setpoint:
         if not due:
             return None
         # of several writes each has a turn of its own, and a newer set-point comes between
-        address, words = due[0]
+        address, data = due[0]
         if self._combining is _Combining.GIVEN_UP or len(due) > 1:
-            return self._bus.write(self._unit, address, words, Priority.SETPOINT)
+            return self._bus.write(self._unit, address, data, Priority.SETPOINT)
         status = self._registers.address(self._inverter.word_key)
-        return self._bus.write_and_read(self._unit, address, words, status, Priority.SETPOINT)
+        return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
-            assert transfer.words is not None
+            assert transfer.data is not None
             if transfer.source is not None:
                 self._combining = _Combining.TAKEN
-            self._take_note(transfer.address, transfer.words)
+            self._take_note(transfer.address, transfer.data)
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
         elif transfer.source is not None and self._gives_up_combining(error):
             # what is wrong with the set-point itself, if anything is, the drive says now
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
-            assert transfer.words is not None
-            asked = self._meant({**self._standing, transfer.address: transfer.words})
+            assert transfer.data is not None
+            asked = self._meant({**self._standing, transfer.address: transfer.data})
             self._refused(f'it refused set-point {asked:g}: {error}')
         else:
             self.was_missed(error)
 
-    def _take_note(self, address: Address, words: Words) -> None:
-        """Take note that these words stand in the drive now."""
+    def _take_note(self, address: Address, data: bytes) -> None:
+        """Take note that these bytes stand in the drive now."""
         self._busy_since = math.inf
-        self._written[address] = words, time.monotonic()
+        self._written[address] = data, time.monotonic()
         if len(self._written) == len(self._keys):
             self.commanded = self._meant(self._standing)
 
@@ -415,12 +414,12 @@ class Setpoint:
         return now < self._busy_since + _LONGEST_BUSY
 
     @property
-    def _standing(self) -> dict[Address, Words]:
+    def _standing(self) -> dict[Address, bytes]:
         """What stands in the drive, as far as that is known."""
-        return {address: words for address, (words, _) in self._written.items()}
+        return {address: data for address, (data, _) in self._written.items()}
 
-    def _meant(self, standing: Mapping[Address, Words]) -> float:
-        """Return the set-point that words mean to the drive, after its own rounding."""
+    def _meant(self, standing: Mapping[Address, bytes]) -> float:
+        """Return the set-point that bytes mean to the drive, after its own rounding."""
         assert self._target is not None
         if len(standing) < len(self._keys):
             return NAN
@@ -470,8 +469,8 @@ class Setpoint:
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
-                address, words = self._registers.target(step)
-                self._written[address] = words, time.monotonic()
+                address, data = self._registers.target(step)
+                self._written[address] = data, time.monotonic()
                 self._busy_since = math.inf
             if self._request is before:
                 self.commanded = 0.0

@@ -111,8 +111,8 @@ class SetpointAll:
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         for setpoint in self._setpoints().values():
             if error is None:
-                assert transfer.words is not None
-                setpoint.was_told(transfer.address, transfer.words)
+                assert transfer.data is not None
+                setpoint.was_told(transfer.address, transfer.data)
             else:
                 setpoint.was_missed(error)
 

@@ -159,15 +159,15 @@ class Watch:
         It is the answer to a look that waits for it; else it begins one at once, if it is news.
         """
         inverter, registers = self._inverter, self._registers
-        if self._task is None or not inverter.connected or not reply.words:
+        if self._task is None or not inverter.connected or not reply.data:
             return
         place = registers.address(inverter.word_key)
         if self._bus.answer(self._task, inverter.settings.address, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
-        if not registers.can_be(inverter.word_key, reply.words):
+        if not registers.can_be(inverter.word_key, reply.data):
             return
-        if inverter.seen and inverter.status_word(reply.words) != inverter.seen.word:
+        if inverter.seen and inverter.status_word(reply.data) != inverter.seen.word:
             self._told = reply
             self.wake()
 

@@ -28,8 +28,6 @@ import math
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -148,14 +146,14 @@ class Memory:
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]
-        words = parameter.encode(value, home(parameter))
-        self._raw[key] = parameter.at(home(parameter)).number.decode(to_bytes(words))
+        data = parameter.encode(value, home(parameter))
+        self._raw[key] = parameter.at(home(parameter)).number.decode(data)
 
     @staticmethod
     def show(parameter: Parameter, raw: int) -> Value:
         """Turn a raw number of this memory into engineering units."""
         protocol = home(parameter)
-        return parameter.decode(to_words(parameter.at(protocol).number.encode(raw)), protocol)
+        return parameter.decode(parameter.at(protocol).number.encode(raw), protocol)
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
@@ -206,7 +204,7 @@ class RegisterMap:
         entry, rest = divmod(register - self._log.first, self._log.stride) if self._log else (-1, 0)
         if self._log is None or not 0 <= entry < self._log.limit:
             return None
-        if rest or count != self._log.words:
+        if rest or 2 * count != self._log.codec.size:
             raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
         return entry
 
@@ -221,7 +219,7 @@ class RegisterMap:
         parameter = self._by_base.get(register)
         if parameter is None:
             raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
-        words = parameter.at('modbus').words
-        if count != words:
-            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {words} registers, not {count}')
+        whole = parameter.at('modbus').codec.size // 2
+        if count != whole:
+            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {whole} registers, not {count}')
         return parameter

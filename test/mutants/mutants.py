@@ -302,8 +302,8 @@ MUTANTS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/registers.py',
-        'Address(place.numbers, place.words)',
-        'Address(place.numbers, 2)',
+        'Address(*self.model[key].at(self.protocol).place)',
+        'Address(*self.model[key].at(self.protocol).place[:3], 4)',
         (_TRACE,),
     ),
     Mutant(

@@ -29,6 +29,7 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
@@ -36,7 +37,6 @@ from nfo_sinus_driver.drive import watch as watch_module
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 

@@ -28,6 +28,7 @@ from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
@@ -39,7 +40,6 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator import runner_g2
 
 WAYS: dict[str, Callable[[Drive], Future[str]]] = {

@@ -29,11 +29,11 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
 
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator import motor as motor_module
 from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 from nfo_sinus_driver.simulator.state_machine import Conditions
