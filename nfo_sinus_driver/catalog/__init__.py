@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.family import load_profile
+from nfo_sinus_driver.catalog.family import usual_family
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -77,4 +78,5 @@ __all__ = [
     'load_profile',
     'to_bytes',
     'to_words',
+    'usual_family',
 ]

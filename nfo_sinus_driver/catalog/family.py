@@ -109,6 +109,11 @@ class Family(Mapping[str, Parameter]):
         group = self[key].group if key else ''
         return frozenset(one for one, parameter in self.items() if parameter.group == group)
 
+    @functools.cached_property
+    def communication(self) -> frozenset[str]:
+        """The keys of the settings of the line, by which the drive may be lost."""
+        return self.group_of(Role.BUS_ADDRESS)
+
 
 def _folders() -> Mapping[str, Path]:
     roots = [Path(root) for root in importlib.import_module(_FAMILIES).__path__]
@@ -119,6 +124,11 @@ def _folders() -> Mapping[str, Path]:
 def families() -> tuple[str, ...]:
     """Return the names of the families that there are folders of."""
     return tuple(sorted(_folders()))
+
+
+def usual_family() -> str:
+    """Return the name of the family of a drive of which nobody says what it is."""
+    return str(importlib.import_module(_FAMILIES).USUAL)
 
 
 @functools.cache

@@ -38,11 +38,6 @@ def followers(model: Family) -> Mapping[str, str]:
     return {key: setting for key, setting in named.items() if key}
 
 
-def is_communication(key: str, model: Family) -> bool:
-    """Tell whether the driver may lose the drive by changing this."""
-    return key in model.group_of(Role.BUS_ADDRESS)
-
-
 def why_not(key: str, inverter: Inverter) -> str:
     """Return why a setting may not be changed, ``''`` if it may."""
     settings = inverter.settings
@@ -50,7 +45,7 @@ def why_not(key: str, inverter: Inverter) -> str:
         return 'control_method is monitor: this driver only reads'
     if inverter.tuning:
         return 'the drive is tuning: wait for its end, or stop it'
-    if not is_communication(key, inverter.model):
+    if key not in inverter.model.communication:
         return ''
     if not settings.allow_communication_changes:
         return (

@@ -30,7 +30,6 @@ from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.parameter_guard import is_communication
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.write_access import Allow
@@ -194,7 +193,7 @@ class ParameterWriter:
     def _order(self, key: str) -> tuple[bool, bool]:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""
         model = self._registers.model
-        return is_communication(key, model), not model[key].stopped
+        return key in model.communication, not model[key].stopped
 
     async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
         """Write one parameter if it differs; return what was written."""

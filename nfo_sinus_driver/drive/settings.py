@@ -23,6 +23,7 @@ import math
 from nfo_sinus_driver.catalog import Profile
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_profile
+from nfo_sinus_driver.catalog import usual_family
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
@@ -115,7 +116,7 @@ class DriveSettings:
     """
 
     address: int = 1
-    model: str = 'sinus_g2'
+    model: str = usual_family()
     control_method: str = 'mode_scmd'
     reference: str = 'fieldbus'
     poll_rate: float = 0.0
