@@ -25,7 +25,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
@@ -174,7 +173,7 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'model',
-        usual_family(),
+        'sinus_g2',
         'The drive family; auto: find out',
         constraints=f'one of {", ".join((*families(), AUTO))}',
     ),

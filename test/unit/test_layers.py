@@ -65,6 +65,8 @@ NAMED = {
     'cli/run.py': {'control.mode'},
     'cli/scan.py': {'serial.si_baud'},
     'drive/motion.py': {'control.mode'},
+    # the default of a public parameter, which the documentation shows
+    'node/settings.py': {'sinus_g2'},
 }
 #: Rooms in which serial ports are opened.
 OPENS_PORTS = {'link', 'simulator'}
