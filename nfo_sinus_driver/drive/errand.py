@@ -64,7 +64,7 @@ class Errands:
     """
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, registers: Registers, motion: Motion | None
+        self, bus: Bus, inverter: Inverter, motion: Motion | None
     ) -> None:
         self._bus = bus
         self._inverter = inverter

@@ -24,11 +24,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from collections.abc import Sequence
+import dataclasses
 from pathlib import Path
 import struct
 import threading
 import time
 from types import SimpleNamespace
+from typing import Any
 
 from drive_rig import PATIENCE
 from drive_rig import Notes
@@ -37,11 +39,15 @@ import pytest
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 
@@ -59,6 +65,8 @@ class Acme:
         self.registers = dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0)
         self.registers[RAMP] = 50
         self.lock = threading.Lock()
+        #: What becomes of the next write to a register.
+        self.fates: dict[int, LinkError] = {}
         #: Register and word of all that was written, in order.
         self.writes: list[tuple[int, int]] = []
         self.trip(0)
@@ -115,6 +123,8 @@ class Acme:
         with self.lock:
             numbers = self._numbers(address)
             words = struct.unpack(f'>{len(numbers)}H', data)
+            if address.index in self.fates:
+                raise self.fates.pop(address.index)
             self.writes += zip(numbers, words, strict=True)
             reset = words[0] & RESET and not self.registers[WORD] & RESET
             self.registers.update(zip(numbers, words, strict=True))
@@ -151,10 +161,39 @@ def test_it_is_found(bus: Bus) -> None:
     assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'acme'
 
 
+def test_one_that_tells_nothing_is_the_one_of_which_nothing_tells(acme: Acme, bus: Bus) -> None:
+    del acme.registers[KIND]
+    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'sinus_optimal'
+
+
+def test_of_two_that_tell_nothing_a_person_has_to_say(
+    acme: Acme, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = dataclasses.replace(load_family('acme').profile, told_by='')
+    monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
+    with pytest.raises(DriveError, match='set model to acme or sinus_optimal'):
+        bus.run(detect_model(bus, 1)).result(PATIENCE)
+
+
+def driver(bus: Bus, notes: Notes, **settings: Any) -> Drive:
+    settings = {'model': 'acme', 'control_method': 'control_word', **settings}
+    return Drive(bus, DriveSettings(**settings), notes)
+
+
+def turning(acme: Acme, bus: Bus, notes: Notes, **settings: Any) -> Drive:
+    """A drive that turns at -20 Hz."""
+    drive = driver(bus, notes, **settings)
+    drive.connect().result(PATIENCE)
+    drive.activate()
+    drive.enable().result(PATIENCE)
+    drive.set_setpoint(-20.0)
+    wait_until(lambda: acme.hertz == -20.0)
+    return drive
+
+
 def test_a_ride(acme: Acme, bus: Bus) -> None:
     notes = Notes()
-    settings = DriveSettings(model='acme', control_method='control_word')
-    drive = Drive(bus, settings, notes)
+    drive = driver(bus, notes)
     drive.connect(parameters=True).result(PATIENCE)
     drive.activate()
     assert dict(drive.parameters.values) == {'ramp.up': 5.0}
@@ -194,3 +233,37 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
     assert (acme.hertz, acme.registers[WORD]) == (0, REMOTE)
     assert 'given back' in drive.disconnect(1.0).result(PATIENCE)
     assert acme.registers[WORD] == 0
+
+
+def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes(), setpoint_timeout=0.2)
+    wait_until(lambda: drive.snapshot.setpoint == 0)
+    assert (acme.hertz, acme.registers[TURN]) == (0, 0)
+    assert drive.armed
+    drive.set_setpoint(-5.0)
+    wait_until(lambda: acme.hertz == -5.0)
+
+
+def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    acme.fates[SIZE] = NoAnswer('silence')
+    begun = len(acme.writes)
+    drive.set_setpoint(30.0)
+    wait_until(lambda: acme.hertz == 30.0)
+    assert acme.writes[begun:] == [(TURN, 0), (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
+    wait_until(lambda: drive.snapshot.setpoint == 30.0)
+
+
+def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:
+    notes = Notes()
+    drive = turning(acme, bus, notes)
+    acme.fates[SIZE] = Refused(Refused.ILLEGAL_VALUE, 'not that')
+    drive.set_setpoint(-35.0)
+    wait_until(lambda: notes.told('it refused set-point -35: not that'))
+    wait_until(lambda: acme.registers[WORD] == REMOTE)
+    assert not drive.armed
+
+
+def test_it_follows_no_set_point_for_all(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    assert drive.setpoint.why_not_shared == 'takes a set-point in several writes'
