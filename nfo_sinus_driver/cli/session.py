@@ -87,7 +87,7 @@ class Remote:
                 bus, settings.address, self.registers, self.inverter, lambda reason: None
             )
             motion = Motion(bus, self.inverter, commands, setpoint)
-        self._errands = Errands(bus, self.inverter, self.registers, motion)
+        self._errands = Errands(bus, self.inverter, motion)
         self.parameters = Parameters(
             bus, self.inverter, self.registers, self._errands, self._run, self._count
         )

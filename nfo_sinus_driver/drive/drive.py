@@ -108,7 +108,7 @@ class Drive:
             lambda: self._connect(patient=False),
         )
         self._barred = False
-        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
+        self._errands = errands = Errands(bus, self._inverter, self._motion)
         #: The settings of the drive.
         self.parameters = Parameters(
             bus, self._inverter, self._registers, errands, self._run, self._take_parameters

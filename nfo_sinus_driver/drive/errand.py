@@ -33,7 +33,6 @@ from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.motion import Motion
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -63,12 +62,9 @@ class Errands:
     :param motion: who commands the drive else; ``None`` if this driver only reads.
     """
 
-    def __init__(
-        self, bus: Bus, inverter: Inverter, motion: Motion | None
-    ) -> None:
+    def __init__(self, bus: Bus, inverter: Inverter, motion: Motion | None) -> None:
         self._bus = bus
         self._inverter = inverter
-        self._registers = registers
         self._motion = motion
 
     def require(self, procedure: Procedure) -> Motion:
