@@ -477,7 +477,8 @@ class Bus:
         for entry in self._turns.clear():
             if isinstance(entry, Slot):
                 self._fail_slot(entry, error)
-            else:
+            elif entry.task.awaited is entry.transfer:
+                # else who was told before has ended it
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: Slot, error: PortError) -> None:

@@ -37,6 +37,7 @@ from nfo_sinus_driver.catalog.profile import Procedure
 from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Refusal
 from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
 from nfo_sinus_driver.catalog.profile import SetpointTarget
 from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Fact
@@ -65,6 +66,7 @@ __all__ = [
     'Profile',
     'Refusal',
     'Removal',
+    'Reset',
     'Role',
     'SetpointTarget',
     'State',

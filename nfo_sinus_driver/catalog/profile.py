@@ -124,7 +124,11 @@ class AcknowledgeThenWrite:
 
 @dataclass(frozen=True)
 class Until:
-    """Wait until the drive's status fulfils a condition; if it does not, the sequence ends."""
+    """
+    Wait until the drive's status fulfils a condition; if it does not, the sequence ends.
+
+    Only when control is taken and when the motor is started.
+    """
 
     condition: Callable[[Status], bool]
 
@@ -220,14 +224,19 @@ class Removal(enum.Enum):
 
 
 class Procedure(enum.Enum):
-    """What a drive does by itself on a command while its motor stands; the value is its name."""
+    """What can be tuned, by name; the order is that of the action Tune."""
 
     FULL = 'full tuning'
     BASIC = 'basic tuning'
     STATOR_RESISTANCE = 'stator resistance measurement'
     CALCULATE = 'parameter calculation'
-    ERASE_ERROR_LOG = 'erasing the error log'
-    RESET_ENERGY = 'resetting the kWh counter'
+
+
+class Reset(enum.Enum):
+    """What else a drive does by itself on a command while its motor stands, by name."""
+
+    ERROR_LOG = 'erasing the error log'
+    ENERGY = 'resetting the kWh counter'
 
 
 class ControlMethod(abc.ABC):
@@ -247,7 +256,7 @@ class ControlMethod(abc.ABC):
     references: ClassVar[Sequence[str]]
     coasts: ClassVar[bool] = False
     older: ClassVar[bool] = True
-    procedures: ClassVar[Mapping[Procedure, Write]] = {}
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
 
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
         self._reference = reference
@@ -370,6 +379,6 @@ class Profile:
     older: OlderDialect | None = None
     uncertain: Mapping[str, float] = field(default_factory=dict)
 
-    def methods_with(self, procedure: Procedure) -> Sequence[str]:
+    def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""
         return [name for name, method in self.methods.items() if procedure in method.procedures]

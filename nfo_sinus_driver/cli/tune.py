@@ -32,7 +32,7 @@ from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Tuned
-from nfo_sinus_driver.drive.errand import require_known
+from nfo_sinus_driver.drive.procedure import require_known
 
 PROCEDURES = {
     'full': Procedure.FULL,
@@ -93,7 +93,7 @@ class _Tuning:
         except DriveError as error:
             tuned = Tuned(False, str(error), ())
         text = in_our_words(tuned.text)
-        if self._drive.stop_unconfirmed and not self._drive.held_by_fault:
+        if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
             # a fault keeps it still; else nobody tries on when this command has ended
             screen.say(text)
             Stopping(self._helm, self._drive, self._show).confirmed_late()

@@ -16,7 +16,7 @@
 """
 Runs on the bus what the profile of a family says.
 
-A control method says what to write, and nothing of when; `motion` decides that.
+A control method says what to write, and nothing of when; `controller` decides that.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from nfo_sinus_driver.catalog import NotPossible
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Refusal
 from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.registers import Registers
@@ -181,7 +182,7 @@ class Commands:
         steps = self._method.acknowledge(shown, control_mode)
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
-    async def begin(self, procedure: Procedure, require_wanted: Callable[[], None]) -> None:
+    async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """
         Have the drive begin a procedure; once, for nobody knows what happened before a second time.
 

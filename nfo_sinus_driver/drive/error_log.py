@@ -25,13 +25,13 @@ import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
@@ -103,10 +103,10 @@ def _local(at: float) -> str:
 class ErrorLog:
     """The error log and the kWh counter of one drive; used on the bus alone."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = registers
-        self._errands = errands
+        self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
         self._sightings: list[tuple[int, float]] = []
@@ -174,11 +174,10 @@ class ErrorLog:
 
         :raises DriveError: it was not erased, and why.
         """
-        procedure = Procedure.ERASE_ERROR_LOG
-        with self._errands.lent(procedure) as loan:
+        with self._procedures.begun(Reset.ERROR_LOG) as access:
             area = self._area()
-            async with self._errands.sent(loan):
-                await self._errands.tell(loan, procedure)
+            async with self._procedures.in_standby(access):
+                await self._procedures.command(access, Reset.ERROR_LOG)
                 if code_of(await self._entry(area, 0)):
                     raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
@@ -189,18 +188,18 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        procedure, energy = Procedure.RESET_ENERGY, self._inverter.model.key(Role.ENERGY)
-        self._errands.require(procedure)
+        energy = self._inverter.model.key(Role.ENERGY)
+        self._procedures.require(Reset.ENERGY)
         if not self._inverter.has(energy):
             since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                f'{procedure.value} came with firmware {float(since or 0):.2f}; this drive has '
+                f'{Reset.ENERGY.value} came with firmware {float(since or 0):.2f}; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        with self._errands.lent(procedure) as loan:
-            async with self._errands.sent(loan):
+        with self._procedures.begun(Reset.ENERGY) as access:
+            async with self._procedures.in_standby(access):
                 before = await self._registers.read_number(energy, Priority.SERVICE)
-                await self._errands.tell(loan, procedure)
+                await self._procedures.command(access, Reset.ENERGY)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')

@@ -27,9 +27,9 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.write_access import Allow
@@ -105,10 +105,10 @@ def describe_drift(drift: Change) -> str:
 class ParameterWriter:
     """Changes parameters of one drive, for coroutines on the bus."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = registers
-        self._access = WriteAccess(inverter, errands)
+        self._access = WriteAccess(inverter, procedures)
 
     async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
         """

@@ -32,7 +32,6 @@ from typing import Any
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
 from nfo_sinus_driver.drive.parameter_guard import after_change
@@ -42,6 +41,7 @@ from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.wanted_state import WantedState
@@ -80,7 +80,7 @@ class Parameters:
         bus: Bus,
         inverter: Inverter,
         registers: Registers,
-        errands: Errands,
+        procedures: Procedures,
         run: Run,
         told: Callable[[Collection[str]], None],
     ) -> None:
@@ -89,7 +89,7 @@ class Parameters:
         self._registers = registers
         self._run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, registers, errands)
+        self._writer = ParameterWriter(inverter, registers, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}

@@ -64,7 +64,7 @@ NAMED = {
     'cli/options.py': {'control.accel'},
     'cli/run.py': {'control.mode'},
     'cli/scan.py': {'serial.si_baud'},
-    'drive/motion.py': {'control.mode'},
+    'drive/start_sequence.py': {'control.mode'},
     # the default of a public parameter, which the documentation shows
     'node/settings.py': {'sinus_g2'},
 }

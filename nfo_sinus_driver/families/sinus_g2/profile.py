@@ -37,6 +37,7 @@ from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Read
 from nfo_sinus_driver.catalog.profile import Refusal
 from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
 from nfo_sinus_driver.catalog.profile import SetpointTarget
 from nfo_sinus_driver.catalog.profile import Status
 from nfo_sinus_driver.catalog.profile import Steps
@@ -160,15 +161,15 @@ class ModeScmd(_G2):
     means = 'SCMD'
     references = tuple(_COMMANDS)
     coasts = True
-    procedures: ClassVar[Mapping[Procedure, Write]] = {
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {
         procedure: Write('fieldbus.scmd', command, once=True, head=True)
         for procedure, command in (
             (Procedure.FULL, Scmd.FULL_TUNING),
             (Procedure.BASIC, Scmd.BASIC_TUNING),
             (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
             (Procedure.CALCULATE, Scmd.PAR_CALC),
-            (Procedure.ERASE_ERROR_LOG, Scmd.ERASE_E_LOG),
-            (Procedure.RESET_ENERGY, Scmd.RESET_E_OUT),
+            (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
+            (Reset.ENERGY, Scmd.RESET_E_OUT),
         )
     }
     #: The parameter that takes the run command.

@@ -33,6 +33,7 @@ from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Read
 from nfo_sinus_driver.catalog.profile import Refusal
 from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
 from nfo_sinus_driver.catalog.profile import SetpointTarget
 from nfo_sinus_driver.catalog.profile import Status
 from nfo_sinus_driver.catalog.profile import Steps
@@ -75,7 +76,7 @@ class ModeSmode(ModeScmd):
     means = 'SMODE'
     references = ('fieldbus', 'terminal')
     coasts = False
-    procedures: ClassVar[Mapping[Procedure, Write]] = {}
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     _command = 'fieldbus.smode'
     _soonest = Write('fieldbus.smode', Smode.STOP)
 

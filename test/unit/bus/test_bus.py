@@ -900,6 +900,33 @@ def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
     assert bus.statistics().reconnects == 1
 
 
+def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
+    bus: Bus, link: FakeLink
+) -> None:
+    link.answer = raiser(PortError('gone'))
+    tasks: list[Task] = []
+
+    async def end_the_other() -> None:
+        try:
+            await bus.read(UNIT, register(1), Priority.POLL)
+        except PortError:
+            bus.cancel(tasks[0])
+            raise
+
+    async def wait_behind() -> None:
+        tasks.append(bus.current)
+        await bus.read(UNIT, register(2), Priority.POLL)
+
+    with link.held():
+        lost = hold(bus, link)
+        first = bus.run(end_the_other())
+        ended = bus.run(wait_behind())
+        last = ask(bus, 3, Priority.POLL)
+    for future in (lost, first, last):
+        assert isinstance(failure(future), PortError)
+    assert isinstance(failure(ended), Cancelled)
+
+
 def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.01)
     link.opening = raiser(PortError('absent'))

@@ -30,6 +30,7 @@ from nfo_sinus_driver.catalog import NotPossible
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Refusal
 from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog.profile import Acknowledge
@@ -248,11 +249,11 @@ def test_a_serial_fault_takes_no_control_from_the_terminals() -> None:
         (Procedure.BASIC, 0x301),
         (Procedure.STATOR_RESISTANCE, 0x401),
         (Procedure.CALCULATE, 0x501),
-        (Procedure.ERASE_ERROR_LOG, 0x800),
-        (Procedure.RESET_ENERGY, 0x900),
+        (Reset.ERROR_LOG, 0x800),
+        (Reset.ENERGY, 0x900),
     ],
 )
-def test_procedures(procedure: Procedure, command: int) -> None:
+def test_procedures(procedure: Procedure | Reset, command: int) -> None:
     # once, and behind no stop that comes later
     assert scmd().procedures[procedure] == Write(SCMD, command, once=True, head=True)
     assert G2.profile.methods_with(procedure) == ['mode_scmd']

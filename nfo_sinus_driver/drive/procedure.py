@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a drive does on an SCMD while its motor stands: tune, erase, reset [M0 table 18]."""
+"""What a drive does on a command while its motor stands: tune, erase, reset [M0 table 18]."""
 
 from __future__ import annotations
 
@@ -27,12 +27,14 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Procedure
-from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.catalog import Reset
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.loan import Loan
-from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -42,7 +44,7 @@ _BUSY_PERIOD = 0.05
 _LONGEST_BUSY = 0.5
 
 
-def require_known(procedure: Procedure, model: Family) -> None:
+def require_known(procedure: Procedure | Reset, model: Family) -> None:
     """
     See to it that a model has a procedure.
 
@@ -55,67 +57,65 @@ def require_known(procedure: Procedure, model: Family) -> None:
         )
 
 
-class Errands:
+class Procedures:
     """
-    Sends one drive on errands; used on the bus alone.
+    Has one drive carry out procedures; used on the bus alone.
 
-    :param motion: who commands the drive else; ``None`` if this driver only reads.
+    :param controller: who commands the drive else; ``None`` if this driver only reads.
     """
 
-    def __init__(self, bus: Bus, inverter: Inverter, motion: Motion | None) -> None:
+    def __init__(self, bus: Bus, inverter: Inverter, controller: Controller | None) -> None:
         self._bus = bus
         self._inverter = inverter
-        self._motion = motion
+        self._controller = controller
 
-    def require(self, procedure: Procedure) -> Motion:
-        """
-        Return who lends the drive for an errand.
-
-        :raises DriveError: the drive has no such errand, or its control method is another.
-        """
-        if self._motion is None:
+    @property
+    def _commands(self) -> Controller:
+        if self._controller is None:
             raise DriveError(MONITOR_REFUSAL)
-        inverter = self._inverter
+        return self._controller
+
+    def require(self, procedure: Procedure | Reset) -> None:
+        """
+        See to it that a procedure may begin.
+
+        :raises DriveError: the drive has no such procedure, or its control method is another; or
+            somebody has the drive.
+        """
+        controller, inverter = self._commands, self._inverter
         if not inverter.connected:
             raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
         require_known(procedure, inverter.model)
-        profile, what = inverter.model.profile, procedure.value
+        profile = inverter.model.profile
         have = profile.methods_with(procedure)
         if inverter.settings.control_method not in have:
             raise DriveError(
-                f'{what} needs {profile.methods[have[0]].means}, and one session does not mix '
-                f'control methods: clean up, set control_method to {have[0]} and configure again'
+                f'{procedure.value} needs {profile.methods[have[0]].means}, and one session does '
+                f'not mix control methods: clean up, set control_method to {have[0]} and configure '
+                'again'
             )
-        self._require_idle(what, self._motion)
-        return self._motion
+        controller.require_idle(procedure.value)
 
     @contextlib.contextmanager
-    def lent(self, procedure: Procedure) -> Iterator[Loan]:
+    def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
         """
-        Have the drive for an errand, from its first preparations on: whoever stops it ends both.
+        Have the drive for a procedure, from its first preparations on.
 
         :raises DriveError: it cannot be had, and why.
         """
         self.require(procedure)
-        with self.had(procedure.value) as loan:
-            yield loan
+        with self.exclusive(procedure.value) as access:
+            yield access
 
     @contextlib.contextmanager
-    def had(self, what: str) -> Iterator[Loan]:
+    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
         """
-        Do as :meth:`lent` for what every control method may do, also while connecting.
+        Have the drive for what every control method may do, also while connecting.
 
         :raises DriveError: somebody has the drive.
         """
-        motion = self._motion
-        if motion is None:
-            raise DriveError(MONITOR_REFUSAL)
-        self._require_idle(what, motion)
-        motion.loan = loan = Loan(what)
-        try:
-            yield loan
-        finally:
-            motion.loan = None
+        with self._commands.exclusive(what) as access:
+            yield access
 
     async def in_control(self, priority: Priority) -> bool:
         """
@@ -123,12 +123,10 @@ class Errands:
 
         :raises DriveError: this driver only reads.
         """
-        if self._motion is None:
-            raise DriveError(MONITOR_REFUSAL)
-        return await self._motion.method.in_control(priority)
+        return await self._commands.method.in_control(priority)
 
     @contextlib.asynccontextmanager
-    async def sent(self, loan: Loan) -> AsyncIterator[None]:
+    async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
@@ -137,29 +135,29 @@ class Errands:
 
         :raises DriveError: it cannot be had, and why.
         """
-        motion = self._motion
-        assert motion is not None and motion.loan is loan
-        found = await self._take(loan, motion)
+        found = await self._take(access)
         try:
             yield
         except Exception:
             # who asked is told what went wrong first; what comes of it is logged
             with contextlib.suppress(DriveError, LinkError):
-                await self._give_back(motion, found)
+                await self._give_back(found)
             raise
-        await self._give_back(motion, found)
+        await self._give_back(found)
 
-    async def recall(self) -> str:
+    async def abort(self) -> str:
         """
-        End what the drive does on an errand; anything else goes on.
+        End the procedure that has the drive; anything else goes on.
 
-        :raises DriveError: the drive does not confirm it; it is tried on and on.
+        :raises DriveError: the drive does not confirm it; it is retried until it does.
         """
-        if self._motion is None or self._motion.loan is None:
+        controller = self._controller
+        procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
+        if controller is None or controller.state not in procedure:
             return ''
-        return await self._motion.stop()
+        return await controller.stop()
 
-    async def tell(self, loan: Loan, procedure: Procedure) -> None:
+    async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
         Have the drive begin; once, for nobody knows what has happened before a second time.
 
@@ -169,33 +167,21 @@ class Errands:
 
         :raises DriveError: it was stopped meanwhile.
         """
-        motion = self._motion
-        assert motion is not None
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
             try:
-                await motion.method.begin(procedure, loan.require_wanted)
+                await self._commands.method.begin(procedure, access.require_wanted)
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
                     raise
             await self._bus.sleep(_BUSY_PERIOD)
 
-    @staticmethod
-    def _require_idle(what: str, motion: Motion) -> None:
-        if motion.loan is not None:
-            raise DriveError(f'{what}: {motion.loan.what} is going on already')
-        if motion.ours:
-            raise DriveError(f'{what}: the motor is enabled: stop it first')
-        # a fault that holds the stop is told of later, with what to do
-        if motion.stopping and not motion.taking_back.held_by_fault:
-            raise DriveError(f'{what}: a stop is not confirmed yet')
-
-    async def _take(self, loan: Loan, motion: Motion) -> Holder:
-        inverter, what = self._inverter, loan.what
+    async def _take(self, access: ExclusiveAccess) -> Holder:
+        controller, inverter, what = self._commands, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
-        found = await motion.method.holder(Priority.SERVICE)
+        found = await controller.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
             raise DriveError(
                 f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
@@ -208,22 +194,23 @@ class Errands:
                 f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
                 'back to them could start the motor: press STOP at the drive first'
             )
-        loan.require_wanted()
+        access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
-        await motion.take_control(control_mode)
-        deadline = time.monotonic() + withdrawal.PATIENCE
+        await controller.take_control(control_mode)
+        deadline = time.monotonic() + confirmation.TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
-                    await self._give_back(motion, found)
+                    await self._give_back(found)
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
             # no manual says that a drive has forgotten what it was told before
-            await motion.method.stop(control_mode)
-            await self._bus.sleep(withdrawal.LOOK_PERIOD)
+            await controller.method.stop(control_mode)
+            await self._bus.sleep(confirmation.LOOK_PERIOD)
         return found
 
-    async def _give_back(self, motion: Motion, found: Holder) -> None:
-        """Take the command back, and control too where nobody had it; not while a fault stands."""
-        await motion.take_back()
-        if found is Holder.NOBODY and not motion.taking_back.held_by_fault:
-            await motion.method.release()
+    async def _give_back(self, found: Holder) -> None:
+        """Remove the command, and give control back where nobody had it; not while faulted."""
+        controller = self._commands
+        await controller.withdraw_run_command()
+        if found is Holder.NOBODY and not controller.blocked_by_fault:
+            await controller.method.release()
