@@ -120,6 +120,8 @@ class Parameter:
     :ivar labels: the manual's label of each code of an enumeration.
     :ivar stopped: the motor must stand for it to be written (type Init, not Init/Run).
     :ivar since: the first firmware that has it, or ``None``.
+    :ivar older: firmware of the family's older dialect has it, too; asking such a drive for others
+        is a fault.
     :ivar source: where in the manuals it stands.
     """
 
@@ -136,6 +138,7 @@ class Parameter:
     access: Access
     stopped: bool
     since: Fraction | None
+    older: bool
     description: str
     source: str
 
@@ -156,11 +159,6 @@ class Parameter:
     def is_setting(self) -> bool:
         """Whether the drive keeps it for people to read and write: a ROS parameter."""
         return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS
-
-    @property
-    def older(self) -> bool:
-        """Firmware that [M2] describes has it too; asking such a drive for others is a fault."""
-        return 'M2' in self.source
 
     def at(self, protocol: str) -> Address:
         """

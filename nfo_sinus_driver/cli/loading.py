@@ -144,7 +144,7 @@ class Loading:
 
     def _how_to_put_back(self) -> str:
         words = [f'{key}={shown(change.old, "")}' for key, change in self._written.items()]
-        if any(key.startswith('serial.') for key in self._written):
+        if not self._drive.model.communication.isdisjoint(self._written):
             words.insert(0, '--allow-communication-changes')
         return command_line(self._options, 'set', *words)
 

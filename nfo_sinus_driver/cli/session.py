@@ -48,12 +48,12 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.methods import make_control_method
-from nfo_sinus_driver.drive.methods import method_in_charge
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
@@ -82,12 +82,12 @@ class Remote:
         self.inverter = Inverter(self.model, self.registers, self, settings)
         controller = None
         if settings.control_method != 'monitor':
-            method = make_control_method(settings, self.registers)
+            commands = Commands(settings, self.registers)
             setpoint = Setpoint(
                 bus, settings.address, self.registers, self.inverter, lambda reason: None
             )
-            controller = Controller(bus, self.inverter, method, setpoint)
-        self._procedures = Procedures(bus, self.inverter, self.registers, controller)
+            controller = Controller(bus, self.inverter, commands, setpoint)
+        self._procedures = Procedures(bus, self.inverter, controller)
         self.parameters = Parameters(
             bus, self.inverter, self.registers, self._procedures, self._run, self._count
         )
@@ -140,7 +140,8 @@ class Remote:
 
     def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
-        return self.do(lambda: method_in_charge(self.inverter, self.registers, Priority.SERVICE))
+        steps = self.model.profile.in_charge(self.inverter.seen)
+        return self.do(lambda: carry_out(steps, self.registers, Priority.SERVICE))
 
     def measure(self, key: str) -> Value:
         """Read one value."""

@@ -143,7 +143,7 @@ def _differing(
             data = drive.registers.encode(key, value)
             if data == drive.parameters.data[key]:
                 continue
-            if is_barred(key, options):
+            if is_barred(key, drive.model, options):
                 kept.append(key)
                 continue
             if not options.dry_run:

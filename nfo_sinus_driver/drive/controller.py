@@ -40,8 +40,8 @@ from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
 from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
-from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
@@ -92,7 +92,7 @@ class Controller:
     """Enables, stops and judges one drive."""
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, method: ControlMethod, setpoint: Setpoint
+        self, bus: Bus, inverter: Inverter, method: Commands, setpoint: Setpoint
     ) -> None:
         self._bus = bus
         self._inverter = inverter
@@ -135,7 +135,7 @@ class Controller:
         return self._sequence.overdue
 
     @property
-    def method(self) -> ControlMethod:
+    def method(self) -> Commands:
         """How the drive is commanded, for a procedure."""
         return self._method
 

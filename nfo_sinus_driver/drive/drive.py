@@ -30,9 +30,11 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
@@ -41,7 +43,6 @@ from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.log_watch import LogWatch
-from nfo_sinus_driver.drive.methods import make_control_method
 from nfo_sinus_driver.drive.own_timeout import OwnTimeout
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.picture import take_picture
@@ -55,7 +56,6 @@ from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
-from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.drive.tuning import Tuned
 from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.drive.watch import Watch
@@ -97,8 +97,8 @@ class Drive:
         )
         self._controller: Controller | None = None
         if settings.control_method != 'monitor':
-            method = make_control_method(settings, self._registers)
-            self._controller = Controller(bus, self._inverter, method, self._setpoint)
+            commands = Commands(settings, self._registers)
+            self._controller = Controller(bus, self._inverter, commands, self._setpoint)
         self._watch = Watch(
             bus,
             self._inverter,
@@ -108,9 +108,7 @@ class Drive:
             listener,
             lambda: self._connect(patient=False),
         )
-        self._procedures = procedures = Procedures(
-            bus, self._inverter, self._registers, self._controller
-        )
+        self._procedures = procedures = Procedures(bus, self._inverter, self._controller)
         #: The settings of the drive.
         self.parameters = Parameters(
             bus, self._inverter, self._registers, procedures, self._run, self._take_parameters
@@ -402,11 +400,11 @@ class Drive:
         if self._controller is not None:
             self._controller.connected()
         name = '' if identity.model else inverter.model.name
-        if identity.model and inverter.model.name == 'sinus_optimal':
+        if identity.model and not inverter.model.profile.names_itself:
             inverter.tell(
                 Severity.WARNING,
-                f'this drive says that it is a {identity.model}; no Optimal says anything: '
-                'set model to auto or sinus_g2',
+                f'this drive says that it is a {identity.model}; no {inverter.model.profile.title} '
+                'says anything: set model to auto or to what it is',
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')

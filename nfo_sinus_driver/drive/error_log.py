@@ -23,6 +23,7 @@ import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -31,7 +32,6 @@ from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -129,11 +129,10 @@ class ErrorLog:
 
         :raises DriveError: it was not erased, and why.
         """
-        what = 'erasing the error log'
-        with self._procedures.begun(what) as access:
+        with self._procedures.begun(Reset.ERROR_LOG) as access:
             area = self._area()
             async with self._procedures.in_standby(access):
-                await self._procedures.command(access, Scmd.ERASE_E_LOG)
+                await self._procedures.command(access, Reset.ERROR_LOG)
                 if code_of(await self._entry(area, 0)):
                     raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
@@ -144,18 +143,18 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
-        self._procedures.require(what)
+        energy = self._inverter.model.key(Role.ENERGY)
+        self._procedures.require(Reset.ENERGY)
         if not self._inverter.has(energy):
-            told = self._inverter.identity
+            since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                f'{what} came with firmware 4.38; this drive has '
+                f'{Reset.ENERGY.value} came with firmware {float(since or 0):.2f}; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        with self._procedures.begun(what) as access:
+        with self._procedures.begun(Reset.ENERGY) as access:
             async with self._procedures.in_standby(access):
                 before = await self._registers.read_number(energy, Priority.SERVICE)
-                await self._procedures.command(access, Scmd.RESET_E_OUT)
+                await self._procedures.command(access, Reset.ENERGY)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')

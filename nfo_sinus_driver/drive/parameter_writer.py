@@ -192,7 +192,8 @@ class ParameterWriter:
 
     def _order(self, key: str) -> tuple[bool, bool]:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""
-        return key.startswith('serial.'), not self._registers.model[key].stopped
+        model = self._registers.model
+        return key in model.communication, not model[key].stopped
 
     async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
         """Write one parameter if it differs; return what was written."""

@@ -34,8 +34,8 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
-from nfo_sinus_driver.drive.parameter_guard import FOLLOWERS
 from nfo_sinus_driver.drive.parameter_guard import after_change
+from nfo_sinus_driver.drive.parameter_guard import followers
 from nfo_sinus_driver.drive.parameter_guard import why_not
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
@@ -267,7 +267,8 @@ class Parameters:
         inverter = self._inverter
         keys = self._keys
         # without these the drive could hardly be read any more, so one of them in a round will do
-        rare = [key for key in keys if key in FOLLOWERS]
+        settings = followers(inverter.model)
+        rare = [key for key in keys if key in settings]
         self._rounds += 1
         skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
@@ -318,7 +319,7 @@ class Parameters:
             try:
                 changes = await self._writer.write(data)
             except ParameterError as error:
-                hint = after_change({key: exact[key] for key in error.left})
+                hint = after_change({key: exact[key] for key in error.left}, self._inverter.model)
                 if not hint:
                     raise
                 raise ParameterError(f'{error}; {hint}', error.left) from error
@@ -328,7 +329,7 @@ class Parameters:
                 self._learn(key, data[key], quiet=key in written)
         for change in changes:
             self._inverter.tell(Severity.INFO, f'{change}{because}')
-        hint = after_change({change.key: change.new for change in changes})
+        hint = after_change({change.key: change.new for change in changes}, self._inverter.model)
         if hint:
             self._inverter.tell(Severity.WARNING, hint)
         return changes

@@ -24,7 +24,10 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.control_state import ControlState
@@ -32,16 +35,26 @@ from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 #: How often a busy drive is told again, and for how long, s.
 _BUSY_PERIOD = 0.05
 _LONGEST_BUSY = 0.5
+
+
+def require_known(procedure: Procedure | Reset, model: Family) -> None:
+    """
+    See to it that a model has a procedure.
+
+    :raises DriveError: it has no command for it.
+    """
+    if not model.profile.methods_with(procedure):
+        raise DriveError(
+            f'{procedure.value} is not known of this model ({model.name}): its manual lists no '
+            'command for it; do it at the keypad'
+        )
 
 
 class Procedures:
@@ -51,12 +64,9 @@ class Procedures:
     :param controller: who commands the drive else; ``None`` if this driver only reads.
     """
 
-    def __init__(
-        self, bus: Bus, inverter: Inverter, registers: Registers, controller: Controller | None
-    ) -> None:
+    def __init__(self, bus: Bus, inverter: Inverter, controller: Controller | None) -> None:
         self._bus = bus
         self._inverter = inverter
-        self._registers = registers
         self._controller = controller
 
     @property
@@ -65,38 +75,36 @@ class Procedures:
             raise DriveError(MONITOR_REFUSAL)
         return self._controller
 
-    def require(self, what: str) -> None:
+    def require(self, procedure: Procedure | Reset) -> None:
         """
         See to it that a procedure may begin.
 
-        :param what: the procedure, in words that go before "needs SCMD".
         :raises DriveError: the drive has no such procedure, or its control method is another; or
             somebody has the drive.
         """
         controller, inverter = self._commands, self._inverter
         if not inverter.connected:
             raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
-        if not inverter.has(inverter.model.key(Role.START_COMMAND)):
+        require_known(procedure, inverter.model)
+        profile = inverter.model.profile
+        have = profile.methods_with(procedure)
+        if inverter.settings.control_method not in have:
             raise DriveError(
-                f'{what} is not known of this model ({inverter.model.name}): [M1] lists no command '
-                'for it; do it at the keypad'
+                f'{procedure.value} needs {profile.methods[have[0]].means}, and one session does '
+                f'not mix control methods: clean up, set control_method to {have[0]} and configure '
+                'again'
             )
-        if inverter.settings.control_method != 'mode_scmd':
-            raise DriveError(
-                f'{what} needs SCMD, and one session does not mix control methods: '
-                'clean up, set control_method to mode_scmd and configure again'
-            )
-        controller.require_idle(what)
+        controller.require_idle(procedure.value)
 
     @contextlib.contextmanager
-    def begun(self, what: str) -> Iterator[ExclusiveAccess]:
+    def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
         """
         Have the drive for a procedure, from its first preparations on.
 
         :raises DriveError: it cannot be had, and why.
         """
-        self.require(what)
-        with self.exclusive(what) as access:
+        self.require(procedure)
+        with self.exclusive(procedure.value) as access:
             yield access
 
     @contextlib.contextmanager
@@ -149,9 +157,9 @@ class Procedures:
             return ''
         return await controller.stop()
 
-    async def command(self, access: ExclusiveAccess, command: Scmd) -> None:
+    async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
-        Write SCMD; once, for nobody knows what has happened before a second one.
+        Have the drive begin; once, for nobody knows what has happened before a second time.
 
         It waits for its turn with the stops, so that one which comes later does not overtake it,
         and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
@@ -162,33 +170,26 @@ class Procedures:
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
             try:
-                await self._registers.write(
-                    self._inverter.model.key(Role.START_COMMAND),
-                    command,
-                    Priority.STOP,
-                    once=True,
-                    require_wanted=access.require_wanted,
-                )
+                await self._commands.method.begin(procedure, access.require_wanted)
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
                     raise
             await self._bus.sleep(_BUSY_PERIOD)
 
-    async def _take(self, access: ExclusiveAccess) -> Mode:
+    async def _take(self, access: ExclusiveAccess) -> Holder:
         controller, inverter, what = self._commands, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
-        key = self._inverter.model.key(Role.CONTROL_SOURCE)
-        mode = int(await self._registers.read_number(key, Priority.SERVICE))
-        if mode == Mode.INHIBIT:
+        found = await controller.method.holder(Priority.SERVICE)
+        if found is Holder.INHIBITED:
             raise DriveError(
                 f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
                 'Inhibit)'
             )
         if seen.driven:
             raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')
-        if mode not in (Mode.STOP, Mode.BUS):
+        if found not in (Holder.NOBODY, Holder.BUS):
             raise DriveError(
                 f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
                 'back to them could start the motor: press STOP at the drive first'
@@ -200,16 +201,16 @@ class Procedures:
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
-                    await self._give_back(Mode(mode))
+                    await self._give_back(found)
                 raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
             await self._bus.sleep(confirmation.LOOK_PERIOD)
-        return Mode(mode)
+        return found
 
-    async def _give_back(self, found: Mode) -> None:
+    async def _give_back(self, found: Holder) -> None:
         """Remove the command, and give control back where nobody had it; not while faulted."""
         controller = self._commands
         await controller.withdraw_run_command()
-        if found is Mode.STOP and not controller.blocked_by_fault:
+        if found is Holder.NOBODY and not controller.blocked_by_fault:
             await controller.method.release()

@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
@@ -32,15 +33,12 @@ from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link.classic_refusal import flag_names
 
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
 #: How often at most what cannot be is read, until it is believed that the drive has it.
 _READINGS = 3
-#: The flag of SioErr that says that a fault kept a message from being carried out [M2 table 4].
-_BLOCKED = 1
 #: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
 _SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 
@@ -83,7 +81,7 @@ class Registers:
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
-        return self.protocol == 'modbus' and self.model.writes_and_reads
+        return self.protocol == 'modbus' and self.model.profile.writes_and_reads
 
     def encode(self, key: str, value: Value) -> bytes:
         """
@@ -99,13 +97,16 @@ class Registers:
             raise ValueError(f'{key}: {value:g} is out of range, at most {highest} on this bus')
         return parameter.encode(value, self.protocol)
 
-    def encode_nearest(self, key: str, value: float) -> bytes:
+    def target(self, step: Write) -> tuple[Address, bytes]:
         """
-        Return the bytes of the drive's step nearest to a set-point.
+        Return where a step of a profile is written, and what; a float as the drive's nearest step.
 
-        :raises ValueError: out of range or not finite.
+        :raises ValueError: out of range, not finite, or an unknown label.
         """
-        return self.model[key].quantise(value, self.protocol)
+        address = self.address(step.at if self.reaches(step.at) else step.key)
+        if isinstance(step.value, float):
+            return address, self.model[step.key].quantise(step.value, self.protocol)
+        return address, self.encode(step.key, step.value)
 
     def value(self, key: str, data: bytes) -> Value:
         """
@@ -174,12 +175,13 @@ class Registers:
         """
         return await self._bus.identify(self._unit, priority)
 
-    async def acknowledge(self, key: str, priority: Priority) -> bytes:
+    async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        return (await self._ask(self.address(key), priority, None, once=True)).data
+        reply = await self._ask(self.address(key), priority, None, once=True)
+        return self.value(key, reply.data)
 
-    async def acknowledge_and_write(self, key: str, target: str, value: Value) -> None:
+    async def acknowledge_and_write(self, key: str, step: Write) -> None:
         """
         Read a parameter whose reading acknowledges, and write another as the very next frame.
 
@@ -189,38 +191,25 @@ class Registers:
         await self._bus.read_then_write(
             self._unit,
             self.address(key),
-            self.address(target),
-            self.encode(target, value),
+            *self.target(step),
             Priority.STOP,
         )
 
-    async def acknowledge_serial_fault(self) -> str:
-        """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
-        key = self.model.key(Role.LINE_FAULTS)
-        if not self.reaches(key):
-            return ''
-        flags = int(self.number(key, await self.acknowledge(key, Priority.SERVICE)))
-        # that it refused a stop since then is no reason of it
-        return ', '.join(flag_names(flags & ~_BLOCKED))
-
     async def write(
         self,
-        key: str,
-        value: Value,
+        step: Write,
         priority: Priority,
-        *,
-        once: bool = False,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         """
-        Write a parameter.
+        Write a parameter as a profile says.
 
-        :param once: do not repeat the request when nobody answers.
         :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        data = self.encode(key, value)
-        await self._ask(self.address(key), priority, data, once, require_wanted)
+        address, data = self.target(step)
+        priority = Priority.STOP if step.head else priority
+        await self._ask(address, priority, data, step.once, require_wanted)
 
     async def write_data(
         self, key: str, data: bytes, priority: Priority, *, once: bool = False
@@ -233,12 +222,6 @@ class Registers:
     ) -> bytes:
         """Read what stands at an address."""
         return (await self._ask(address, priority, None, once)).data
-
-    async def write_at(
-        self, address: Address, data: bytes, priority: Priority, *, once: bool = False
-    ) -> None:
-        """Write bytes to an address."""
-        await self._ask(address, priority, data, once)
 
     def is_odd(self, key: str) -> bool:
         """Tell whether what was read last of a parameter cannot be, and was read more than once."""

@@ -27,8 +27,8 @@ from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
 from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
-from nfo_sinus_driver.drive.control_method import ControlMethod
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -38,7 +38,7 @@ from nfo_sinus_driver.link import Refused
 class StartSequence:
     """Starts the motor of one drive; used on the bus alone."""
 
-    def __init__(self, bus: Bus, inverter: Inverter, method: ControlMethod) -> None:
+    def __init__(self, bus: Bus, inverter: Inverter, method: Commands) -> None:
         self._bus = bus
         self._inverter = inverter
         self._method = method

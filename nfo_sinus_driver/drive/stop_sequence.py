@@ -25,9 +25,9 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive.control_method import ControlMethod
-from nfo_sinus_driver.drive.control_method import Removal
+from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -78,7 +78,7 @@ class StopSequence:
         self,
         bus: Bus,
         inverter: Inverter,
-        method: ControlMethod,
+        method: Commands,
         report: Callable[[ControlEvent], None],
     ) -> None:
         self._bus = bus

@@ -33,7 +33,6 @@ from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.errors import DriveError
-from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.notices import Notices
 from nfo_sinus_driver.drive.picture import take_picture
@@ -162,11 +161,11 @@ class Watch:
         inverter, registers = self._inverter, self._registers
         if self._task is None or not inverter.connected or not reply.data:
             return
-        place = registers.address(STATUS_WORD)
+        place = registers.address(inverter.word_key)
         if self._bus.answer(self._task, inverter.settings.address, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
-        if not registers.can_be(STATUS_WORD, reply.data):
+        if not registers.can_be(inverter.word_key, reply.data):
             return
         if inverter.seen and inverter.status_word(reply.data) != inverter.seen.word:
             self._told = reply

@@ -88,7 +88,9 @@ class AllDrives:
 
     def _broadcast(self) -> str:
         try:
-            self._context.bus.run(broadcast_stop(self._context.bus)).result(_LONGEST_STOP)
+            bus = self._context.bus
+            models = [drive.drive.model for drive in self._context.drives]
+            bus.run(broadcast_stop(bus, models)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'

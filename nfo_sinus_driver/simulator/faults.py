@@ -76,7 +76,7 @@ class Faults:
     def __init__(self, model: Family, log_size: int) -> None:
         self._model = model
         self._kinds = {Kind.FAULT}
-        if model.status_word.tells_alarms:
+        if model.profile.status_word.tells_alarms:
             self._kinds.add(Kind.ALARM)
         (lost,) = (code.code for code in model.codes(Meaning.SERIAL_FAILURE))
         #: What a silent or damaged line leads to.

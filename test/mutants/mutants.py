@@ -34,14 +34,13 @@ _DRIVE = 'nfo_sinus_driver/drive/drive.py'
 _WATCH = 'nfo_sinus_driver/drive/watch.py'
 _WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
 _TUNING = 'test/unit/drive/test_tuning.py'
-_METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
+_COMMANDS = 'nfo_sinus_driver/drive/commands.py'
+_G2 = 'nfo_sinus_driver/families/sinus_g2/profile.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
 _SIGNALS = 'nfo_sinus_driver/signals.py'
 _SEQUENCE = 'nfo_sinus_driver/drive/stop_sequence.py'
-_CONTROL = 'nfo_sinus_driver/drive/drive_control.py'
-_REFERENCE = 'nfo_sinus_driver/drive/reference.py'
-_PROCEDURE = 'nfo_sinus_driver/drive/procedure.py'
+_PROFILE = 'nfo_sinus_driver/catalog/profile.py'
 _ANY_ORDER = 'test/unit/drive/test_any_order.py'
 _STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
 _CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
@@ -175,8 +174,8 @@ MUTANTS = (
     Mutant(
         2,
         'the run command is not taken back before an acknowledgement',
-        _METHOD,
-        'await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)',
+        _G2,
+        'yield Write(self._command, Scmd.STOP, once=True)',
         'pass',
         (_NO_RESTART, '-k', 'fault_and_ack'),
     ),
@@ -199,8 +198,8 @@ MUTANTS = (
     Mutant(
         2,
         'no set-point 0 before a run command',
-        _REFERENCE,
-        '        await self.write_zero(priority, once=False)\n',
+        _PROFILE,
+        '        yield from self.zero(once=False)\n',
         '',
         (_TRACE,),
     ),
@@ -264,9 +263,9 @@ MUTANTS = (
     Mutant(
         3,
         'a stop waits behind everything else',
-        _METHOD,
-        'write(self._command, Scmd.STOP, Priority.STOP, once=True)',
-        "write('fieldbus.scmd', Scmd.STOP, Priority.REFRESH, once=True)",
+        _COMMANDS,
+        'carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)',
+        'carry_out(self._method.stop(control_mode), self._registers, Priority.REFRESH)',
         ('test/unit/drive/test_stop_first.py',),
     ),
     Mutant(
@@ -312,11 +311,11 @@ MUTANTS = (
     Mutant(
         6,
         'control is given back by MODE = Ext',
-        _METHOD,
-        "            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)\n\n"
-        '    async def remove',
-        "            await self._registers.write('fieldbus.mode', Mode.EXT, Priority.SERVICE)\n\n"
-        '    async def remove',
+        _G2,
+        '            yield Write(MODE, Mode.STOP)\n\n'
+        '    def remove(self, control_mode: str) -> Steps[Removal]:\n        """Write SCMD',
+        '            yield Write(MODE, Mode.EXT)\n\n'
+        '    def remove(self, control_mode: str) -> Steps[Removal]:\n        """Write SCMD',
         (_TRACE,),
     ),
     Mutant(
@@ -457,8 +456,8 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: no set-point 0 before a run command',
-        _REFERENCE,
-        '        await self.write_zero(priority, once=False)\n',
+        _PROFILE,
+        '        yield from self.zero(once=False)\n',
         '',
         _G2_CONTROL,
     ),
@@ -577,7 +576,7 @@ MUTANTS = (
     Mutant(
         6,
         'in any order: both directions at once',
-        _CONTROL,
+        _G2,
         'switched_on | Control.ENABLE_OP,',
         'switched_on | Control.ENABLE_OP | Control.ENABLE_REV_OP,',
         _G2_CONTROL,
@@ -585,10 +584,10 @@ MUTANTS = (
     Mutant(
         6,
         'in any order: the register of the other method is written',
-        _CONTROL,
-        '            await self._change(~_RUN, Control(0), Priority.STOP)\n',
-        '            await self._change(~_RUN, Control(0), Priority.STOP)\n'
-        "            await self._registers.write('fieldbus.scmd', 0, Priority.STOP)\n",
+        _G2,
+        '            yield from self._change(~_RUN, Control(0))\n',
+        '            yield from self._change(~_RUN, Control(0))\n'
+        "            yield Write('fieldbus.scmd', 0)\n",
         _G2_CONTROL,
     ),
     Mutant(
@@ -618,17 +617,17 @@ MUTANTS = (
     Mutant(
         2,
         'a fault is acknowledged with the run command still there',
-        _METHOD,
-        '        if ours and await self.remove(control_mode) is not Removal.COMMAND:\n',
+        _G2,
+        '        if ours and (yield from self.remove(control_mode)) is not Removal.COMMAND:\n',
         '        if False:\n',
         _NO_TURN,
     ),
     Mutant(
         2,
         'nothing follows the acknowledgement of a drive that refuses everything',
-        _METHOD,
-        '                await self._registers.acknowledge_and_write(key, *self._soonest)\n',
-        '                await self._registers.acknowledge(key, _ACK)\n',
+        _G2,
+        '                yield AcknowledgeThenWrite(INV_ST_WITH_ACK, self._soonest)\n',
+        '                yield Acknowledge(INV_ST_WITH_ACK)\n',
         _NO_TURN,
     ),
     Mutant(
@@ -642,18 +641,17 @@ MUTANTS = (
     Mutant(
         2,
         'no stop follows MODE = Bus',
-        _METHOD,
-        '                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)\n'
-        '                return\n',
+        _G2,
+        '                yield stop\n                return\n',
         '                return\n',
         _CONTROL_TAKEN,
     ),
     Mutant(
         2,
         'a tuning that waits for the line is sent after a stop',
-        _PROCEDURE,
-        '                    require_wanted=access.require_wanted,\n',
-        '',
+        _COMMANDS,
+        'await self._registers.write(write, Priority.STOP, require_wanted)',
+        'await self._registers.write(write, Priority.STOP)',
         _TUNING_BEGINS,
     ),
     Mutant(
@@ -675,9 +673,9 @@ MUTANTS = (
     Mutant(
         2,
         'the acknowledgement of a serial fault takes control from the terminals',
-        _METHOD,
-        '        if not elsewhere:\n',
-        '        if True:\n',
+        _G2,
+        '        if not elsewhere:\n            yield from self._remove_control()\n',
+        '        yield from self._remove_control()\n',
         _EVERY_WAY,
     ),
     Mutant(
