@@ -14,3 +14,6 @@
 
 
 """What the makers' manuals say: a folder for each drive family, which the catalog reads."""
+
+#: The family of a drive of which nobody says what it is.
+USUAL = 'sinus_g2'

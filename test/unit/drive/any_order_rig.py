@@ -55,6 +55,7 @@ from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Refused as FarRefusal
 
 #: One byte at 57600 8E1, the silence between frames, and what the drive takes to answer, s.
@@ -194,7 +195,9 @@ class DirectLink:
             raise NotReady(self._not_ready_until)
         register, count = address.numbers[0], address.words
         request = struct.pack('>BBHH', unit, 3, register, count)
-        words = self._exchange(request, 5 + 2 * count, lambda far: far.read(register, count))
+        words = self._exchange(
+            request, 5 + 2 * count, lambda far: server(far).read(register, count)
+        )
         return Reply(words, self._rig.clock.now)
 
     def write(self, unit: int, address: Address, words: Words) -> Reply:
@@ -206,7 +209,7 @@ class DirectLink:
             request = head + struct.pack(f'>{count}H', *words)
 
         def carry_out(far: SimulatedDrive) -> Words:
-            far.write(register, words)
+            server(far).write(register, words)
             return ()
 
         self._rig.judge(lambda: self._rig.wrote(register, words))
@@ -225,7 +228,7 @@ class DirectLink:
         told = self._exchange(
             request,
             5 + 2 * count,
-            lambda far: far.write_and_read(register, words, source.numbers[0], count),
+            lambda far: server(far).write_and_read(register, words, source.numbers[0], count),
         )
         return Reply(told, self._rig.clock.now)
 

@@ -24,7 +24,8 @@ import tty
 import pytest
 
 from nfo_sinus_driver.simulator import pymodbus_compat
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Refused
 
 
@@ -32,17 +33,17 @@ class Bench:
     """A drive on the bench: commands by name, and time that passes when told."""
 
     def __init__(self, **options):
-        self.drive = SimulatedDrive(**options)
+        self.drive = simulated_drive(**options)
 
     def write(self, key, value):
         parameter = self.drive.model[key]
         words = parameter.encode(value)
-        self.drive.write(parameter.at('modbus').index, words)
+        server(self.drive).write(parameter.at('modbus').index, words)
 
     def read(self, key):
         parameter = self.drive.model[key]
         place = parameter.at('modbus')
-        return parameter.decode(self.drive.read(place.index, place.words))
+        return parameter.decode(server(self.drive).read(place.index, place.words))
 
     def mode(self, code):
         self.write('fieldbus.mode', code)
@@ -66,7 +67,7 @@ class Bench:
 
     @property
     def state(self):
-        return self.drive.runner.state
+        return self.drive.control_unit.state
 
     @property
     def inv_st(self):

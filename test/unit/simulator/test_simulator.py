@@ -24,6 +24,7 @@ import time
 import pytest
 
 from nfo_sinus_driver.simulator.control import Client
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
 
@@ -215,9 +216,9 @@ def test_the_motor_lives_in_real_time(link):
     with Simulator(settings={'control.accel': 0.5}, control='', link=link) as simulator:
         with simulator.lock:
             drive = simulator.drives[1]
-            drive.write(0x294, [3])
-            drive.write(0x3FC, [200])
-            drive.write(0x298, [0x101])
+            server(drive).write(0x294, [3])
+            server(drive).write(0x3FC, [200])
+            server(drive).write(0x298, [0x101])
         begin = time.monotonic()
         with Client.at_link(link) as client:
             state = client.wait_for(lambda state: state['frequency'] == 20, timeout=5)
