@@ -25,6 +25,9 @@ import sys
 
 import pytest
 
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'nfo_sinus_driver'
 
@@ -42,8 +45,9 @@ MAY_IMPORT = {
     'signals': set(),
     'jobs': {'link'},
     'turns': {'jobs'},
-    # who knows a family's words by their names, until these are its profile and its simulator
+    # who knows a family's words by their names, until these are its profile
     'drive': {'bus', 'catalog', 'families', 'link'},
+    # the folders of a family in there, of its words; the rest, of which is the default
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
     'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
@@ -56,6 +60,16 @@ OPENS_NO_PORT = frozenset({'node/output.py'})
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
 PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
+
+#: What names a family in a file that is to know none: in an import, an identifier, a text.
+FAMILY = re.compile(
+    '|'.join([*families(), r'sinus_', r'simulator\.sinus\b', r'(?<![a-z0-9])g2', 'optimal']),
+    re.IGNORECASE,
+)
+#: Every parameter of every family: none of them is known there either.
+KEYS = re.compile(
+    '|'.join(sorted({re.escape(key) for name in families() for key in load_family(name)}))
+)
 
 MOST_LINES = 600
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
@@ -116,6 +130,12 @@ def opens_ports(tree: ast.Module) -> Iterator[str]:
             yield from (f'os.{alias.name}' for alias in node.names if alias.name in PORT_CALLS)
 
 
+def families_in(source: str) -> Iterator[str]:
+    """What of a family stands in a file that is to know none, the name of the package apart."""
+    text = source.replace(PACKAGE, '')
+    yield from (found[0] for pattern in (FAMILY, KEYS) for found in pattern.finditer(text))
+
+
 def violations(path: str, source: str) -> list[str]:
     """What is wrong with a file of the package; ``path`` is its path below the package."""
     tree = ast.parse(source)
@@ -137,6 +157,12 @@ def violations(path: str, source: str) -> list[str]:
             found.append(f'{room} imports {name}')
     if room not in OPENS_PORTS and path not in OPENS_NO_PORT:
         found += [f'{room} opens ports with {call}' for call in opens_ports(tree)]
+    if room == 'simulator':
+        own, _, inside = path.removeprefix('simulator/').rpartition('/')
+        others = [name for name in families() if own and name != own]
+        found += [f'{own} imports {name}' for name in others if f'simulator.{name}' in source]
+        if not own:
+            found += [f'{inside} knows {what}' for what in families_in(source)]
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
         found.append(f'{lines} lines are too many')
@@ -248,6 +274,20 @@ for module in {modules!r}:
         ('bus.py', 'import os\nos.open("/dev/ttyUSB0", os.O_RDWR)', 'bus opens ports with os.open'),
         ('node/line.py', 'from os import open as o', 'node opens ports with os.open'),
         ('drive/drive.py', '\n' * 601, '601 lines are too many'),
+        ('simulator/drive.py', "model = 'sinus_g2'", 'drive.py knows sinus_g2'),
+        ('simulator/drive.py', 'class OptimalUnit: ...', 'drive.py knows Optimal'),
+        ('simulator/drive.py', 'def g2_only(): ...', 'drive.py knows g2'),
+        (
+            'simulator/drive.py',
+            'from nfo_sinus_driver.simulator.sinus import variant',
+            'drive.py knows simulator.sinus',
+        ),
+        (
+            'simulator/sinus_g2/family.py',
+            'from nfo_sinus_driver.simulator.sinus_optimal import family',
+            'sinus_g2 imports sinus_optimal',
+        ),
+        ('simulator/drive.py', "key == 'fieldbus.mode'", 'drive.py knows fieldbus.mode'),
         ('shed/tools.py', '', 'shed is no room of the house'),
     ],
 )
@@ -265,6 +305,8 @@ def test_checker_sees(path: str, source: str, complaint: str) -> None:
         ('drive/drive.py', 'from nfo_sinus_driver.bus import Bus\nfrom .errors import DriveError'),
         ('catalog/family.py', 'import csv\nopen("sinus_g2.csv")\nos.path.open'),
         ('drive/drive.py', '\n' * 600),
+        ('simulator/drive.py', 'from nfo_sinus_driver.families import USUAL'),
+        ('simulator/sinus_g2/control_unit.py', "class G2:\n    key = 'fieldbus.mode'"),
     ],
 )
 def test_checker_lets_pass(path: str, source: str) -> None:
