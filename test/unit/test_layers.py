@@ -42,7 +42,7 @@ MAY_IMPORT = {
     'bus': {'link'},
     'signals': set(),
     'drive': {'bus', 'catalog', 'link'},
-    # the codes of each drive that is simulated
+    # the folders of a family in there, of its words; the rest, of which is the default
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals'},
     'demo': {'node'},
@@ -70,6 +70,16 @@ NAMED = {
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
 PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
+
+#: What names a family in a file that is to know none: in an import, an identifier, a text.
+FAMILY = re.compile(
+    '|'.join([*families(), r'sinus_', r'simulator\.sinus\b', r'(?<![a-z0-9])g2', 'optimal']),
+    re.IGNORECASE,
+)
+#: Every parameter of every family: none of them is known there either.
+KEYS = re.compile(
+    '|'.join(sorted({re.escape(key) for name in families() for key in load_family(name)}))
+)
 
 MOST_LINES = 600
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
@@ -153,6 +163,12 @@ def named(tree: ast.Module) -> set[str]:
     return {name for text in texts for name in family_names().findall(text)}
 
 
+def families_in(source: str) -> Iterator[str]:
+    """What of a family stands in a file that is to know none, the name of the package apart."""
+    text = source.replace(PACKAGE, '')
+    yield from (found[0] for pattern in (FAMILY, KEYS) for found in pattern.finditer(text))
+
+
 def violations(path: str, source: str) -> list[str]:
     """What is wrong with a file of the package; ``path`` is its path below the package."""
     tree = ast.parse(source)
@@ -177,6 +193,12 @@ def violations(path: str, source: str) -> list[str]:
     if room not in NAMES_FAMILIES:
         more = named(tree) - NAMED.get(path, set())
         found += [f'{room} names {name}' for name in sorted(more)]
+    if room == 'simulator':
+        own, _, inside = path.removeprefix('simulator/').rpartition('/')
+        others = [name for name in families() if own and name != own]
+        found += [f'{own} imports {name}' for name in others if f'simulator.{name}' in source]
+        if not own:
+            found += [f'{inside} knows {what}' for what in families_in(source)]
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
         found.append(f'{lines} lines are too many')
@@ -346,6 +368,20 @@ for module in {modules!r}:
         ('node/main.py', 'if model == "sinus_optimal": pass', 'node names sinus_optimal'),
         ('link/rtu.py', 'MODE = "fieldbus.mode"', 'link names fieldbus.mode'),
         ('drive/drive.py', '\n' * 601, '601 lines are too many'),
+        ('simulator/drive.py', "model = 'sinus_g2'", 'drive.py knows sinus_g2'),
+        ('simulator/drive.py', 'class OptimalUnit: ...', 'drive.py knows Optimal'),
+        ('simulator/drive.py', 'def g2_only(): ...', 'drive.py knows g2'),
+        (
+            'simulator/drive.py',
+            'from nfo_sinus_driver.simulator.sinus import variant',
+            'drive.py knows simulator.sinus',
+        ),
+        (
+            'simulator/sinus_g2/family.py',
+            'from nfo_sinus_driver.simulator.sinus_optimal import family',
+            'sinus_g2 imports sinus_optimal',
+        ),
+        ('simulator/drive.py', "key == 'fieldbus.mode'", 'drive.py knows fieldbus.mode'),
         ('shed/tools.py', '', 'shed is no room of the house'),
     ],
 )
@@ -365,6 +401,8 @@ def test_checker_sees(path: str, source: str, complaint: str) -> None:
         ('drive/drive.py', '"""Such as motor.p_nom of a sinus_g2."""\nlog = "motor.log"'),
         ('families/sinus_g2/profile.py', 'MODE = "fieldbus.mode"'),
         ('drive/drive.py', '\n' * 600),
+        ('simulator/drive.py', 'from nfo_sinus_driver.families import USUAL'),
+        ('simulator/sinus_g2/control_unit.py', "class G2:\n    key = 'fieldbus.mode'"),
     ],
 )
 def test_checker_lets_pass(path: str, source: str) -> None:

@@ -151,8 +151,7 @@ class Rig:
         **options: Any,
     ) -> None:
         self._trace = trace
-        options.setdefault('boot_time', 0.2)
-        options.setdefault('variant', hardest(settings.model))
+        options = {'boot_time': 0.2, **hardest(settings.model), **options}
         self.simulator = Simulator(
             baud=BAUD,
             trace=str(trace),
