@@ -50,6 +50,7 @@ from nfo_sinus_driver.jobs import read_in_parts
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Keeper
+from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NotReady
@@ -141,9 +142,9 @@ class Bus:
             self._enter(slot)
 
     @property
-    def space(self) -> str:
-        """How parameters are addressed on this line: ``modbus`` or ``classic``."""
-        return self._link.space
+    def protocol(self) -> LineProtocol:
+        """What this line speaks."""
+        return self._link.protocol
 
     @property
     def alive(self) -> bool:

@@ -23,14 +23,6 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Address
 
-#: The address that every drive listens to and none answers [M0 §6.1.2].
-EVERYBODY = 95
-
-
-def can_broadcast(bus: Bus) -> bool:
-    """Tell whether the protocol of a line has a broadcast that every drive obeys."""
-    return bus.space == 'classic'
-
 
 async def broadcast_stop(bus: Bus) -> None:
     """
@@ -40,7 +32,9 @@ async def broadcast_stop(bus: Bus) -> None:
 
     :raises LinkError: the port is lost.
     """
+    everybody = bus.protocol.broadcast
+    assert everybody is not None, 'the protocol has a broadcast'
     g2 = load_family('sinus_g2')
-    mode = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
+    mode = g2[g2.key(Role.CONTROL_SOURCE)].at(bus.protocol.addressing)
     data = mode.number.encode(Mode.STOP)
-    await bus.write(EVERYBODY, Address(*mode.place), data, Priority.STOP)
+    await bus.write(everybody, Address(*mode.place), data, Priority.STOP)

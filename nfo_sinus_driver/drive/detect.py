@@ -37,10 +37,10 @@ async def detect_model(bus: Bus, unit: int) -> str:
 
     :raises DriveError: it does not answer; the message says what to check.
     """
-    if bus.space == 'classic':
+    if not bus.protocol.identifies:
         return 'sinus_g2'
     g2 = load_family('sinus_g2')
-    firmware = g2[g2.key(Role.FIRMWARE)].at('modbus')
+    firmware = g2[g2.key(Role.FIRMWARE)].at(bus.protocol.addressing)
     try:
         if await bus.identify(unit, Priority.SERVICE) != Identification():
             return 'sinus_g2'

@@ -20,7 +20,9 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: Frames need no silence between them, but transmitters take a moment to switch, characters.
@@ -36,6 +38,17 @@ class AsciiLink(SerialLink):
     The standard allows a pause of a second between two characters. An answer whose end was lost
     would leave the line unused for that, so no pause may be longer than it may take to begin one.
     """
+
+    protocol = LineProtocol(
+        name='modbus_ascii',
+        addressing='modbus',
+        units=UNITS,
+        baud_rate=19200,
+        char_format='7E1',
+        char_formats=('7E1', '7O1', '7N2', '7N1', '7E2', '7O2'),
+        identifies=True,
+        writes_and_reads=True,
+    )
 
     @property
     def _gap(self) -> float:

@@ -47,13 +47,13 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.serial_link import Port
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.settings import LineSettings
 
 #: Bytes in a message.
 _WORD = 2
-#: SiProt of both firmwares [M0 §6.1.2], [M2 §4], [C5].
-CHAR_FORMATS = ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1')
 
 #: Pauses within an answer may last this long, s: no manual limits them [C86].
 _LUMP = 0.03
@@ -107,17 +107,22 @@ class ClassicLink:
     answered, ACK and NAK when they begin again within two characters; later ones may pass for the
     answer, a REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that
     protects them, so choose a format that has it.
-
-    :raises ValueError: a character format that no firmware has.
     """
 
-    space = 'classic'
+    #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
+    #: [M0 §6.1.2], [C10].
+    protocol = LineProtocol(
+        name='classic',
+        addressing='classic',
+        units=range(classic.POINT_TO_POINT, BROADCAST),
+        baud_rate=9600,
+        char_format='7E1',
+        char_formats=('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1'),
+        broadcast=BROADCAST,
+        point_to_point=classic.POINT_TO_POINT,
+    )
 
     def __init__(self, port: Port, settings: LineSettings) -> None:
-        if settings.char_format not in CHAR_FORMATS:
-            raise ValueError(
-                f'char_format {settings.char_format!r}: classic has {", ".join(CHAR_FORMATS)}'
-            )
         self._port = port
         self._settings = settings
         self._doubts: Doubts[Kind] = Doubts(settings.response_timeout)
@@ -127,6 +132,15 @@ class ClassicLink:
         self._echoes = False
         #: What the slowest unit took lately until its answer began, s.
         self._slowest = _TURNAROUND
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> ClassicLink:
+        """
+        Return the link on a port.
+
+        :raises ValueError: what is named is no port; the message says what to write.
+        """
+        return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
         """

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 from typing import Protocol
 
+from nfo_sinus_driver.link.protocol import LineProtocol
+
 
 @dataclass(frozen=True)
 class Address:
@@ -97,10 +99,10 @@ class Link(Protocol):
     """
     One line to several units, used by one thread.
 
-    :ivar space: how parameters are addressed: ``modbus`` by register, ``classic`` by id.
+    :ivar protocol: what it speaks.
     """
 
-    space: str
+    protocol: LineProtocol
 
     def open(self) -> None:
         """

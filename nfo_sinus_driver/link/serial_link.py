@@ -22,7 +22,6 @@ from collections.abc import Sequence
 import contextlib
 import time
 from typing import Any
-from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.link.answer_reader import AnswerReader
@@ -44,6 +43,8 @@ from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 from nfo_sinus_driver.link.modbus_probes import answer_kinds
 from nfo_sinus_driver.link.modbus_probes import probes
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
@@ -60,18 +61,6 @@ _PAUSES = 3
 _WRITE_PATIENCE = 0.02
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
-
-
-class Port(Protocol):
-    """What carries the bytes."""
-
-    def open(self) -> None: ...  # noqa: D102
-
-    def close(self) -> None: ...  # noqa: D102
-
-    def write(self, data: bytes) -> None: ...  # noqa: D102
-
-    def read(self, until: float) -> bytes: ...  # noqa: D102
 
 
 class SerialLink(ModbusLink):
@@ -115,6 +104,15 @@ class SerialLink(ModbusLink):
         self._stray = False
         #: When the last byte was on the line, as far as we know.
         self._line_end = 0.0
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> SerialLink:
+        """
+        Return the link on a port.
+
+        :raises ValueError: what is named is no port; the message says what to write.
+        """
+        return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
         """

@@ -38,7 +38,6 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
-from nfo_sinus_driver.drive.settings import require_address
 from nfo_sinus_driver.node.autostart import Autostart
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
@@ -311,7 +310,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         names = {field.name for field in dataclasses.fields(DriveSettings)}
         wanted = {name: value for name, value in values.items() if name in names}
         settings = DriveSettings(**wanted, retries=self._line.retries)  # type: ignore[arg-type]
-        require_address(settings.address, self._line.bus.space)
+        self._line.bus.protocol.require_unit(settings.address)
         other = self._line.rival_of(self, settings.address)
         if other is not None:
             raise ValueError(

@@ -30,7 +30,6 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.drive.settings import POINT_TO_POINT
 from nfo_sinus_driver.node.listener import Listener
 from nfo_sinus_driver.node.outbox import Outbox
 
@@ -107,8 +106,9 @@ class Line:
 
     def rival_of(self, owner: DriveNode, address: int) -> DriveNode | None:
         """Return another node whose drive would answer to an address, too."""
+        alone = self.bus.protocol.point_to_point
         for node in self.drives:
             theirs = node.settings.address
-            if node is not owner and (theirs == address or POINT_TO_POINT in (theirs, address)):
+            if node is not owner and (theirs == address or alone in (theirs, address)):
                 return node
         return None

@@ -28,6 +28,7 @@ from typing import NamedTuple
 from support.addresses import packed
 from support.addresses import register
 
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
@@ -66,7 +67,7 @@ class FakeLink:
     :ivar opening: called when the port is opened; may raise.
     """
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self) -> None:
         self.done: list[Done] = []

@@ -48,6 +48,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -147,7 +148,7 @@ class DirectLink:
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig

@@ -36,7 +36,6 @@ from support.addresses import classic_id
 from support.addresses import packed
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.classic_link import CHAR_FORMATS
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
@@ -113,7 +112,7 @@ def test_read_and_write(lump: bool, unit: int) -> None:
     assert bench.drive.requests == [(unit, 0x1E, None, 'answer'), (unit, 0x1E, 0xFF9C, 'answer')]
 
 
-@pytest.mark.parametrize('char_format', CHAR_FORMATS)
+@pytest.mark.parametrize('char_format', ClassicLink.protocol.char_formats)
 @pytest.mark.parametrize('baud', BAUD_RATES)
 def test_every_rate_and_format_at_the_limit_of_the_wire(baud: int, char_format: str) -> None:
     line = LineSettings(baud, char_format, TIMEOUT)
@@ -135,12 +134,6 @@ def test_the_same_question_to_one_drive_after_the_other_costs_nothing_more() -> 
         bench.write(A, 1, unit=1)
         bench.write(A, 1, unit=2)
     assert bench.wire.now - start == pytest.approx(20 * (22 + 17) * SETTINGS.char_time)
-
-
-@pytest.mark.parametrize('char_format', ['7N1', '7E2', '8E2'])
-def test_a_format_that_no_firmware_has(char_format: str) -> None:
-    with pytest.raises(ValueError, match='classic has 7E1, 7O1, 7N2, 8E1, 8O1, 8N2, 8N1'):
-        Bench(settings=LineSettings(9600, char_format))
 
 
 def test_reply_says_when_its_last_byte_came() -> None:

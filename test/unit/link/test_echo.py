@@ -47,6 +47,7 @@ from virtual_wire import Fate
 from virtual_wire import Slave
 from virtual_wire import Wire
 
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.ascii_link import AsciiLink
 from nfo_sinus_driver.link.echo import Echo
@@ -55,7 +56,6 @@ from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.rtu_link import RtuLink
 
 KINDS = {'rtu': (RtuLink, Wire), 'ascii': (AsciiLink, AsciiWire)}

@@ -28,8 +28,8 @@ from support.addresses import register
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.open import line_settings
 
 ONE = register(0x2A5)
 TWO = register(0x258, 2)
