@@ -38,7 +38,6 @@ from nfo_sinus_driver.link.classic_refusal import MODE
 from nfo_sinus_driver.link.classic_refusal import SIO_ERR
 from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
 from nfo_sinus_driver.link.consistent_read import consistent_read
-from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -47,6 +46,7 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.protocol import LineProtocol
@@ -68,7 +68,7 @@ _TURNAROUND_MARGIN = 2.0
 _KEPT_OF_SLOWEST = 0.98
 #: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
 #: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
-#: certain, see Doubts.
+#: certain, see LateReplies.
 _EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
 #: How old the inverter status may be to show that a serial fault is new, s.
 _FRESH = 1.0
@@ -90,10 +90,10 @@ class ClassicLink:
 
     A REPLY names its parameter, ACK and NAK name nothing. So whenever an answer is missing or
     damaged, or bytes come that nobody asked for, the kinds of answers that may still come are in
-    doubt (:class:`Doubts`). A parameter whose REPLY is in doubt is only read after another one has
-    been. A write is never kept waiting, for it may be a stop; but if its answer is in doubt it is
-    not believed: the line is cleared by reading something, and :class:`DamagedAnswer` says that
-    nobody knows.
+    quarantine (:class:`LateReplies`). A parameter whose REPLY is there is only read after another
+    one has been. A write is never kept waiting, for it may be a stop; but if its answer is there
+    it is not believed: the line is cleared by reading something, and :class:`DamagedAnswer` says
+    that nobody knows.
 
     An adapter that echoes what is sent is noticed at the first request; from then on an answer
     counts only behind the echo.
@@ -125,7 +125,9 @@ class ClassicLink:
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
-        self._doubts: Doubts[Kind] = Doubts(settings.response_timeout)
+        self._late: LateReplies[Request, Kind] = LateReplies(
+            settings.response_timeout, classic.kinds
+        )
         #: The inverter status that each unit told last, and when.
         self._inv_st: dict[int, tuple[int, float]] = {}
         self._last: _Answer | None = None
@@ -153,7 +155,7 @@ class ClassicLink:
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         self._port.close()
-        self._doubts.clear()
+        self._late.clear()
         self._inv_st.clear()
         self._last = None
         self._echoes = False
@@ -233,7 +235,7 @@ class ClassicLink:
             with contextlib.suppress(NoAnswer, DamagedAnswer):
                 _, _, early = self._transact(request)
                 if early:
-                    self._distrust(request)
+                    self._late.expect(request, time.monotonic())
             return self.write(unit, address, data)
         except LinkError as error:
             error.maybe_done = True
@@ -257,7 +259,7 @@ class ClassicLink:
             self._listen(request)
         answer, arrived, early = self._transact(request)
         if early:
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
             self._clear(unit)
             self._listen(request)
             answer, arrived, _ = self._transact(request)
@@ -337,11 +339,7 @@ class ClassicLink:
         :raises NotReady: all are.
         """
         questions = ((number, (number,)) for number in (*numbers, *_EVERYWHERE))
-        return self._doubts.first_certain(unit, questions)
-
-    def _distrust(self, request: Request) -> None:
-        """Expect an answer to a request, one more than has come."""
-        self._doubts.add(request.unit, classic.kinds(request))
+        return self._late.first_certain(unit, questions, time.monotonic())
 
     def _listen(self, request: Request) -> None:
         """Take what came unasked; wait for it where it could pass for the answer to a request."""
@@ -352,7 +350,7 @@ class ClassicLink:
             until = max(until, last.arrived + pause)
         while True:
             if self._port.read(until) and last:
-                self._distrust(last.request)
+                self._late.expect(last.request, time.monotonic())
             if time.monotonic() >= until:
                 return
 
@@ -375,17 +373,17 @@ class ClassicLink:
         try:
             answer, arrived, more = self._receive(request, sent)
         except (NoAnswer, DamagedAnswer):
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
             # if the adapter still echoes, the next echo will tell
             self._echoes = False
             raise
         # units answer in order: whatever was still to come has come before this
-        self._doubts.end(request.unit)
+        self._late.release(request.unit)
         self._last = _Answer(request, classic.kind(answer), arrived)
         took = arrived - sent - len(classic.encode(answer)) * self._settings.char_time
         self._slowest = max(took, _KEPT_OF_SLOWEST * self._slowest)
         if more:
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
         again = before is not None and before.request == request and isinstance(answer, Value)
         # a character less, for no clock is exact
         least = (classic.LONGEST_ANSWER - 1) * self._settings.char_time
@@ -393,7 +391,7 @@ class ClassicLink:
 
     def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
         """Return the answer, when it came, and whether more came behind it."""
-        doubt = self._doubts.of(request.unit)
+        quarantined = self._late.quarantined(request.unit, time.monotonic())
         longest = classic.LONGEST_ANSWER * self._settings.char_time + _LUMP
         deadline = sent + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
@@ -415,7 +413,7 @@ class ClassicLink:
                     self._echoes = echoed = True
                     came -= len(classic.encode(request))
                 elif echoed and classic.answers(message, request):
-                    if classic.kind(message) not in doubt:
+                    if classic.kind(message) not in quarantined:
                         return message, now, bool(messages[number:] or reader.pending)
                     if isinstance(request, Select):
                         raise _Ambiguous(

@@ -60,14 +60,17 @@ class Bench:
         fates: list[Fate] | None = None,
         settings: LineSettings = SETTINGS,
         probes: tuple[Address, ...] = (ONE, TWO),
+        *,
+        trusted: bool = False,
     ) -> None:
         self.wire = self.wire_class(settings)
         self.slave = Slave(self.wire, iter(fates or []))
         self.link = self.link_class(self.wire, settings)
         with self.wire.time():
             self.link.open()
-            # as behind a line that has told something twice before
-            self.link.distrust()
+            if not trusted:
+                # as behind a line that has told something twice before
+                self.link._late.heard_unasked(self.wire.now)
         self.link.use_probes(UNIT, probes)
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
