@@ -49,12 +49,12 @@ from nfo_sinus_driver.jobs import log_unexpected
 from nfo_sinus_driver.jobs import read_in_parts
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import Keeper
 from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Reconnect
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.silence import Silences
 from nfo_sinus_driver.statistics import Recorder
@@ -81,7 +81,7 @@ class Bus:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._port = Keeper(link)
+        self._port = Reconnect(link)
         self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
         self._awake = threading.Event()
         #: Which units do not answer, for coroutines on the worker.
@@ -160,9 +160,9 @@ class Bus:
         """Why the port is not open, or ``None`` when it is."""
         return None if self._port.is_open else self._port.error
 
-    def use_probes(self, unit: int, probes: tuple[Address, ...]) -> None:
+    def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
         """Tell the link which parameters of a unit it may read to find out if it hears it."""
-        self.call(lambda: self._link.use_probes(unit, probes))
+        self.call(lambda: self._link.use_resync_reads(unit, addresses))
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
@@ -464,7 +464,7 @@ class Bus:
         self.silences.note(unit, now, error, now - started)
         self._turns.took(now - started)
         if isinstance(error, PortError):
-            self._port.lose(error, now + REOPEN_PERIOD)
+            self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
             self.recorder.transaction(unit, now, now - started, error)
 

@@ -46,7 +46,7 @@ _SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
-_PROBES = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
+_RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
 
 
 class Registers:
@@ -68,8 +68,8 @@ class Registers:
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = bus.protocol.addressing
-        probes = (model.key(role) for role in _PROBES if role in model.roles)
-        bus.use_probes(unit, tuple(self.address(key) for key in probes))
+        reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
+        bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""

@@ -58,8 +58,8 @@ class AsciiLink(SerialLink):
         return modbus_ascii.encode(request)
 
     def _reader(self, request: Request[_T]) -> modbus_ascii.AsciiReader[_T]:
-        pause = min(modbus_ascii.PAUSE, self._settings.response_timeout)
-        return modbus_ascii.AsciiReader(request, pause)
+        timeout = min(modbus_ascii.INTER_BYTE_TIMEOUT, self._settings.response_timeout)
+        return modbus_ascii.AsciiReader(request, timeout)
 
     def _frame_length(self, message_length: int) -> int:
         return modbus_ascii.length(message_length)

@@ -52,11 +52,10 @@ from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.settings import LineSettings
 
-#: Bytes in a message.
-_WORD = 2
-
+#: What a message carries.
+_WORD = struct.Struct('>H')
 #: Pauses within an answer may last this long, s: no manual limits them [C86].
-_LUMP = 0.03
+_INTER_BYTE_TIMEOUT = 0.03
 #: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
 _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
@@ -160,7 +159,7 @@ class ClassicLink:
         self._last = None
         self._echoes = False
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
         Take parameters that are safe to read; here those are asked that every firmware has.
 
@@ -170,7 +169,10 @@ class ClassicLink:
 
     def parts(self, address: Address) -> tuple[Address, ...]:
         """Return the words: a message carries one."""
-        return tuple(Address(address.space, id_, None, _WORD) for id_ in _ids(address))
+        if address.sub_index is None:
+            return (address,)
+        ids = address.index, address.sub_index
+        return tuple(Address(address.space, id_, None, _WORD.size) for id_ in ids)
 
     def read(self, unit: int, address: Address) -> Reply:
         """
@@ -180,7 +182,7 @@ class ClassicLink:
         """
         if address.sub_index is None:
             word, arrived = self._enquire(unit, address.index)
-            return Reply(word.to_bytes(_WORD, 'big'), arrived)
+            return Reply(_WORD.pack(word), arrived)
         steps = consistent_read(unit, self.parts(address))
         part = next(steps)
         while True:
@@ -194,21 +196,12 @@ class ClassicLink:
         """
         Write one parameter; unit 95 means all of them, and nobody confirms it.
 
-        Of two words the low one is written first, as they are numbered; the manuals have no
-        such parameter, so nothing says how. A refused second word leaves the first one written.
+        It has one word: nobody writes what has two, and no manual says how.
 
         :raises LinkError: as its subclasses say.
         """
-        arrived = 0.0
-        ids = _ids(address)
-        words = struct.unpack(f'>{len(ids)}H', data)
-        for position, (id_, word) in enumerate(zip(ids, words, strict=True)):
-            try:
-                arrived = self._select(Select(unit, id_, word))
-            except LinkError as error:
-                error.maybe_done = error.maybe_done or position > 0
-                raise
-        return Reply(b'', arrived)
+        (word,) = _WORD.unpack(data)
+        return Reply(b'', self._select(Select(unit, address.index, word)))
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
@@ -328,13 +321,13 @@ class ClassicLink:
         """
         Read something that cannot be mistaken: what was late has come before it.
 
-        :raises NotReady: everything that could be read is in doubt.
+        :raises NotReady: everything that could be read is in quarantine.
         """
         self._enquire(unit, self._first_certain(unit))
 
     def _first_certain(self, unit: int, *numbers: int) -> int:
         """
-        Return the first of some parameters, or of those to be read at any time, not in doubt.
+        Return the first of some parameters, or of those to be read at any time, not in quarantine.
 
         :raises NotReady: all are.
         """
@@ -392,7 +385,7 @@ class ClassicLink:
     def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
         """Return the answer, when it came, and whether more came behind it."""
         quarantined = self._late.quarantined(request.unit, time.monotonic())
-        longest = classic.LONGEST_ANSWER * self._settings.char_time + _LUMP
+        longest = classic.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
         deadline = sent + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         last_chance = deadline + 2 * longest
@@ -423,11 +416,6 @@ class ClassicLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
-
-
-def _ids(address: Address) -> tuple[int, ...]:
-    """Return the id of each word, the low one first."""
-    return (address.index,) if address.sub_index is None else (address.index, address.sub_index)
 
 
 class NothingToAsk:

@@ -159,7 +159,7 @@ class Link(Protocol):
     def identify(self, unit: int) -> Inquiry:
         """Return the questions by which a unit tells who it is; nothing is sent yet."""
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
         Name parameters of different sizes that are safe to read at any time.
 

@@ -42,10 +42,10 @@ from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
-from nfo_sinus_driver.link.modbus_probes import answer_kinds
-from nfo_sinus_driver.link.modbus_probes import probes
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.resync_reads import answer_kinds
+from nfo_sinus_driver.link.resync_reads import resync_reads
 from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
@@ -53,7 +53,7 @@ _T = TypeVar('_T')
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
 #: How long a write waits at least for a line that is not silent, s.
-_WRITE_PATIENCE = 0.02
+_WRITE_WAIT = 0.02
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
 
@@ -83,11 +83,11 @@ class SerialLink(ModbusLink):
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )
-        self._safe: dict[int, tuple[Address, ...]] = {}
+        self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         self._echo = Echo()
         #: When the last request had left.
         self._sent_at = 0.0
-        #: The probe on its way is only about that.
+        #: The resync read on its way is only about that.
         self._confirming = False
         #: Other bytes came with the last answer.
         self._stray = False
@@ -118,9 +118,9 @@ class SerialLink(ModbusLink):
         self._late.clear()
         self._echo = Echo()
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
-        self._safe[unit] = tuple(probes)
+        self._resync_addresses[unit] = tuple(addresses)
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
@@ -165,14 +165,14 @@ class SerialLink(ModbusLink):
         """Return the answer to a request, and when its last byte came."""
         self._await_silence(request)
         # a write answer names what was written, and nobody believes it without reading back
-        probed = not isinstance(request, Write) and self._make_certain(request)
+        resynced = not isinstance(request, Write) and self._make_certain(request)
         try:
             answer = self._transact(request)
         except Refused:
             self._confirm(request)
             raise
         except LinkError as error:
-            error.heard = probed
+            error.heard = resynced
             raise
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
@@ -199,12 +199,12 @@ class SerialLink(ModbusLink):
         """
         if not self._in_quarantine(request):
             return False
-        questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
+        questions = [(request, (request.answer_head,)), *self._resync_reads(request.unit)]
         question = self._late.first_certain(request.unit, questions, time.monotonic())
         if question is request:
             return False
         try:
-            self._probe(question)
+            self._resync_read(question)
         except LinkError as error:
             # nobody has heard the request itself
             error.maybe_done = False
@@ -212,14 +212,14 @@ class SerialLink(ModbusLink):
         self._await_silence(request)
         return True
 
-    def _probes(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
-        return probes(unit, self._safe.get(unit, ()))
+    def _resync_reads(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
+        return resync_reads(unit, self._resync_addresses.get(unit, ()))
 
-    def _probe(self, probe: Request[Any]) -> None:
+    def _resync_read(self, read: Request[Any]) -> None:
         """Have a unit answer, whatever it says."""
         # a refusal that is believed tells as well as an answer that all is said
         with contextlib.suppress(Refused):
-            self._transact(probe)
+            self._transact(read)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
         """
@@ -248,14 +248,14 @@ class SerialLink(ModbusLink):
         self._confirming = True
         try:
             stray |= self._await_silence(request)
-            probes = self._probes(request.unit)
-            self._probe(self._late.first_certain(request.unit, probes, time.monotonic()))
+            reads = self._resync_reads(request.unit)
+            self._resync_read(self._late.first_certain(request.unit, reads, time.monotonic()))
             if not stray and not self._stray:
                 return
         except (NotReady, NeverSilent):
             pass
         except (NoAnswer, DamagedAnswer):
-            # the right answer may be as late as that to the probe
+            # the right answer may be as late as that to the other
             self._late.expect(request, time.monotonic())
             raise
         finally:
@@ -286,8 +286,8 @@ class SerialLink(ModbusLink):
         :raises NeverSilent: there is none.
         """
         is_write = isinstance(request, (Write, WriteAndRead))
-        patience = self._write_patience if is_write else self._settings.response_timeout
-        give_up = max(self._line_end + self._gap, time.monotonic()) + patience
+        wait = self._write_wait if is_write else self._settings.response_timeout
+        give_up = max(self._line_end + self._gap, time.monotonic()) + wait
         came = False
         while True:
             data = self._port.read(self._line_end + self._gap)
@@ -305,10 +305,10 @@ class SerialLink(ModbusLink):
                 raise NeverSilent('the line is never silent: noise, or another master on it')
 
     @property
-    def _write_patience(self) -> float:
+    def _write_wait(self) -> float:
         """How long a write waits for a line that is not silent, s: one answer of two registers."""
         longest = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
-        return max(_WRITE_PATIENCE, longest)
+        return max(_WRITE_WAIT, longest)
 
     # --- one transaction --------------------------------------------------------------------------
 
@@ -382,8 +382,9 @@ class SerialLink(ModbusLink):
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
                 return answer, now
-            rest = (self._echo.missing + reader.missing) * char_time + reader.patience
-            deadline = min(max(first, now + rest), last_chance + _PAUSES * reader.patience)
+            pause = reader.inter_byte_timeout
+            rest = (self._echo.bytes_needed + reader.bytes_needed) * char_time + pause
+            deadline = min(max(first, now + rest), last_chance + _PAUSES * pause)
         held = self._echo.give_up()
         if held and not isinstance(request, Write):
             answer = _feed(reader, held, refusals)

@@ -65,8 +65,8 @@ class TcpLink(ModbusLink):
     A Modbus master on one connection to a gateway; a unit is a drive behind it.
 
     Every request has a number of its own, which its answer repeats: a late or doubled answer is
-    told from the right one by that, so no unit is ever in doubt. Drives that do not answer leave
-    the connection as it is.
+    told from the right one by that, so nothing is ever in quarantine. Drives that do not answer
+    leave the connection as it is.
 
     :param response_timeout: from a request sent to its answer, s.
     """
@@ -125,8 +125,8 @@ class TcpLink(ModbusLink):
         if connection is not None:
             connection.close()
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
-        """Take parameters that are safe to read; here nothing has to be probed."""
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """Take parameters that are safe to read; here nothing has to be resynchronised."""
 
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""

@@ -76,7 +76,7 @@ class FakeLink:
         self.closing: Callable[[], None] = lambda: None
         self.opened = 0
         self.closed = 0
-        self.probes: dict[int, tuple[Address, ...]] = {}
+        self.resync_reads: dict[int, tuple[Address, ...]] = {}
         self._condition = threading.Condition()
         self._hold = self._holds = False
 
@@ -133,8 +133,8 @@ class FakeLink:
             self.read(unit, source)
         return self.write(unit, address, data)
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
-        self.probes[unit] = tuple(probes)
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        self.resync_reads[unit] = tuple(addresses)
 
     def _transact(self, done: Done) -> Reply:
         with self._condition:

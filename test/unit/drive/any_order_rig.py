@@ -189,7 +189,7 @@ class DirectLink:
     def parts(self, address: Address) -> tuple[Address]:
         return (address,)
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         pass
 
     def identify(self, unit: int) -> _Told:

@@ -110,7 +110,7 @@ class Tap:
         self.open = link.open
         self.close = link.close
         self.parts = link.parts
-        self.use_probes = link.use_probes
+        self.use_resync_reads = link.use_resync_reads
         self.identify = link.identify
 
     def read(self, unit: int, address: Address) -> Reply:

@@ -37,7 +37,9 @@ EVERY = pytest.mark.parametrize('ends', _ON_CLASSIC, ids=[ends.name for ends in 
 
 @pytest.fixture(scope='module')
 def registers() -> Registers:
-    bus = SimpleNamespace(protocol=PROTOCOLS['classic'], use_probes=lambda unit, probes: None)
+    bus = SimpleNamespace(
+        protocol=PROTOCOLS['classic'], use_resync_reads=lambda unit, addresses: None
+    )
     return Registers(bus, 1, load_family('sinus_g2'), 0)  # type: ignore[arg-type]
 
 

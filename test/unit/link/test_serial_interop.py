@@ -40,7 +40,7 @@ def link(request: pytest.FixtureRequest) -> Iterator[Link]:
     protocol = f'modbus_{request.param}'
     with serial_server(request.param) as path:
         link = open_link(protocol, path, line_settings(protocol, response_timeout=5.0))
-        link.use_probes(1, (ONE, TWO))
+        link.use_resync_reads(1, (ONE, TWO))
         link.open()
         yield link
         link.close()
