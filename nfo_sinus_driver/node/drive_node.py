@@ -35,7 +35,6 @@ from rclpy.parameter import Parameter
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive.settings import require_address
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
@@ -231,7 +230,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         wanted = {name: value for name, value in values.items() if name in names}
         retries = self._bus_context.retries
         settings = DriveSettings(**wanted, retries=retries)  # type: ignore[arg-type]
-        require_address(settings.address, self._bus_context.bus.space)
+        self._bus_context.bus.protocol.require_unit(settings.address)
         other = self._bus_context.address_conflict(self.get_name(), settings.address)
         if other is not None:
             raise ValueError(

@@ -48,6 +48,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -148,7 +149,7 @@ class DirectLink:
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -189,7 +190,7 @@ class DirectLink:
     def parts(self, address: Address) -> tuple[Address]:
         return (address,)
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         pass
 
     def identify(self, unit: int) -> _Told:

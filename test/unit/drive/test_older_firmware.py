@@ -30,8 +30,8 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.classic import Server
 
