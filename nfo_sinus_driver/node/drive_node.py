@@ -51,6 +51,7 @@ from nfo_sinus_driver.node.settings import coerce
 from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.tuning import TuningServices
 
+_NAMES = frozenset(setting.name for setting in DRIVE_SETTINGS)
 #: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 
@@ -270,9 +271,12 @@ class DriveNode(LifecycleNodeMixin, Node):
 
         :raises ValueError: they make no sense, or cannot be changed now.
         """
+        changed = {one.name: one.value for one in parameters if one.name in _NAMES}
+        if not changed:
+            # those of the drive are many
+            return self.managed.settings
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']
-        changed = {parameter.name: parameter.value for parameter in parameters}
         _require_gear_ratio(changed)
         # not read_only for rclpy, so that what was dumped can be loaded
         autostart = self.get_parameter('autostart').value

@@ -44,6 +44,7 @@ from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
+from support.examples import examples
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
@@ -71,7 +72,7 @@ SEED = int(os.environ.get('SEED', '0'))
 _SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
-    max_examples=40,
+    max_examples=examples(80),
     stateful_step_count=30,
     derandomize=True,
     deadline=None,
