@@ -30,6 +30,8 @@ from classic_link_bench import UNIT
 from classic_link_bench import A
 from classic_link_bench import B
 from classic_link_bench import Bench
+from hypothesis import given
+from hypothesis import strategies as st
 import pytest
 from support.addresses import classic_id
 from support.addresses import packed
@@ -168,6 +170,16 @@ def test_write_and_read_takes_two_transactions() -> None:
     reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, packed(7), B))
     assert reply.data == bench.answer_of(1)
     assert bench.drive.requests == [(1, 0x1E, 7, 'answer'), (1, 0xB6, None, 'answer')]
+
+
+@given(st.binary(min_size=2, max_size=2))
+def test_any_word_there_and_back(data: bytes) -> None:
+    bench = Bench()
+    word = int.from_bytes(data, 'big')
+    assert bench.do(lambda: bench.link.write(UNIT, A, data)).data == b''
+    assert bench.drive.requests[0][1:3] == (A.index, word)
+    bench.drive.values = {A.index: lambda: word}
+    assert bench.read(A).data == data
 
 
 # --- broadcast ------------------------------------------------------------------------------------
