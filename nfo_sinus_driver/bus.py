@@ -44,9 +44,9 @@ from nfo_sinus_driver.jobs import Sleepers
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
+from nfo_sinus_driver.jobs import consistent_read
 from nfo_sinus_driver.jobs import inquire
 from nfo_sinus_driver.jobs import log_unexpected
-from nfo_sinus_driver.jobs import read_in_parts
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LineProtocol
@@ -174,7 +174,7 @@ class Bus:
         """
         parts = self._link.parts(address)
         if len(parts) > 1:
-            return read_in_parts(unit, parts, priority)
+            return consistent_read(unit, parts, priority)
         return Transfer(unit, address, priority)
 
     def write(
