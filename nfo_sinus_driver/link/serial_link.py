@@ -178,10 +178,6 @@ class SerialLink(ModbusLink):
             # it may be the one before, told twice
             self._late.expect(request, time.monotonic())
 
-    def _in_quarantine(self, request: Request[Any]) -> bool:
-        """Tell whether the answer to an earlier request would look like that to this one."""
-        return request.answer_head in self._late.quarantined(request.unit, time.monotonic())
-
     def _make_certain(self, request: Request[Any]) -> bool:
         """
         Have the unit answer something else, if its answer to this could be confused with another.
@@ -189,10 +185,11 @@ class SerialLink(ModbusLink):
         :returns: whether it was asked, and answered.
         :raises NotReady: that cannot be told from others either.
         """
-        if not self._in_quarantine(request):
+        unit, now = request.unit, time.monotonic()
+        if request.answer_head not in self._late.quarantined(unit, now):
             return False
-        questions = [(request, (request.answer_head,)), *self._resync_reads(request.unit)]
-        question = self._late.first_certain(request.unit, questions, time.monotonic())
+        questions = [(request, (request.answer_head,)), *self._resync_reads(unit)]
+        question = self._late.first_certain(unit, questions, now)
         if question is request:
             return False
         try:
