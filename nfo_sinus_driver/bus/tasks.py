@@ -29,16 +29,18 @@ import math
 from typing import Any
 
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Inquiry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import consistent_read
 
 _log = logging.getLogger(__name__)
 
 _NOWHERE = Address('', 0, None, 0)
+#: How often the parts of a value that changes meanwhile are read again.
+_TRIES = 5
 
 
 class Priority(enum.IntEnum):
@@ -100,21 +102,28 @@ class Transfer:
         return (yield self)
 
 
-async def read_in_parts(unit: int, parts: Sequence[Address], priority: Priority) -> Reply:
+async def consistent_read(unit: int, parts: Sequence[Address], priority: Priority) -> Reply:
     """
-    Read a parameter each of whose parts is a transaction of its own, so that a stop may go between.
+    Read a value each of whose two parts is a transaction of its own, so that a stop may go between.
 
+    The high part, the low one, and the high one again until it stands still: the value may change
+    meanwhile, but what is returned has been the value at one moment.
+
+    :param parts: the low one, then the high one.
+    :raises DamagedAnswer: it never stood still.
     :raises LinkError: as the link does.
     """
-    steps = consistent_read(unit, parts)
-    part = next(steps)
-    while True:
-        reply = await Transfer(unit, part, priority)
-        try:
-            part = steps.send(reply)
-        except StopIteration as end:
-            whole: Reply = end.value
-            return whole
+    low_part, high_part = parts
+    high = await Transfer(unit, high_part, priority)
+    for _ in range(_TRIES):
+        low = await Transfer(unit, low_part, priority)
+        again = await Transfer(unit, high_part, priority)
+        if again.data == high.data:
+            return Reply(low.data + high.data, again.arrived)
+        high = again
+    raise DamagedAnswer(
+        f'unit {unit}: {high_part.space} {high_part.index:04X}h never stood still'
+    )
 
 
 async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identification:

@@ -49,9 +49,9 @@ from nfo_sinus_driver.bus.tasks import Sleepers
 from nfo_sinus_driver.bus.tasks import Slot
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.bus.tasks import consistent_read
 from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
-from nfo_sinus_driver.bus.tasks import read_in_parts
 from nfo_sinus_driver.bus.timers import set_timer_slack
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
@@ -172,7 +172,7 @@ class Bus:
         """
         parts = self._link.parts(address)
         if len(parts) > 1:
-            return read_in_parts(unit, parts, priority)
+            return consistent_read(unit, parts, priority)
         return Transfer(unit, address, priority)
 
     def write(

@@ -91,6 +91,10 @@ def _common() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     group = parser.add_argument_group('line and drive, as the parameters of the driver')
     add = group.add_argument
+    # the line of a gateway is set in the gateway
+    lines = [protocol for protocol in PROTOCOLS.values() if protocol.char_formats]
+    rates = [f'{protocol.name} {protocol.baud_rate}' for protocol in lines]
+    formats = [f'{protocol.name} {protocol.char_format}' for protocol in lines]
     add(
         '--port',
         help='a device path, or a URL such as socket://host:port; for modbus_tcp host:port of the '
@@ -110,12 +114,13 @@ def _common() -> argparse.ArgumentParser:
         choices=(0, *BAUD_RATES),
         metavar='RATE',
         help=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)} '
-        '(default: 0, which is 19200)',
+        f'(default: 0, the one of the factory: {", ".join(rates)})',
     )
     add(
         '--char-format',
         metavar='FORMAT',
-        help='such as 8E1, 8O1, 8N2 (default: 8E1; modbus_ascii: 7E1)',
+        help='such as 8E1, 8O1, 8N2 '
+        f'(default: the one of the factory: {", ".join(formats)})',
     )
     add(
         '--response-timeout',

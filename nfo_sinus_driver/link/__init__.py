@@ -14,7 +14,6 @@
 
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
-from nfo_sinus_driver.link.consistent_read import consistent_read
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import GatewaySilent
 from nfo_sinus_driver.link.errors import LinkError
@@ -26,9 +25,9 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
+from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.protocols import PROTOCOLS
 from nfo_sinus_driver.link.protocols import line_settings
 from nfo_sinus_driver.link.protocols import open_link
@@ -53,7 +52,6 @@ __all__ = [
     'Reconnect',
     'Refused',
     'Reply',
-    'consistent_read',
     'line_settings',
     'open_link',
 ]

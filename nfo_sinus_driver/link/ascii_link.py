@@ -20,9 +20,9 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: Frames need no silence between them, but transmitters take a moment to switch, characters.

@@ -37,7 +37,6 @@ from nfo_sinus_driver.link.classic_refusal import INV_ST
 from nfo_sinus_driver.link.classic_refusal import MODE
 from nfo_sinus_driver.link.classic_refusal import SIO_ERR
 from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
-from nfo_sinus_driver.link.consistent_read import consistent_read
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -45,11 +44,11 @@ from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.settings import LineSettings
 
 #: What a message carries.
@@ -136,19 +135,11 @@ class ClassicLink:
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> ClassicLink:
-        """
-        Return the link on a port.
-
-        :raises ValueError: what is named is no port; the message says what to write.
-        """
+        """Return the link on a port; a ValueError says what is no port."""
         return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
-        """
-        Open the port.
-
-        :raises PortError: it cannot be opened; the message says what to do.
-        """
+        """Open the port."""
         self._port.open()
 
     def close(self) -> None:
@@ -175,22 +166,10 @@ class ClassicLink:
         return tuple(Address(address.space, id_, None, _WORD.size) for id_ in ids)
 
     def read(self, unit: int, address: Address) -> Reply:
-        """
-        Read one parameter; one of two words in three transactions or more, until it stands still.
-
-        :raises LinkError: as its subclasses say.
-        """
-        if address.sub_index is None:
-            word, arrived = self._enquire(unit, address.index)
-            return Reply(_WORD.pack(word), arrived)
-        steps = consistent_read(unit, self.parts(address))
-        part = next(steps)
-        while True:
-            try:
-                part = steps.send(self.read(unit, part))
-            except StopIteration as end:
-                whole: Reply = end.value
-                return whole
+        """Read one parameter of one word, or one word of another."""
+        (part,) = self.parts(address)
+        word, arrived = self._enquire(unit, part.index)
+        return Reply(_WORD.pack(word), arrived)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """
@@ -206,11 +185,7 @@ class ClassicLink:
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
-        """
-        Write one parameter, then read another; in as many transactions as that takes.
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Write one parameter, then read another; in as many transactions as that takes."""
         self.write(unit, address, data)
         return self.read(unit, source)
 

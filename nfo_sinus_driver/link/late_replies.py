@@ -25,7 +25,6 @@ from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
 import enum
 from typing import Generic
-from typing import NamedTuple
 from typing import Protocol
 from typing import TypeVar
 
@@ -66,12 +65,6 @@ class Doubt(enum.Enum):
     RESYNC = enum.auto()
 
 
-class _Noted(NamedTuple):
-    request: object
-    reply: bytes
-    until: float
-
-
 class LateReplies(Generic[_Request, _Kind]):
     """
     What may still come from each unit, by *kinds*: what tells its replies from one another.
@@ -98,12 +91,14 @@ class LateReplies(Generic[_Request, _Kind]):
     def __init__(
         self, response_timeout: float, kinds: Callable[[_Request], Iterable[_Kind]]
     ) -> None:
+        self._response_timeout = response_timeout
         self._memory = (LATEST_REPLY - 1) * response_timeout
         self._kinds = kinds
         self._until: dict[int, dict[_Kind, float]] = {}
-        self._noted: dict[int, _Noted] = {}
+        #: The last reply of each unit: to what, its bytes, and until when it may come again.
+        self._noted: dict[int, tuple[_Request, bytes, float]] = {}
         self._last: _Request | None = None
-        self.repeated: object = None
+        self.repeated: _Request | None = None
         #: Until when a reply may well come twice.
         self._distrust_until = 0.0
         #: How long a unit has taken at most to reply, s.
@@ -173,16 +168,16 @@ class LateReplies(Generic[_Request, _Kind]):
         if self._last is not None:
             self.expect(self._last, now)
 
-    def note(self, request: _Request, reply: bytes, now: float, until: float) -> None:
+    def note(self, request: _Request, reply: bytes, now: float, length: float) -> None:
         """
-        Take note of what a unit replied.
+        Take note of what a unit replied, for it may come again.
 
-        :param until: until when that may come again.
+        :param length: how long it takes on the line, s.
         """
         before = self._noted.get(request.unit)
-        if before is not None and before.reply == reply and now < before.until:
-            self.repeated = before.request
-        self._noted[request.unit] = _Noted(request, reply, until)
+        if before is not None and before[1] == reply and now < before[2]:
+            self.repeated = before[0]
+        self._noted[request.unit] = request, reply, now + self._response_timeout + length
 
     def doubt_about(self, request: _Request, now: float, *, names_it: bool = False) -> Doubt:
         """

@@ -22,13 +22,13 @@ from typing import TypeVar
 
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
-from nfo_sinus_driver.link.protocol import LineProtocol
 
 #: The addresses of drives [M0 §6.2.2].
 UNITS = range(1, 248)
@@ -46,29 +46,17 @@ class ModbusLink(ABC):
         return (address,)
 
     def read(self, unit: int, address: Address) -> Reply:
-        """
-        Read one parameter (function 03).
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Read one parameter (function 03)."""
         return Reply(*self._ask(read_of(unit, address)))
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """
-        Write one parameter (function 06 for one register, 16 for several).
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Write one parameter (function 06 for one register, 16 for several)."""
         return Reply(*self._ask(Write(unit, address.index, data)))
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
-        """
-        Write one parameter and read another, in one transaction (function 23).
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Write one parameter and read another, in one transaction (function 23)."""
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
     def read_then_write(

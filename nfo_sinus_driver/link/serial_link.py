@@ -96,19 +96,11 @@ class SerialLink(ModbusLink):
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> SerialLink:
-        """
-        Return the link on a port.
-
-        :raises ValueError: what is named is no port; the message says what to write.
-        """
+        """Return the link on a port; a ValueError says what is no port."""
         return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
-        """
-        Open the port.
-
-        :raises PortError: it cannot be opened; the message says what to do.
-        """
+        """Open the port."""
         self._port.open()
         self._line_end = time.monotonic()
 
@@ -186,10 +178,6 @@ class SerialLink(ModbusLink):
             # it may be the one before, told twice
             self._late.expect(request, time.monotonic())
 
-    def _in_quarantine(self, request: Request[Any]) -> bool:
-        """Tell whether the answer to an earlier request would look like that to this one."""
-        return request.answer_head in self._late.quarantined(request.unit, time.monotonic())
-
     def _make_certain(self, request: Request[Any]) -> bool:
         """
         Have the unit answer something else, if its answer to this could be confused with another.
@@ -197,10 +185,11 @@ class SerialLink(ModbusLink):
         :returns: whether it was asked, and answered.
         :raises NotReady: that cannot be told from others either.
         """
-        if not self._in_quarantine(request):
+        unit, now = request.unit, time.monotonic()
+        if request.answer_head not in self._late.quarantined(unit, now):
             return False
-        questions = [(request, (request.answer_head,)), *self._resync_reads(request.unit)]
-        question = self._late.first_certain(request.unit, questions, time.monotonic())
+        questions = [(request, (request.answer_head,)), *self._resync_reads(unit)]
+        question = self._late.first_certain(unit, questions, now)
         if question is request:
             return False
         try:
@@ -227,6 +216,8 @@ class SerialLink(ModbusLink):
 
         :param names_it: the answer says itself what it is about.
         """
+        if self._late.repeated is None:
+            return
         now = time.monotonic()
         doubt = self._late.doubt_about(request, now, names_it=names_it)
         if doubt is Doubt.LISTEN:
@@ -327,14 +318,16 @@ class SerialLink(ModbusLink):
             raise
         except Refused:
             self._late.release(request.unit)
-            self._remember(request, reader.frame)
+            length = len(reader.frame) * self._settings.char_time
+            self._late.note(request, reader.frame, time.monotonic(), length)
             raise
         finally:
             # what comes back before the answer to a write may be its answer
             if not isinstance(request, Write) and frame in reader.other:
                 self._echo.present = True
             self._stray = bool(self._echo.before or reader.other.replace(frame, b'', 1))
-        self._remember(request, reader.frame)
+        length = len(reader.frame) * self._settings.char_time
+        self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)
         if not late:
             # units answer in order: whatever was still to come has come before this
@@ -342,18 +335,11 @@ class SerialLink(ModbusLink):
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
-        took = arrived - self._sent_at - len(reader.frame) * self._settings.char_time
-        self._late.took(request.unit, took)
+        self._late.took(request.unit, arrived - self._sent_at - length)
         if late or reader.received:
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.heard_unasked(time.monotonic())
         return answer, arrived
-
-    def _remember(self, request: Request[Any], frame: bytes) -> None:
-        """Take note of what a unit told, and that it may come once more."""
-        now = time.monotonic()
-        again = self._settings.response_timeout + len(frame) * self._settings.char_time
-        self._late.note(request, frame, now, now + again)
 
     def _receive(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes

@@ -39,13 +39,13 @@ from nfo_sinus_driver.link.errors import NoPath
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import understand
 from nfo_sinus_driver.link.modbus_tcp import FrameReader
 from nfo_sinus_driver.link.modbus_tcp import encode
-from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
@@ -101,11 +101,7 @@ class TcpLink(ModbusLink):
         return cls(*_host_and_port(port), settings.response_timeout)
 
     def open(self) -> None:
-        """
-        Connect to the gateway.
-
-        :raises PortError: nobody there.
-        """
+        """Connect to the gateway."""
         self.close()
         try:
             self._socket = socket.create_connection((self._host, self._port), _CONNECT_TIMEOUT)

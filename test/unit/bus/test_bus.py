@@ -280,18 +280,35 @@ def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> Non
         result(talker)
 
 
+async def read_parts(bus: Bus) -> bytes:
+    """Read a value of two words, of which register 5 has the low one."""
+    return (await bus.read(UNIT, Address('register', 5, 6, 4), Priority.REFRESH)).data
+
+
 def test_stop_goes_between_the_words_of_a_value(bus: Bus, link: FakeLink) -> None:
     # over Classic each word is a transaction: the high one, the low one, the high one again
-    async def read() -> bytes:
-        return (await bus.read(UNIT, Address('register', 5, 6, 4), Priority.REFRESH)).data
-
     with link.held():
-        value = bus.run(read())
+        value = bus.run(read_parts(bus))
         link.wait_until_held()
         stop = ask(bus, 1, Priority.STOP)
     result(stop)
     assert result(value) == packed(5, 6)
     assert link.numbers == [6, 1, 5, 6]
+
+
+def test_words_that_change_meanwhile_are_read_again(bus: Bus, link: FakeLink) -> None:
+    # 3FFFFh becomes 40000h between high and low
+    words = {6: iter([3, 4, 4]), 5: iter([0, 1])}
+    link.answer = lambda done: packed(next(words[done.number]))
+    assert result(bus.run(read_parts(bus))) == packed(1, 4)
+    assert link.numbers == [6, 5, 6, 5, 6]
+
+
+def test_words_that_never_stand_still(bus: Bus, link: FakeLink) -> None:
+    link.answer = lambda done: packed(len(link.done))
+    with pytest.raises(DamagedAnswer, match='stood still'):
+        result(bus.run(read_parts(bus)))
+    assert len(link.numbers) == 11
 
 
 def test_stop_goes_before_the_background_s_share(

@@ -23,6 +23,7 @@ import pytest
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
@@ -51,6 +52,21 @@ def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProto
     assert any(protocol.addressing in row.addresses for row in rows)
     assert protocol.broadcast not in protocol.units
     assert protocol.point_to_point in (None, protocol.units[0])
+
+
+@EVERY
+def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol) -> None:
+    port = PORTS.get(protocol.name, '/dev/x')
+    link = open_link(protocol.name, port, line_settings(protocol.name))
+    for row in load_family('sinus_g2').values():
+        if protocol.addressing in row.addresses:
+            place = row.at(protocol.addressing)
+            address = Address(*place.place)
+            parts = link.parts(address)
+            assert sum(part.size for part in parts) == address.size == place.codec.size
+            assert all(link.parts(part) == (part,) for part in parts), 'each is one transaction'
+            # a gateway and Modbus read registers that belong together at once
+            assert parts == (address,) or protocol.name == 'classic'
 
 
 @given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
