@@ -87,8 +87,8 @@ class AllDrives:
 
     def _broadcast(self) -> str:
         try:
-            bus = self._context.bus
-            models = [drive.drive.model for drive in self._context.drives]
+            bus, drives = self._context.bus, self._context.drives
+            models = [managed.drive.model for managed in drives]
             bus.run(broadcast_stop(bus, models)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'

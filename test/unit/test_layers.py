@@ -42,7 +42,8 @@ MAY_IMPORT = {
     'bus': {'link'},
     'signals': set(),
     'drive': {'bus', 'catalog', 'link'},
-    # the folders of a family in there, of its words; the rest, of which is the default
+    # the folders of a family in there, of its words; the rest, of which is the default; and no
+    # profile: a mistake in that must not hide
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals'},
     'demo': {'node'},
@@ -180,7 +181,8 @@ def violations(path: str, source: str) -> list[str]:
         top, _, rest = name.partition('.')
         if top == PACKAGE:
             other = rest.split('.')[0]
-            if other != room and other not in MAY_IMPORT[room]:
+            unseen = room == 'simulator' and 'profile' in rest.split('.')
+            if unseen or (other != room and other not in MAY_IMPORT[room]):
                 found.append(f'{room or "the package"} imports {name}')
             continue
         if top in PORT_MODULES and room not in OPENS_PORTS:
@@ -341,6 +343,11 @@ for module in {modules!r}:
         ('simulator/main.py', 'import rclpy.node', 'simulator imports rclpy.node'),
         ('simulator/main.py', 'from nfo_sinus_driver.link import rtu', 'simulator imports'),
         ('simulator/main.py', 'from nfo_sinus_driver import drive', 'simulator imports'),
+        (
+            'simulator/drive.py',
+            'from nfo_sinus_driver.families.sinus_g2.profile import PROFILE',
+            'simulator imports',
+        ),
         ('simulator/main.py', 'from ..link import rtu', 'simulator imports'),
         ('simulator/main.py', 'def f():\n    import nfo_sinus_driver.bus', 'simulator imports'),
         ('simulator/main.py', 'import_module("nfo_sinus_driver.link")', 'simulator imports'),
