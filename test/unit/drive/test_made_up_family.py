@@ -44,6 +44,7 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LinkError
@@ -59,7 +60,7 @@ RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 class Acme:
     """The registers of an Acme at the other end of a line; it refuses what it does not have."""
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self) -> None:
         self.registers = dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0)
@@ -102,7 +103,7 @@ class Acme:
     def close(self) -> None:
         """Nothing has to be closed."""
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Nothing is ever in doubt."""
 
     def identify(self, unit: int) -> SimpleNamespace:

@@ -21,7 +21,6 @@ import pytest
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver import simulator as room
-from nfo_sinus_driver.catalog import family as catalog
 from nfo_sinus_driver.simulator.family import every_verb
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.inject import inject
@@ -38,7 +37,6 @@ ENABLE, RUN, ACKNOWLEDGE = 1 << 8, 1 << 9, 1 << 15
 def fable(monkeypatch):
     for package, name in [(families, 'families'), (room, 'simulator')]:
         monkeypatch.setattr(package, '__path__', [*package.__path__, str(HERE / name)])
-    monkeypatch.setattr(catalog, '_FAMILIES', HERE / 'families')
 
 
 class Master:

@@ -18,18 +18,7 @@ from __future__ import annotations
 
 import enum
 
-from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusWord
-
-TITLE = 'Fable'
-WRITES_AND_READS = False
-
-
-class Mode(enum.IntEnum):
-    """Who controls it: always the bus."""
-
-    BUS = 1
 
 
 class Command(enum.IntFlag):
@@ -53,10 +42,3 @@ def state_of(word: int) -> State:
     if word & Status.FAULT:
         return State.FAULTED
     return State.OPERATION_ENABLED if word & Status.TURNS else State.SWITCHED_ON
-
-
-STATUS_WORD = StatusWord(
-    state=state_of,
-    by_bit={Status.FAULT: Fact.FAULT, Status.TURNS: Fact.OPERATION_ENABLED},
-    by_state={},
-)
