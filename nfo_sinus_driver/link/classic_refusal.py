@@ -64,12 +64,12 @@ def by_status(inv_st: int) -> Refused:
     """Return what the inverter status says of a NAK, where the flags are not read."""
     if inv_st == SIO_FAIL:
         text = 'a serial fault (Sio Fail) stands, and until it is acknowledged nothing can be done'
-        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)', inv_st)
+        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
     if inv_st in _FAULTS:
         text = f'a fault stands (InvSt {inv_st}), and until it is acknowledged nothing can be done'
-        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)', inv_st)
+        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
     text = 'the drive does not accept this value, or not in its present state'
-    return Refused(Refused.ILLEGAL_VALUE, f'{text} (NAK, InvSt {inv_st})', inv_st)
+    return Refused(Refused.ILLEGAL_VALUE, f'{text} (NAK, InvSt {inv_st})')
 
 
 def by_flags(word: int) -> Refused:
@@ -81,7 +81,7 @@ def by_flags(word: int) -> Refused:
         code = Refused.ILLEGAL_ADDRESS
     why = ', '.join(flag_names(word)) or 'it does not say why'
     text = f'the drive refused: {why}; its serial fault (Sio Fail) by this is cleared (NAK)'
-    return Refused(code, text, SIO_FAIL)
+    return Refused(code, text)
 
 
 def unknown(error: LinkError) -> Refused:

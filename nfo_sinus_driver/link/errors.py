@@ -64,7 +64,6 @@ class Refused(LinkError):
     The drive answered that it will not.
 
     :ivar code: the Modbus exception code, or on other protocols the one that means the same.
-    :ivar inv_st: the inverter status that it told as the reason, where it did.
     """
 
     ILLEGAL_FUNCTION = 1
@@ -75,9 +74,8 @@ class Refused(LinkError):
     NO_PATH = 10
     NO_ANSWER = 11
 
-    def __init__(self, code: int, reason: str = '', inv_st: int | None = None) -> None:
+    def __init__(self, code: int, reason: str = '') -> None:
         self.code = code
-        self.inv_st = inv_st
         #: What a person may look up, to stand behind a sentence.
         self.behind = f': {reason}' if reason else f' (exception {code})'
         text = _REFUSALS.get(code, 'the drive refused')
