@@ -148,7 +148,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             return TransitionCallbackReturn.FAILURE
         self._drive_parameters.declare(self.managed.drive)
         self._apply_wanted_state()
-        self.lifecycle.note_configured()
+        self.lifecycle.note_transition()
         return TransitionCallbackReturn.SUCCESS
 
     @_guarded
@@ -273,7 +273,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         """
         changed = {one.name: one.value for one in parameters if one.name in _NAMES}
         if not changed:
-            # those of the drive are many
+            # a drive has many of its own, and they come one by one
             return self.managed.settings
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']

@@ -75,14 +75,10 @@ class Lifecycle:
         self._autostart.join(timeout)
 
     def note_transition(self) -> None:
-        """Leave the lifecycle to an operator once an operator took a hand in it."""
+        """Take note of one that works; an operator who took a hand in it has the lifecycle."""
+        self._complaint = ''
         if self.by_operator:
             self._autostart.give_up()
-
-    def note_configured(self) -> None:
-        """Take note that the drive was found."""
-        self._complaint = ''
-        self.note_transition()
 
     def complain(self, why: str, *, known: bool) -> None:
         """

@@ -21,10 +21,10 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from concurrent.futures import wait
+from concurrent.futures import as_completed
+import contextlib
 import ctypes
 import sys
 import time
@@ -184,14 +184,12 @@ def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveN
     """
     waiting = set(futures)
     longest = max((one.managed.settings.shutdown_timeout for one in futures.values()), default=0.0)
-    deadline = time.monotonic() + longest + _LAST_ANSWER
-    while waiting:
-        left = max(0.0, deadline - time.monotonic())
-        ended, waiting = wait(waiting, left, FIRST_COMPLETED)
-        for future in ended or waiting:
+    with contextlib.suppress(FutureTimeoutError):
+        for future in as_completed(futures, longest + _LAST_ANSWER):
+            waiting.remove(future)
             yield futures[future], future
-        if not ended:
-            return
+    for future in waiting:
+        yield futures[future], future
 
 
 def _confirmed(node: DriveNode, future: Future[str]) -> bool:
