@@ -105,7 +105,7 @@ class Remote:
 
     def error_log(self, most: int) -> tuple[LogEntry, ...]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
-        return self._drive.error_log(most).result()
+        return self.do(lambda: self._drive.log.read_now(most))
 
     def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""

@@ -154,6 +154,11 @@ class Drive:
         return self._registers
 
     @property
+    def log(self) -> ErrorLog:
+        """Its error log, for coroutines on the bus."""
+        return self._error_log
+
+    @property
     def snapshot(self) -> Snapshot:
         """The newest poll."""
         return self._watch.snapshot
@@ -375,7 +380,7 @@ class Drive:
         return answer
 
     async def _read_error_log(self, most: int) -> tuple[LogEntry, ...]:
-        if self._watch.begun and not self._inverter.connected:
+        if not self._inverter.connected:
             raise DriveError(f'the drive at address {self._unit} is not connected')
         return await self._error_log.read_now(most)
 
