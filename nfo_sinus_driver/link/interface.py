@@ -139,10 +139,13 @@ class LineProtocol:
 
         :raises ValueError: it cannot; the message says which it can.
         """
-        if self.char_formats and char_format not in self.char_formats:
-            raise ValueError(
-                f'char_format {char_format!r}: {self.name} has {", ".join(self.char_formats)}'
-            )
+        if not self.char_formats or char_format in self.char_formats:
+            return
+        has = ', '.join(self.char_formats)
+        bits, *other_bits = {known[0] for known in self.char_formats}
+        if not other_bits:
+            has = f'{bits} data bits, write {bits}{char_format[1:]}'
+        raise ValueError(f'char_format {char_format!r}: {self.name} has {has}')
 
 
 class Link(Protocol):

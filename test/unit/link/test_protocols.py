@@ -86,10 +86,12 @@ FORMATS = st.builds(''.join, st.tuples(*map(st.sampled_from, ('78', 'EON', '12')
 @given(st.sampled_from(['modbus_rtu', 'modbus_ascii']), FORMATS)
 def test_a_modbus_frame_has_as_many_data_bits_as_its_protocol(protocol: str, format_: str) -> None:
     # RTU has eight, ASCII seven (MODBUS over Serial Line V1.02 §2.5)
-    if format_[0] == ('8' if protocol == 'modbus_rtu' else '7'):
+    bits = '8' if protocol == 'modbus_rtu' else '7'
+    if format_[0] == bits:
         open_with(protocol, format_)
     else:
-        with pytest.raises(ValueError, match=f"^char_format '{format_}': {protocol} has [78]E1"):
+        remedy = f'{protocol} has {bits} data bits, write {bits}{format_[1:]}'
+        with pytest.raises(ValueError, match=f"^char_format '{format_}': {remedy}$"):
             open_with(protocol, format_)
 
 
