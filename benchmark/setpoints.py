@@ -152,7 +152,7 @@ def _delays(
         written.setdefault((unit, word), []).append(at)
     delays = []
     for at, drive, value in published:
-        (word,) = _MODEL['status.frq_set'].quantise(value, 'modbus')
+        word = int.from_bytes(_MODEL['status.frq_set'].quantise(value, 'modbus'), 'big')
         moments = written.get((drive + 1, word), ())
         delays += [moment - at for moment in moments if at <= moment < at + _LOST][:1]
     return delays, len(published) - len(delays)

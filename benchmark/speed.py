@@ -153,10 +153,10 @@ def _read_time(line: Line, key: str) -> float:
     parameter = load_family('sinus_g2')[key]
     if line.protocol == 'classic':
         # an ENQUIRY of 8 characters and a REPLY of 14 for each word [M0 §6.1.3]
-        return parameter.at('classic').words * 22 * line.character
+        return parameter.at('classic').codec.size * 11 * line.character
     # 8 bytes ask, 5 and the words answer, t3.5 is before each
-    words = parameter.at('modbus').words
-    return (13 + 2 * words) * line.character + 2 * line.gap
+    size = parameter.at('modbus').codec.size
+    return (13 + size) * line.character + 2 * line.gap
 
 
 def cycles(window: Window, rig: Rig) -> Figures:

@@ -46,7 +46,7 @@ from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
 from nfo_sinus_driver.jobs import inquire
 from nfo_sinus_driver.jobs import log_unexpected
-from nfo_sinus_driver.jobs import read_in_steps
+from nfo_sinus_driver.jobs import read_in_parts
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import Keeper
@@ -55,7 +55,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.silence import Silences
 from nfo_sinus_driver.statistics import Recorder
 from nfo_sinus_driver.statistics import Statistics
@@ -172,15 +171,16 @@ class Bus:
 
         :raises LinkError: as the link does.
         """
-        if len(address.numbers) > 1:
-            return read_in_steps(unit, address, priority)
+        parts = self._link.parts(address)
+        if len(parts) > 1:
+            return read_in_parts(unit, parts, priority)
         return Transfer(unit, address, priority)
 
     def write(
         self,
         unit: int,
         address: Address,
-        words: Words,
+        data: bytes,
         priority: Priority,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Transfer:
@@ -190,19 +190,19 @@ class Bus:
         :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        return Transfer(unit, address, priority, words, require_wanted=require_wanted)
+        return Transfer(unit, address, priority, data, require_wanted=require_wanted)
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address, priority: Priority
+        self, unit: int, address: Address, data: bytes, source: Address, priority: Priority
     ) -> Transfer:
         """
         Write one parameter and read another, in one transaction (to be awaited, or for a slot).
 
-        The answer has no words if it was only written: see :meth:`Link.write_and_read`.
+        The answer has no data if it was only written: see :meth:`Link.write_and_read`.
 
         :raises LinkError: as the link does.
         """
-        return Transfer(unit, address, priority, words, source=source)
+        return Transfer(unit, address, priority, data, source=source)
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
         """
@@ -218,18 +218,18 @@ class Bus:
         return True
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words, priority: Priority
+        self, unit: int, source: Address, address: Address, data: bytes, priority: Priority
     ) -> Transfer:
         """
         Read a parameter whose value nobody needs, then write another (to be awaited).
 
         One turn: nothing is sent between, whatever becomes of the read.
 
-        :param source: of one word.
+        :param source: what is read in one transaction.
         :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
         """
-        send = functools.partial(self._link.read_then_write, unit, source, address, words)
-        return Transfer(unit, address, priority, words, send)
+        send = functools.partial(self._link.read_then_write, unit, source, address, data)
+        return Transfer(unit, address, priority, data, send)
 
     def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
         """
@@ -438,13 +438,13 @@ class Bus:
         try:
             if transfer.send is not None:
                 reply = transfer.send()
-            elif transfer.words is None:
+            elif transfer.data is None:
                 reply = self._link.read(transfer.unit, transfer.address)
             elif transfer.source is None:
-                reply = self._link.write(transfer.unit, transfer.address, transfer.words)
+                reply = self._link.write(transfer.unit, transfer.address, transfer.data)
             else:
                 reply = self._link.write_and_read(
-                    transfer.unit, transfer.address, transfer.words, transfer.source
+                    transfer.unit, transfer.address, transfer.data, transfer.source
                 )
         except NotReady:
             raise
@@ -477,7 +477,8 @@ class Bus:
         for entry in self._turns.clear():
             if isinstance(entry, Slot):
                 self._fail_slot(entry, error)
-            else:
+            elif entry.task.awaited is entry.transfer:
+                # else who was told before has ended it
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: Slot, error: PortError) -> None:

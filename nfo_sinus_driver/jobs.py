@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Coroutine
 from collections.abc import Generator
+from collections.abc import Sequence
 from concurrent.futures import Future
 import enum
 import heapq
@@ -33,12 +34,11 @@ from nfo_sinus_driver.link import Inquiry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
-from nfo_sinus_driver.link import in_steps
+from nfo_sinus_driver.link import consistent_read
 
 _log = logging.getLogger(__name__)
 
-_NOWHERE = Address((), 0)
+_NOWHERE = Address('', 0, None, 0)
 
 
 class Priority(enum.IntEnum):
@@ -64,21 +64,21 @@ class Transfer:
     """
     One transaction that a coroutine awaits.
 
-    A read, or a write if ``words`` is given, or whatever ``send`` does.
+    A read, or a write if ``data`` is given, or whatever ``send`` does.
 
     :param require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
     :ivar source: what is read in the same transaction as the write, or ``None``.
     """
 
-    __slots__ = ('address', 'priority', 'require_wanted', 'send', 'source', 'unit', 'words')
+    __slots__ = ('address', 'data', 'priority', 'require_wanted', 'send', 'source', 'unit')
 
     def __init__(
         self,
         unit: int,
         address: Address,
         priority: Priority,
-        words: Words | None = None,
+        data: bytes | None = None,
         send: Callable[[], Reply] | None = None,
         require_wanted: Callable[[], None] = lambda: None,
         source: Address | None = None,
@@ -86,27 +86,27 @@ class Transfer:
         self.unit = unit
         self.address = address
         self.priority = priority
-        self.words = words
+        self.data = data
         self.send = send
         self.require_wanted = require_wanted
         self.source = source
 
     def reads(self, unit: int, address: Address) -> bool:
         """Tell whether it only reads a parameter."""
-        reading = self.words is None and self.send is None
+        reading = self.data is None and self.send is None
         return reading and self.unit == unit and self.address == address
 
     def __await__(self) -> Generator[Transfer, Reply, Reply]:
         return (yield self)
 
 
-async def read_in_steps(unit: int, address: Address, priority: Priority) -> Reply:
+async def read_in_parts(unit: int, parts: Sequence[Address], priority: Priority) -> Reply:
     """
-    Read a parameter each of whose words is a transaction of its own, so that a stop may go between.
+    Read a parameter each of whose parts is a transaction of its own, so that a stop may go between.
 
     :raises LinkError: as the link does.
     """
-    steps = in_steps(unit, address)
+    steps = consistent_read(unit, parts)
     part = next(steps)
     while True:
         reply = await Transfer(unit, part, priority)

@@ -231,7 +231,7 @@ class Turns:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING
-        commands = transfer.priority is Priority.STOP and transfer.words is not None
+        commands = transfer.priority is Priority.STOP and transfer.data is not None
         return _COMMAND if commands else transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:

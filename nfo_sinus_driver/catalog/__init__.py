@@ -24,10 +24,21 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.family import load_profile
+from nfo_sinus_driver.catalog.family import usual_family
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import NotPossible
+from nfo_sinus_driver.catalog.profile import OlderDialect
+from nfo_sinus_driver.catalog.profile import Procedure
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Refusal
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
+from nfo_sinus_driver.catalog.profile import SetpointTarget
 from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Kind
@@ -44,11 +55,20 @@ __all__ = [
     'ErrorLogArea',
     'Fact',
     'Family',
+    'Holder',
     'Kind',
     'Meaning',
+    'NotPossible',
     'Number',
+    'OlderDialect',
     'Parameter',
+    'Procedure',
+    'Profile',
+    'Refusal',
+    'Removal',
+    'Reset',
     'Role',
+    'SetpointTarget',
     'State',
     'StatusCode',
     'StatusWord',
@@ -57,6 +77,8 @@ __all__ = [
     'codec_of',
     'families',
     'load_family',
+    'load_profile',
     'to_bytes',
     'to_words',
+    'usual_family',
 ]

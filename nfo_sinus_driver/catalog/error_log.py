@@ -47,11 +47,6 @@ class ErrorLogArea:
     limit: int
     codec: Number
 
-    @property
-    def words(self) -> int:
-        """How many 16-bit words an entry has."""
-        return self.codec.size // 2
-
     def address(self, entry: int) -> int:
         """
         Return where an entry begins, 0 being the newest.
@@ -62,7 +57,13 @@ class ErrorLogArea:
             raise IndexError(f'the error log has {self.limit} entries, not {entry + 1}')
         return self.first + self.stride * entry
 
-    def numbers(self, entry: int) -> tuple[int, ...]:
-        """Return the register of an entry, or the ids of its words, the low one first."""
-        first = self.address(entry)
-        return tuple(range(first, first + self.words)) if self.space == 'id' else (first,)
+    def place(self, entry: int) -> tuple[str, int, int | None, int]:
+        """
+        Return what a link is told of an entry: space, index, sub-index and size in bytes.
+
+        :raises IndexError: no drive has so many entries.
+        """
+        index = self.address(entry)
+        # on Classic the high word has the next id
+        sub_index = index + 1 if self.space == 'id' else None
+        return self.space, index, sub_index, self.codec.size

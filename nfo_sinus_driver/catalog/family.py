@@ -14,14 +14,14 @@
 
 
 """
-A drive family: its parameters, status codes and words, read from its folder in ``families/``.
+A drive family: its parameters, status codes and profile, read from its folder in ``families/``.
 
 Nobody imports such a folder: its name is all that is known of it, and :func:`load_family` reads it.
+More folders are found where the search path of that package, its ``__path__``, leads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,13 +37,13 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import StatusCode
-from nfo_sinus_driver.catalog.status import StatusWord
 
-_FAMILIES = Path(__file__).parents[1] / 'families'
+_FAMILIES = 'nfo_sinus_driver.families'
 
 
 @dataclass(frozen=True)
@@ -52,25 +52,19 @@ class Family(Mapping[str, Parameter]):
     A drive family: its parameters by key, and what it says of itself.
 
     :ivar name: the name of its folder.
-    :ivar title: what its maker calls it.
     :ivar parameters: its parameters, in the order of the manual.
     :ivar roles: which of them has which role.
     :ivar status_codes: its inverter status codes, by number.
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
-    :ivar status_word: what its status word means.
-    :ivar modes: the codes of who controls it.
-    :ivar writes_and_reads: it has Modbus function 23.
+    :ivar profile: how it is commanded, and what is to be known of it beside its tables.
     """
 
     name: str
-    title: str
     parameters: Mapping[str, Parameter]
     roles: Mapping[Role, str]
     status_codes: Mapping[int, StatusCode]
     error_logs: Mapping[str, ErrorLogArea]
-    status_word: StatusWord
-    modes: Collection[int]
-    writes_and_reads: bool
+    profile: Profile
 
     def __getitem__(self, key: str) -> Parameter:
         return self.parameters[key]
@@ -109,10 +103,46 @@ class Family(Mapping[str, Parameter]):
         """Return the inverter status codes that mean something."""
         return tuple(code for code in self.status_codes.values() if meaning in code.meanings)
 
+    def group_of(self, role: Role) -> frozenset[str]:
+        """Return the keys of the group that the parameter with a role is in, if there is one."""
+        key = self.key(role)
+        group = self[key].group if key else ''
+        return frozenset(one for one, parameter in self.items() if parameter.group == group)
+
+    @functools.cached_property
+    def communication(self) -> frozenset[str]:
+        """The keys of the settings of the line, by which the drive may be lost."""
+        return self.group_of(Role.BUS_ADDRESS)
+
+
+def _folders() -> Mapping[str, Path]:
+    roots = [Path(root) for root in importlib.import_module(_FAMILIES).__path__]
+    found = [path.parent for root in roots for path in root.glob('*/parameters.csv')]
+    return {folder.name: folder for folder in sorted(found)}
+
 
 def families() -> tuple[str, ...]:
     """Return the names of the families that there are folders of."""
-    return tuple(sorted(path.parent.name for path in _FAMILIES.glob('*/parameters.csv')))
+    return tuple(sorted(_folders()))
+
+
+def usual_family() -> str:
+    """Return the name of the family of a drive of which nobody says what it is."""
+    return str(importlib.import_module(_FAMILIES).USUAL)
+
+
+@functools.cache
+def load_profile(name: str) -> Profile:
+    """
+    Load the profile of one drive family, without its tables.
+
+    :raises ValueError: there is no such family; the message lists those there are.
+    """
+    if name not in families():
+        raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
+    profile = importlib.import_module(f'{_FAMILIES}.{name}.profile').PROFILE
+    assert isinstance(profile, Profile)
+    return profile
 
 
 @functools.cache
@@ -123,9 +153,8 @@ def load_family(name: str) -> Family:
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
-    if name not in families():
-        raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
-    folder = _FAMILIES / name
+    profile = load_profile(name)
+    folder = _folders()[name]
     keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
     addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
 
@@ -150,17 +179,13 @@ def load_family(name: str) -> Family:
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
     log = folder / 'error_log.csv'
     logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
-    words = importlib.import_module(f'nfo_sinus_driver.families.{name}.words')
     return Family(
         name=name,
-        title=words.TITLE,
         parameters={row.key: row for row in parameters},
         roles=dict(roles),
         status_codes={row.code: row for row in codes},
         error_logs={row.protocol: row for row in logs},
-        status_word=words.STATUS_WORD,
-        modes=frozenset(words.Mode),
-        writes_and_reads=words.WRITES_AND_READS,
+        profile=profile,
     )
 
 
@@ -209,6 +234,7 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
         access=Access(row['access']),
         stopped={'init': True, 'run': False, '': False}[row['when']],
         since=table.fraction(row['since']),
+        older={'yes': True, '': False}[row['older']],
         description=row['description'],
         source=row['source'],
     )

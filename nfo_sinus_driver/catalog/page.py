@@ -104,7 +104,7 @@ def page() -> str:
 
 
 def _family(family: Family) -> Iterator[str]:
-    yield f'## {family.title}\n'
+    yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
     if groups:

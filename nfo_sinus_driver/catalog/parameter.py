@@ -32,8 +32,6 @@ import struct
 
 from nfo_sinus_driver.catalog.codec import Number
 from nfo_sinus_driver.catalog.codec import Text
-from nfo_sinus_driver.catalog.codec import to_bytes
-from nfo_sinus_driver.catalog.codec import to_words
 
 #: An engineering value: a number, the label of an enumeration, or on/off.
 Value = bool | int | float | str
@@ -92,15 +90,15 @@ class Address:
         return (self.index,) if self.sub_index is None else (self.index, self.sub_index)
 
     @property
-    def words(self) -> int:
-        """How many 16-bit words it takes."""
-        return self.codec.size // 2
+    def place(self) -> tuple[str, int, int | None, int]:
+        """What a link is told: space, index, sub-index and size in bytes."""
+        return self.space, self.index, self.sub_index, self.codec.size
 
     @property
     def occupied(self) -> Sequence[tuple[int, ...]]:
         """All that it takes and nobody else may: registers and ids one by one."""
         if self.space == 'register':
-            return [(self.index + word,) for word in range(self.words)]
+            return [(self.index + word,) for word in range(self.codec.size // 2)]
         return [(id_,) for id_ in self.numbers] if self.space == 'id' else [self.numbers]
 
 
@@ -122,6 +120,8 @@ class Parameter:
     :ivar labels: the manual's label of each code of an enumeration.
     :ivar stopped: the motor must stand for it to be written (type Init, not Init/Run).
     :ivar since: the first firmware that has it, or ``None``.
+    :ivar older: firmware of the family's older dialect has it, too; asking such a drive for others
+        is a fault.
     :ivar source: where in the manuals it stands.
     """
 
@@ -138,6 +138,7 @@ class Parameter:
     access: Access
     stopped: bool
     since: Fraction | None
+    older: bool
     description: str
     source: str
 
@@ -159,11 +160,6 @@ class Parameter:
         """Whether the drive keeps it for people to read and write: a ROS parameter."""
         return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS
 
-    @property
-    def older(self) -> bool:
-        """Firmware that [M2] describes has it too; asking such a drive for others is a fault."""
-        return 'M2' in self.source
-
     def at(self, protocol: str) -> Address:
         """
         Return where it stands on ``protocol``.
@@ -179,38 +175,38 @@ class Parameter:
         """Return the value of one raw count over ``protocol``, in :attr:`unit`."""
         return self.at(protocol).factor
 
-    def decode(self, words: Sequence[int], protocol: str = 'modbus') -> Value:
+    def decode(self, data: bytes, protocol: str = 'modbus') -> Value:
         """
-        Turn the words read from the drive into a value in :attr:`unit`.
+        Turn the bytes read from the drive into a value in :attr:`unit`.
 
         A code that the manual does not list is shown as its number: the drive is right [C19].
 
-        :raises ValueError: not as many words as the parameter has, or a code that has no value of
+        :raises ValueError: not as many bytes as the parameter has, or a code that has no value of
             the parameter's type.
         """
-        codec, data = self.at(protocol).codec, to_bytes(words)
-        if isinstance(codec, Text):
-            return codec.decode(data)
-        raw = codec.decode(data)
+        address = self.at(protocol)
+        raw = address.codec.decode(data)
+        if isinstance(raw, str):
+            return raw
         if self.labels:
             return self._meaning(raw)
         if self.kind is int:
             return raw
-        factor = self.factor(protocol)
+        factor = address.factor
         return raw * factor.numerator / factor.denominator
 
-    def encode(self, value: Value, protocol: str = 'modbus') -> tuple[int, ...]:
+    def encode(self, value: Value, protocol: str = 'modbus') -> bytes:
         """
-        Turn a value in :attr:`unit` into the words to write, exactly.
+        Turn a value in :attr:`unit` into the bytes to write, exactly.
 
         :raises ValueError: wrong type, out of range, unknown label, or a number between two steps
             of the drive; the message says what would be right.
         """
         if self.labels:
-            return self._words(self._code(value), protocol)
+            return self.at(protocol).number.encode(self._code(value))
         codec = self.at(protocol).codec
         if isinstance(codec, Text):
-            return to_words(codec.encode(str(value)))
+            return codec.encode(str(value))
         number = self._number(value)
         factor = self.factor(protocol)
         raw = round(number / factor)
@@ -222,7 +218,7 @@ class Parameter:
                 f'{_show(below * factor)} and {_show((below + 1) * factor)}'
             )
         self._check_range(raw * factor, protocol)
-        return self._words(raw, protocol)
+        return codec.encode(raw)
 
     def span(self, protocol: str = 'modbus') -> tuple[Fraction, Fraction]:
         """
@@ -242,19 +238,16 @@ class Parameter:
         codecs = [address.codec for address in self.addresses.values()]
         return any(isinstance(codec, Number) and not codec.signed for codec in codecs)
 
-    def quantise(self, value: float, protocol: str = 'modbus') -> tuple[int, ...]:
+    def quantise(self, value: float, protocol: str = 'modbus') -> bytes:
         """
-        Turn a set-point into the words of the nearest step of the drive.
+        Turn a set-point into the bytes of the nearest step of the drive.
 
         :raises ValueError: not finite, or out of range.
         """
         number = self._number(value)
         factor = self.factor(protocol)
         self._check_range(number, protocol)
-        return self._words(round(number / factor), protocol)
-
-    def _words(self, raw: int, protocol: str) -> tuple[int, ...]:
-        return to_words(self.at(protocol).number.encode(raw))
+        return self.at(protocol).number.encode(round(number / factor))
 
     def _meaning(self, raw: int) -> Value:
         """Return what a code of an enumeration means."""

@@ -31,10 +31,6 @@ class Role(enum.Enum):
     STATUS_WORD = 'status_word'
     #: Who controls the drive.
     CONTROL_SOURCE = 'control_source'
-    #: Starts and stops the motor, and procedures such as tuning.
-    START_COMMAND = 'start_command'
-    #: What went wrong on the line; reading it acknowledges.
-    LINE_FAULTS = 'line_faults'
     FIRMWARE = 'firmware'
     MOTOR_FIRMWARE = 'motor_firmware'
 
@@ -42,13 +38,6 @@ class Role(enum.Enum):
     PROCESS_UNIT = 'process_unit'
     STOP_MODE = 'stop_mode'
     START_DELAY = 'start_delay'
-
-    FREQUENCY_SETPOINT = 'frequency_setpoint'
-    SPEED_SETPOINT = 'speed_setpoint'
-    TORQUE_SETPOINT = 'torque_setpoint'
-    PROCESS_SETPOINT = 'process_setpoint'
-    #: Takes the set-point of every control mode, where it can be reached.
-    COMMON_SETPOINT = 'common_setpoint'
 
     ACTUAL_FREQUENCY = 'actual_frequency'
     ACTUAL_SPEED = 'actual_speed'
@@ -72,8 +61,12 @@ class Role(enum.Enum):
     NOMINAL_FREQUENCY = 'nominal_frequency'
     NOMINAL_SPEED = 'nominal_speed'
     NOMINAL_CURRENT = 'nominal_current'
+    NOMINAL_POWER_FACTOR = 'nominal_power_factor'
 
     #: After how long a silence of the line the drive stops the motor by itself, and if it does.
     COMMUNICATION_TIMEOUT = 'communication_timeout'
     STOP_AT_TIMEOUT = 'stop_at_timeout'
+    BUS_PROTOCOL = 'bus_protocol'
     BUS_ADDRESS = 'bus_address'
+    BAUD_RATE = 'baud_rate'
+    CHARACTER_FORMAT = 'character_format'

@@ -57,7 +57,8 @@ def set_(options: argparse.Namespace) -> int:
             for name, value in wanted.items():
                 try:
                     exact = drive.parameters.exact(name, value)
-                    if is_barred(name, options) and not same(exact, values.get(name)):
+                    barred = is_barred(name, drive.model, options)
+                    if barred and not same(exact, values.get(name)):
                         raise ParameterError(f'{name}: {BARRED}')
                     drive.parameters.admit(name, value)
                 except ParameterError as error:

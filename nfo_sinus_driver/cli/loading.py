@@ -36,7 +36,6 @@ from nfo_sinus_driver.cli.values import shown
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.link import Words
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -45,18 +44,18 @@ class Loading:
     """
     Writes into one drive, in an order that the drive takes.
 
-    :param words: what differs from what the drive has, as it shall stand there.
+    :param data: what differs from what the drive has, as it shall stand there.
     :param options: ``put_back`` and ``keep`` say what happens when it fails half-way.
     """
 
     def __init__(
-        self, drive: Remote, words: Mapping[str, Words], options: argparse.Namespace
+        self, drive: Remote, data: Mapping[str, bytes], options: argparse.Namespace
     ) -> None:
         self._drive = drive
-        self._words = words
+        self._data = data
         self._options = options
         #: What the drive had, to be put back.
-        self._before = {key: drive.parameters.words[key] for key in words}
+        self._before = {key: drive.parameters.data[key] for key in data}
         self._written: dict[str, Change] = {}
 
     def run(self) -> None:
@@ -67,7 +66,7 @@ class Loading:
             put back if that was wanted.
         """
         try:
-            self._write('writing', self._words, self._written)
+            self._write('writing', self._data, self._written)
         except (DriveError, Interrupted) as error:
             doubtful = error.left if isinstance(error, ParameterError) else ()
             self._tell_how_far(error)
@@ -75,7 +74,7 @@ class Loading:
             raise Trouble(self._clean_up(stained)) from error
 
     def _write(
-        self, what: str, words: Mapping[str, Words], written: dict[str, Change]
+        self, what: str, data: Mapping[str, bytes], written: dict[str, Change]
     ) -> None:
         """
         Write, and keep account of it.
@@ -83,19 +82,19 @@ class Loading:
         :raises DriveError: something was not taken.
         :raises Interrupted: a signal came; the parameter that was on its way was finished.
         """
-        with _signals_noted() as came, progress(f'{what} {self._drive}', len(words)) as step:
+        with _signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
 
             def wrote(change: Change) -> None:
                 written[change.key] = change
                 step()
-                if came() and len(written) < len(words):
+                if came() and len(written) < len(data):
                     raise Interrupted
 
-            self._drive.parameters.write_each(words, wrote).result()
+            self._drive.parameters.write_each(data, wrote).result()
 
     def _tell_how_far(self, error: Exception) -> None:
         """Say what was written and what was not."""
-        left = [key for key in self._words if key not in self._written]
+        left = [key for key in self._data if key not in self._written]
         # a message of the writer begins with the parameter that it is about
         failed = [key for key in left if str(error).startswith(f'{key}:')]
         left = [key for key in left if key not in failed]
@@ -114,7 +113,7 @@ class Loading:
         if not self._options.put_back and not self._wants_it_back():
             if self._written:
                 remark(f'to put it back:\n  {self._how_to_put_back()}')
-            return f'not loaded: {len(self._written)} of {len(self._words)} were written'
+            return f'not loaded: {len(self._written)} of {len(self._data)} were written'
         back: dict[str, Change] = {}
         try:
             self._write('putting back', {key: self._before[key] for key in stained}, back)
@@ -145,7 +144,7 @@ class Loading:
 
     def _how_to_put_back(self) -> str:
         words = [f'{key}={shown(change.old, "")}' for key, change in self._written.items()]
-        if any(key.startswith('serial.') for key in self._written):
+        if not self._drive.model.communication.isdisjoint(self._written):
             words.insert(0, '--allow-communication-changes')
         return command_line(self._options, 'set', *words)
 

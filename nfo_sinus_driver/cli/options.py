@@ -22,6 +22,7 @@ import math
 import shlex
 
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import ADDRESSES
@@ -36,7 +37,7 @@ DEFAULTS = {
     'port': '/dev/ttyUSB0',
     'protocol': 'modbus_rtu',
     'address': 1,
-    'model': 'sinus_g2',
+    'model': usual_family(),
     'baud_rate': 0,
     'char_format': '',
     'response_timeout': 0.2,
@@ -104,7 +105,7 @@ def _common() -> argparse.ArgumentParser:
         metavar='N',
         help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone (default: 1)',
     )
-    add('--model', choices=families(), help='default: sinus_g2')
+    add('--model', choices=families(), help=f'default: {usual_family()}')
     add(
         '--baud-rate',
         type=int,

@@ -34,7 +34,6 @@ from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive.reference import Reference
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1
@@ -122,7 +121,10 @@ class _Ride:
             )
         if options.setpoint is None:
             return
-        most = Reference(remote.registers, mode).most
+        target = remote.model.profile.setpoints.get(mode)
+        if target is None:
+            raise Trouble(f'the drive takes no set-point over the bus in control mode {mode}')
+        most = target.most
         if abs(options.setpoint) > most:
             unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
             raise Trouble(

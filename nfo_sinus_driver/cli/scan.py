@@ -160,7 +160,7 @@ def _ask(drive: Remote) -> dict[str, str] | None:
     """
     try:
         status = drive.model.key(Role.STATUS_CODE)
-        drive.do(lambda: drive.registers.read_words(status, Priority.POLL, once=True))
+        drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))
         identity = drive.identify()
     except DriveError as error:
         cause = error.__cause__

@@ -47,14 +47,14 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.commands import carry_out
+from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.methods import make_control_method
-from nfo_sinus_driver.drive.methods import method_in_charge
-from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.link import LinkError
@@ -80,16 +80,16 @@ class Remote:
         self.model: Family = load_family(settings.model)
         self.registers = Registers(bus, settings.address, self.model, settings.retries)
         self.inverter = Inverter(self.model, self.registers, self, settings)
-        motion = None
+        controller = None
         if settings.control_method != 'monitor':
-            method = make_control_method(settings, self.registers)
+            commands = Commands(settings, self.registers)
             setpoint = Setpoint(
                 bus, settings.address, self.registers, self.inverter, lambda reason: None
             )
-            motion = Motion(bus, self.inverter, method, setpoint)
-        self._errands = Errands(bus, self.inverter, self.registers, motion)
+            controller = Controller(bus, self.inverter, commands, setpoint)
+        self._procedures = Procedures(bus, self.inverter, controller)
         self.parameters = Parameters(
-            bus, self.inverter, self.registers, self._errands, self._run, self._count
+            bus, self.inverter, self.registers, self._procedures, self._run, self._count
         )
         self._step: Callable[[], None] = lambda: None
 
@@ -135,12 +135,13 @@ class Remote:
 
     def error_log(self, most: int) -> tuple[LogEntry, ...]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
-        log = ErrorLog(self.inverter, self.registers, self._errands)
+        log = ErrorLog(self.inverter, self.registers, self._procedures)
         return self.do(lambda: log.read_now(most))
 
     def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
-        return self.do(lambda: method_in_charge(self.inverter, self.registers, Priority.SERVICE))
+        steps = self.model.profile.in_charge(self.inverter.seen)
+        return self.do(lambda: carry_out(steps, self.registers, Priority.SERVICE))
 
     def measure(self, key: str) -> Value:
         """Read one value."""

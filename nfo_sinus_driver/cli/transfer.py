@@ -41,7 +41,7 @@ from nfo_sinus_driver.cli.values import shown
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.link import Words
+from nfo_sinus_driver.drive.parameter_writer import shown_raw
 
 _NOTHING = ', nothing was written'
 
@@ -52,7 +52,7 @@ def dump(options: argparse.Namespace) -> int:
         drive = session.drive()
         identity = drive.identify()
         values = drive.read()
-        lost = [key for key in drive.parameters.words if key not in values]
+        lost = [key for key in drive.parameters.data if key not in values]
     write_file(options.file, format_file(_header(drive, identity), values, drive.model))
     where = '' if options.file == '-' else f' saved in {options.file}'
     remark(f'{len(values)} parameters of {drive}, {identity}{where}')
@@ -73,20 +73,20 @@ def load(options: argparse.Namespace) -> int:
         for note in _notes(file, drive, identity):
             remark(note)
         values = drive.read(file.values)
-        require_names(file.values, drive.parameters.words, str(drive), _NOTHING)
-        words = _differing(file, drive, options)
-        for key in words:
-            new = drive.registers.value(key, words[key])
+        require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
+        data = _differing(file, drive, options)
+        for key in data:
+            new = drive.registers.value(key, data[key])
             put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
-        count = 'one parameter' if len(words) == 1 else f'{len(words)} parameters'
-        if not words:
+        count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
+        if not data:
             remark(f'nothing to write: {drive} has all of it already')
             return 0
-        _require_standstill(drive, words)
+        _require_standstill(drive, data)
         if options.dry_run:
             remark(f'a dry run: {count} would be written, nothing was')
             return 0
-        Loading(drive, words, options).run()
+        Loading(drive, data, options).run()
     remark(f'{count} written and read back')
     return 0
 
@@ -128,22 +128,22 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
 
 def _differing(
     file: ParameterFile, drive: Remote, options: argparse.Namespace
-) -> dict[str, Words]:
+) -> dict[str, bytes]:
     """
     Return what has to be written.
 
     :raises Trouble: the drive cannot have some of it, or it may not be changed; all is listed.
     """
-    found: dict[str, Words] = {}
+    found: dict[str, bytes] = {}
     wrong, kept = [], []
     for key, value in file.values.items():
         if same(value, drive.parameters.values.get(key)):
             continue
         try:
-            words = drive.registers.words(key, value)
-            if words == drive.parameters.words[key]:
+            data = drive.registers.encode(key, value)
+            if data == drive.parameters.data[key]:
                 continue
-            if is_barred(key, options):
+            if is_barred(key, drive.model, options):
                 kept.append(key)
                 continue
             if not options.dry_run:
@@ -151,7 +151,7 @@ def _differing(
         except (ParameterError, ValueError) as error:
             wrong.append(str(error))
         else:
-            found[key] = words
+            found[key] = data
     if wrong:
         raise Trouble(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
     if kept:
@@ -169,18 +169,17 @@ def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
 
 
 def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
-    """Return what the drive has, as words where they mean nothing."""
-    words = ' '.join(f'{word:04X}h' for word in drive.parameters.words[key])
-    return values.get(key, words)
+    """Return what the drive has, as bytes where they mean nothing."""
+    return values.get(key, shown_raw(drive.parameters.data[key]))
 
 
-def _require_standstill(drive: Remote, words: Mapping[str, Words]) -> None:
+def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
     """
     See to it that what only a standing motor allows is not tried while it runs.
 
     :raises Trouble: it runs.
     """
-    keys = [key for key in words if drive.model[key].stopped]
+    keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.look().driven:
         head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
         raise Trouble(listed(head, keys))

@@ -20,7 +20,6 @@ import argparse
 import json
 import time
 
-from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.helm import Ended
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
@@ -33,6 +32,7 @@ from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.drive.procedure import require_known
 
 PROCEDURES = {
     'full': Procedure.FULL,
@@ -53,11 +53,7 @@ def tune(options: argparse.Namespace) -> int:
     with Session(options) as session:
         drive = session.drive()
         drive.identify(thoroughly=False)
-        if not drive.inverter.has(drive.model.key(Role.START_COMMAND)):
-            raise Trouble(
-                f'{what} is not known of this model ({drive.model.name}): [M1] lists no command '
-                'for it; do it at the keypad'
-            )
+        require_known(procedure, drive.model)
         if drive.look().driven:
             raise Trouble(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
     require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
@@ -97,7 +93,7 @@ class _Tuning:
         except DriveError as error:
             tuned = Tuned(False, str(error), ())
         text = in_our_words(tuned.text)
-        if self._drive.stop_unconfirmed and not self._drive.held_by_fault:
+        if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
             # a fault keeps it still; else nobody tries on when this command has ended
             screen.say(text)
             Stopping(self._helm, self._drive, self._show).confirmed_late()

@@ -31,7 +31,6 @@ from nfo_sinus_driver.drive.parameter_writer import show
 
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
 _MEASURED = 'Status'
-_LINE = 'serial.'
 #: Why a setting of the line is left alone.
 BARRED = (
     'settings of the line are changed with --allow-communication-changes alone, '
@@ -51,9 +50,9 @@ def same(one: Value | None, other: Value | None) -> bool:
     return one == other
 
 
-def is_barred(key: str, options: argparse.Namespace) -> bool:
+def is_barred(key: str, model: Family, options: argparse.Namespace) -> bool:
     """Tell whether a setting must not be changed without being asked for by an option."""
-    return key.startswith(_LINE) and not options.allow_communication_changes
+    return key in model.communication and not options.allow_communication_changes
 
 
 def parse_value(parameter: Parameter, text: str) -> Value:

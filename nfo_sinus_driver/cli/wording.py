@@ -27,7 +27,6 @@ _WORDS = (
     ('more than lost_after', 'more than a silence after which it is lost'),
     ('set drive_timeout', 'give --drive-timeout'),
     ('drive_timeout', '--drive-timeout'),
-    ('set model to auto or sinus_g2', 'give --model sinus_g2'),
     ('set model to auto or to what it is', 'give the right --model'),
     ('if this driver is killed', 'if this command is killed'),
     ('the driver is ending', 'this command is ending'),

@@ -14,6 +14,7 @@
 
 """One inverter in engineering units. No ROS."""
 
+from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
@@ -26,7 +27,6 @@ from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.snapshot import Telemetry
-from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.drive.tuning import Tuned
 
 __all__ = [

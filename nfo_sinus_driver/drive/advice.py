@@ -38,11 +38,6 @@ NO_RUN_INPUT = (
     'the drive stays in standby: its RUN input is not active '
     '(DIN1; strap it to +24 V or close its safety contact)'
 )
-#: Why a serial fault is left that MODE = Stop would end.
-CONTROLLED_ELSEWHERE = (
-    'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
-    'command that ends it, would take from them; press STOP at the drive, then acknowledge again'
-)
 
 
 def explain(error: LinkError, address: int, *, known: bool) -> str:

@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.link import Address
 
 #: The address that every drive listens to and none answers [M0 §6.1.2].
@@ -32,16 +32,17 @@ def can_broadcast(bus: Bus) -> bool:
     return bus.space == 'classic'
 
 
-async def broadcast_stop(bus: Bus) -> None:
+async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
     """
-    Write MODE = Stop to all drives of a Classic line; nobody confirms it.
+    Release the motors of all drives of a line that has a broadcast; nobody confirms it.
 
-    It works even on drives with a serial fault ([M0 §6.1.5], [C9]).
-
+    :param models: those that are on the line.
     :raises LinkError: the port is lost.
     """
-    g2 = load_family('sinus_g2')
-    place = g2[g2.key(Role.CONTROL_SOURCE)].at('classic')
-    await bus.write(
-        EVERYBODY, Address(place.numbers, place.words), (Mode.STOP,), Priority.STOP
-    )
+    for model in dict.fromkeys(models):
+        stop = model.profile.broadcast_stop
+        if stop is not None:
+            parameter = model[stop.key]
+            address = Address(*parameter.at(bus.space).place)
+            data = parameter.encode(stop.value, bus.space)
+            await bus.write(EVERYBODY, address, data, Priority.STOP)

@@ -19,7 +19,8 @@ from __future__ import annotations
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.errors import DriveError
@@ -33,22 +34,39 @@ async def detect_model(bus: Bus, unit: int) -> str:
     """
     Find out which model a drive is, for coroutines on the bus.
 
-    Only the G2 speaks Classic, tells who it is by functions 43 and 17, and has SWVer [C57].
+    It is the only one that speaks the protocol of the line; or the one that tells who it is; or
+    the one that has a parameter which no other has; or the only one that is left.
 
-    :raises DriveError: it does not answer; the message says what to check.
+    :raises DriveError: it does not answer, or several are left; the message says what to do.
     """
-    if bus.space == 'classic':
-        return 'sinus_g2'
-    g2 = load_family('sinus_g2')
-    place = g2[g2.key(Role.FIRMWARE)].at('modbus')
+    models = [model for model in map(load_family, families()) if _speaks(model, bus.space)]
     try:
-        if await bus.identify(unit, Priority.SERVICE) != Identification():
-            return 'sinus_g2'
-        await bus.read(unit, Address(place.numbers, place.words), Priority.SERVICE)
-    except Refused:
-        return 'sinus_optimal'
+        if len(models) > 1 and await bus.identify(unit, Priority.SERVICE) != Identification():
+            models = [model for model in models if model.profile.names_itself]
+        for model in models if len(models) > 1 else ():
+            if not model.profile.told_by:
+                continue
+            if await _has(bus, unit, model, model.profile.told_by):
+                return model.name
+            models = [other for other in models if other is not model]
     except Cancelled:
         raise DriveError('the driver is ending') from None
     except LinkError as error:
         raise DriveError(explain(error, unit, known=False)) from error
-    return 'sinus_g2'
+    if len(models) == 1:
+        return models[0].name
+    names = ' or '.join(model.name for model in models)
+    raise DriveError(f'the drive at address {unit} does not tell what it is: set model to {names}')
+
+
+def _speaks(model: Family, protocol: str) -> bool:
+    return any(protocol in parameter.addresses for parameter in model.values())
+
+
+async def _has(bus: Bus, unit: int, model: Family, key: str) -> bool:
+    address = Address(*model[key].at(bus.space).place)
+    try:
+        await bus.read(unit, address, Priority.SERVICE)
+    except Refused:
+        return False
+    return True

@@ -30,21 +30,23 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_watch import LogWatch
-from nfo_sinus_driver.drive.methods import make_control_method
-from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.own_timeout import OwnTimeout
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.picture import take_picture
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
@@ -54,7 +56,6 @@ from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
-from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.drive.tuning import Tuned
 from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.drive.watch import Watch
@@ -91,34 +92,33 @@ class Drive:
             self._unit,
             self._registers,
             self._inverter,
-            lambda reason: self._motion.refused(reason) if self._motion else None,
+            lambda reason: self._controller.refused(reason) if self._controller else None,
             lambda reply: self._watch.told(reply),
         )
-        self._motion: Motion | None = None
+        self._controller: Controller | None = None
         if settings.control_method != 'monitor':
-            method = make_control_method(settings, self._registers)
-            self._motion = Motion(bus, self._inverter, method, self._setpoint)
+            commands = Commands(settings, self._registers)
+            self._controller = Controller(bus, self._inverter, commands, self._setpoint)
         self._watch = Watch(
             bus,
             self._inverter,
             self._registers,
             self._setpoint,
-            self._motion,
+            self._controller,
             listener,
             lambda: self._connect(patient=False),
         )
-        self._barred = False
-        self._errands = errands = Errands(bus, self._inverter, self._registers, self._motion)
+        self._procedures = procedures = Procedures(bus, self._inverter, self._controller)
         #: The settings of the drive.
         self.parameters = Parameters(
-            bus, self._inverter, self._registers, errands, self._run, self._take_parameters
+            bus, self._inverter, self._registers, procedures, self._run, self._take_parameters
         )
         self._own_timeout = OwnTimeout(
-            self._inverter, self.parameters, commanded=self._motion is not None
+            self._inverter, self.parameters, commanded=self._controller is not None
         )
-        self._error_log = ErrorLog(self._inverter, self._registers, errands)
+        self._error_log = ErrorLog(self._inverter, self._registers, procedures)
         self._log_watch = LogWatch(bus, self._inverter, self._error_log, listener)
-        self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, errands)
+        self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, procedures)
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
 
@@ -179,17 +179,17 @@ class Drive:
     @property
     def stop_unconfirmed(self) -> bool:
         """A stop was asked for that the drive has not confirmed yet."""
-        return self._motion is not None and self._motion.stopping
+        return self._controller is not None and self._controller.stopping
 
     @property
-    def held_by_fault(self) -> bool:
+    def blocked_by_fault(self) -> bool:
         """A fault keeps the drive from taking a stop, and the motor still."""
-        return self._motion is not None and self._motion.taking_back.held_by_fault
+        return self._controller is not None and self._controller.blocked_by_fault
 
     @property
     def stop_overdue(self) -> bool:
         """It has had time to confirm it, and no fault keeps it from turning the motor."""
-        return self._motion is not None and self._motion.taking_back.overdue
+        return self._controller is not None and self._controller.stop_overdue
 
     @property
     def statistics(self) -> Statistics:
@@ -236,8 +236,7 @@ class Drive:
 
         :param patience: how long the drive may take to confirm it, s.
         """
-        self._barred = True
-        return self._run(lambda: self._deactivate(patience))
+        return self._run(lambda: self._stop_for_good(patience))
 
     def enable(self) -> Future[str]:
         """Take control and run at set-point 0, then follow set-points that come in."""
@@ -245,15 +244,17 @@ class Drive:
 
     def stop(self) -> Future[str]:
         """Stop as the drive's StMode says; control is kept."""
-        return self._run(lambda: self._command(lambda motion: motion.stop()))
+        return self._run(lambda: self._command(lambda controller: controller.stop()))
 
     def quick_stop(self) -> Future[str]:
         """Release the motor at once: it coasts."""
-        return self._run(lambda: self._command(lambda motion: motion.quick_stop()))
+        return self._run(lambda: self._command(lambda controller: controller.quick_stop()))
 
     def acknowledge(self) -> Future[str]:
         """Acknowledge a fault."""
-        return self._run(lambda: self._command(lambda motion: motion.acknowledge(), connected=True))
+        return self._run(
+            lambda: self._command(lambda controller: controller.acknowledge(), connected=True)
+        )
 
     def error_log(self, most: int = 0) -> Future[tuple[LogEntry, ...]]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
@@ -261,11 +262,11 @@ class Drive:
 
     def erase_error_log(self) -> Future[str]:
         """Erase the error log; the motor must stand."""
-        return self._run(lambda: self._unless_barred(self._error_log.erase_now))
+        return self._run(lambda: self._unless_closed(self._error_log.erase_now))
 
     def reset_energy(self) -> Future[str]:
         """Reset the kWh counter; the motor must stand."""
-        return self._run(lambda: self._unless_barred(self._error_log.reset_energy_now))
+        return self._run(lambda: self._unless_closed(self._error_log.reset_energy_now))
 
     def tune(
         self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
@@ -280,7 +281,7 @@ class Drive:
 
     def cancel_tuning(self) -> Future[str]:
         """Stop a tuning; does nothing else, and nothing if there is none."""
-        return self._run(self._errands.recall)
+        return self._run(self._procedures.abort)
 
     def set_drive_timeout(self, seconds: float) -> Future[str]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
@@ -317,19 +318,19 @@ class Drive:
         return explain(error, self._unit, known=self._inverter.identity is not None)
 
     async def _command(self, command: Any, *, connected: bool = False) -> str:
-        if self._motion is None:
+        if self._controller is None:
             raise DriveError(MONITOR_REFUSAL)
         if connected and not self._inverter.connected:
             raise DriveError(f'the drive at address {self._unit} is not connected')
-        answer: str = await command(self._motion)
+        answer: str = await command(self._controller)
         return answer
 
     async def _enable(self) -> str:
         # looked at on the bus, where a deactivation cannot come between
-        if self._barred or not self._watch.active:
+        if not self._watch.active:
             raise DriveError('the drive is not active')
         answer = await self._command(
-            lambda motion: motion.enable(self._own_timeout.require_set), connected=True
+            lambda controller: controller.enable(self._own_timeout.require_set), connected=True
         )
         self._watch.wake()
         return answer
@@ -339,17 +340,17 @@ class Drive:
             raise DriveError(f'the drive at address {self._unit} is not connected')
         return await self._error_log.read_now(most)
 
-    async def _unless_barred(self, errand: Callable[[], Coroutine[Any, Any, str]]) -> str:
+    async def _unless_closed(self, procedure: Callable[[], Coroutine[Any, Any, str]]) -> str:
         # it would take control that nobody gives back any more
-        if self._barred:
+        if self._controller is not None and self._controller.state is ControlState.CLOSED:
             raise DriveError('the driver is ending')
-        return await errand()
+        return await procedure()
 
     async def _tune(
         self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None
     ) -> Tuned:
         # as with enable, the motor may turn
-        if self._barred or not self._watch.active:
+        if not self._watch.active:
             raise DriveError('the drive is not active')
 
         def tell(seen: InverterStatus, elapsed: float) -> None:
@@ -367,6 +368,8 @@ class Drive:
                 except BaseException:
                     # nobody watches it yet
                     self._inverter.connected = False
+                    if self._controller is not None:
+                        self._controller.disconnected()
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
@@ -387,19 +390,21 @@ class Drive:
         await inverter.read_control_mode()
         await inverter.read_timeout()
         await inverter.look(Priority.SERVICE)
-        if self._motion is not None:
-            await self._motion.connected()
+        if self._controller is not None:
+            await self._controller.secure_found()
             await self._own_timeout.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
         self._setpoint.connected()
         inverter.connected = inverter.answering = True
+        if self._controller is not None:
+            self._controller.connected()
         name = '' if identity.model else inverter.model.name
-        if identity.model and inverter.model.name == 'sinus_optimal':
+        if identity.model and not inverter.model.profile.names_itself:
             inverter.tell(
                 Severity.WARNING,
-                f'this drive says that it is a {identity.model}; no Optimal says anything: '
-                'set model to auto or sinus_g2',
+                f'this drive says that it is a {identity.model}; no {inverter.model.profile.title} '
+                'says anything: set model to auto or to what it is',
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, f'connected: {told}')
@@ -409,19 +414,21 @@ class Drive:
         # nobody may enable it while it is awaited that the motor stands
         self._set_active(False)
         try:
-            if self._motion is None:
+            if self._controller is None:
                 return 'only watched'
-            return await self._motion.release(timeout)
+            return await self._controller.release(timeout)
         finally:
             if self._parameters_task is not None:
                 task, self._parameters_task = self._parameters_task, None
                 self._bus.cancel(task)
             self._inverter.connected = False
+            if self._controller is not None:
+                self._controller.disconnected()
             self._log_watch.end()
             self._watch.end()
 
     async def _require_standing(self) -> None:
-        if self._motion is None or self._inverter.identity is None:
+        if self._controller is None or self._inverter.identity is None:
             return
         seen = await self._inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
@@ -430,14 +437,19 @@ class Drive:
                 f'({self._inverter.describe()}): another one has to wait until it stands'
             )
 
+    async def _stop_for_good(self, patience: float) -> str:
+        if self._controller is not None:
+            self._controller.close()
+        return await self._deactivate(patience)
+
     async def _deactivate(self, patience: float | None = None) -> str:
         self._set_active(False)
-        if self._motion is None or not self._motion.concerned:
+        if self._controller is None or not self._controller.may_run:
             return ''
         if patience is not None and not self.heard:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)
-        return await self._motion.stop(patience)
+        return await self._controller.stop(patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""

@@ -25,15 +25,14 @@ import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -104,10 +103,10 @@ def _local(at: float) -> str:
 class ErrorLog:
     """The error log and the kWh counter of one drive; used on the bus alone."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = registers
-        self._errands = errands
+        self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
         self._sightings: list[tuple[int, float]] = []
@@ -126,8 +125,8 @@ class ErrorLog:
         """
         area = self._area()
         limit = min(most or area.entries, area.limit)
-        words = await self._read(area, limit, 0, Priority.POLL)
-        return self.understood(words, await self.read_time(Priority.POLL))
+        entries = await self._read(area, limit, 0, Priority.POLL)
+        return self.understood(entries, await self.read_time(Priority.POLL))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
@@ -175,11 +174,10 @@ class ErrorLog:
 
         :raises DriveError: it was not erased, and why.
         """
-        what = 'erasing the error log'
-        with self._errands.lent(what) as loan:
+        with self._procedures.begun(Reset.ERROR_LOG) as access:
             area = self._area()
-            async with self._errands.sent(loan):
-                await self._errands.tell(loan, Scmd.ERASE_E_LOG)
+            async with self._procedures.in_standby(access):
+                await self._procedures.command(access, Reset.ERROR_LOG)
                 if code_of(await self._entry(area, 0)):
                     raise DriveError('the drive took the command, but its error log is not empty')
         return 'the error log is erased'
@@ -190,18 +188,18 @@ class ErrorLog:
 
         :raises DriveError: it was not reset, and why.
         """
-        what, energy = 'resetting the kWh counter', self._inverter.model.key(Role.ENERGY)
-        self._errands.require(what)
+        energy = self._inverter.model.key(Role.ENERGY)
+        self._procedures.require(Reset.ENERGY)
         if not self._inverter.has(energy):
-            told = self._inverter.identity
+            since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                f'{what} came with firmware 4.38; this drive has '
+                f'{Reset.ENERGY.value} came with firmware {float(since or 0):.2f}; this drive has '
                 f'{(told and told.versions) or "an older one"}'
             )
-        with self._errands.lent(what) as loan:
-            async with self._errands.sent(loan):
+        with self._procedures.begun(Reset.ENERGY) as access:
+            async with self._procedures.in_standby(access):
                 before = await self._registers.read_number(energy, Priority.SERVICE)
-                await self._errands.tell(loan, Scmd.RESET_E_OUT)
+                await self._procedures.command(access, Reset.ENERGY)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')
@@ -219,10 +217,10 @@ class ErrorLog:
     ) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
         for _ in range(_TRIES):
-            words = await self._read_down(area, limit, known, priority)
+            entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
-            if not words or await self._entry(area, 0, priority) == words[0]:
-                return words
+            if not entries or await self._entry(area, 0, priority) == entries[0]:
+                return entries
         raise DriveError('the drive writes into its error log all the time: try again')
 
     async def _read_down(
@@ -247,10 +245,10 @@ class ErrorLog:
     ) -> int:
         """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
         # nobody waits for what is read in the background, so it is not asked for again at once
-        words = await self._registers.read_from(
-            Address(area.numbers(number), area.words), priority, once=priority > Priority.POLL
+        data = await self._registers.read_from(
+            Address(*area.place(number)), priority, once=priority > Priority.POLL
         )
-        return area.codec.decode(to_bytes(words))
+        return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
         code, then = code_of(entry), hours_of(entry)

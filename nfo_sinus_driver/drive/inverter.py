@@ -27,8 +27,10 @@ import math
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
@@ -38,25 +40,19 @@ from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Severity
-from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
-#: The parameter that a status begins with.
-STATUS_WORD = 'fieldbus.drive_status'
-#: Firmware from which on [M0] describes the Classic protocol [C3].
-_FIRST_OF_V2_03 = 4.28
-#: As long as RunDly of the G2 can be, s.
+#: No start delay of a drive is longer, s.
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
 _SOON = 2.0
 _NOT_ASKED = (
-    'its firmware is not asked for while the bus has control, which firmware before 4.28 takes for '
-    'a fault: it is treated like that one until it is connected to while the bus has no control; '
-    'set classic_dialect to v2.03 or v5.0 to know it at once'
+    'its firmware is not asked for while the bus has control, which firmware before {before:g} '
+    'takes for a fault: it is treated like that one until it is connected to while the bus has no '
+    'control; set classic_dialect to v2.03 or {name} to know it at once'
 )
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
@@ -128,7 +124,7 @@ class Inverter:
         self.tuning = False
         self.control_mode = ''
         self.unit = ''
-        #: Its firmware is of those that do not know every parameter ([M2], [C21]).
+        #: Its firmware is of those that do not know every parameter.
         self._older = False
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
@@ -155,13 +151,13 @@ class Inverter:
             and has not before, the rest is read at the head of the bus.
         :raises LinkError: the drive does not answer.
         """
-        if not self.has(STATUS_WORD):
+        if not self.has(self.word_key):
             return await self._look_at_code(priority, once)
         before = self.seen
         if told is None:
             word, at = await self._read_word(priority, once)
         else:
-            word, at = self.status_word(told.words), told.arrived
+            word, at = self.status_word(told.data), told.arrived
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -190,12 +186,17 @@ class Inverter:
         return self._saw(seen)
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self._registers.read_reply(STATUS_WORD, priority, once=once)
-        return self.status_word(reply.words), reply.arrived
+        reply = await self._registers.read_reply(self.word_key, priority, once=once)
+        return self.status_word(reply.data), reply.arrived
 
-    def status_word(self, words: Words) -> int:
+    @property
+    def word_key(self) -> str:
+        """The parameter that a status begins with; ``''`` if the model has none."""
+        return self.model.key(Role.STATUS_WORD)
+
+    def status_word(self, data: bytes) -> int:
         """Return what counts of a status word: the upper half is described nowhere [C24]."""
-        return int(self._registers.number(STATUS_WORD, words)) & 0xFFFF
+        return int(self._registers.number(self.word_key, data)) & 0xFFFF
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
@@ -209,8 +210,9 @@ class Inverter:
         seen = InverterStatus(at, None, code, self.model, code_at=at)
         if seen.means(Meaning.ANONYMOUS):
             key = self.model.key(Role.CONTROL_SOURCE)
-            mode = await self._registers.read_number(key, priority, once=once)
-            seen = replace(seen, by_mode=mode == Mode.BUS)
+            source = await self._registers.read(key, priority, once=once)
+            holder = self.model.profile.holders.get(int(source), Holder.UNKNOWN)
+            seen = replace(seen, by_mode=holder is Holder.BUS)
         return self._saw(seen)
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
@@ -244,8 +246,8 @@ class Inverter:
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
-        words = await self._registers.read_words(key, priority, once=True)
-        value = self._registers.number(key, words)
+        data = await self._registers.read_data(key, priority, once=True)
+        value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
             return value
         if key not in self._told_impossible:
@@ -285,9 +287,9 @@ class Inverter:
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
         stop = self.model.key(Role.STOP_AT_TIMEOUT)
         self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
-        words = await self._registers.read_words(stop, Priority.SERVICE)
+        data = await self._registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = words == self._registers.words(stop, True)
+        self.auto_stop = data == self._registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """
@@ -299,18 +301,19 @@ class Inverter:
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
         await self._registers.read(self.model.key(Role.STATUS_CODE), priority, once=not patient)
-        classic = self._registers.protocol == 'classic'
+        dialect = self._dialect
         before, was_older = self.identity, self._older
-        self._older = classic and self.settings.classic_dialect == 'v5.0'
+        self._older = dialect is not None and self.settings.classic_dialect == dialect.name
         firmware_key = self.model.key(Role.FIRMWARE)
         if self._older or not self._registers.reaches(firmware_key):
             self.identity = Identity()
             return self.identity
-        if not await self._may_ask_firmware():
+        if dialect is not None and not await self._may_ask_firmware(dialect):
             if before is None:
                 # what the older firmware knows the newer one knows, too
                 self.identity, self._older = Identity(), True
-                self.tell(Severity.WARNING, _NOT_ASKED)
+                text = _NOT_ASKED.format(before=dialect.before, name=dialect.name)
+                self.tell(Severity.WARNING, text)
             else:
                 self._older = was_older
             return self.identity or Identity()
@@ -319,29 +322,34 @@ class Inverter:
             motor_key = self.model.key(Role.MOTOR_FIRMWARE)
             motor = await self._registers.read_number(motor_key, Priority.SERVICE)
         except Refused:
-            if not classic or self.settings.classic_dialect:
+            if dialect is None or self.settings.classic_dialect:
                 raise
             self._older = True
             self.identity = Identity()
         else:
-            self._older = classic and firmware < _FIRST_OF_V2_03
+            self._older = dialect is not None and firmware < dialect.before
             self.identity = Identity(firmware, int(motor))
         return self.identity
 
-    async def _may_ask_firmware(self) -> bool:
-        """
-        Tell whether SWVer can be asked for without harm.
+    @property
+    def _dialect(self) -> OlderDialect | None:
+        """The older dialect that a drive of this model may have on this line."""
+        dialect = self.model.profile.older
+        here = dialect is not None and dialect.protocol == self._registers.protocol
+        return dialect if here else None
 
-        To older firmware it is unknown, which is a serial fault while the bus has control [C21].
-        Who commands by the control word says by that that the drive is not of those.
+    async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
         """
-        settings = self.settings
-        known = settings.classic_dialect or settings.control_method == 'drive_control'
-        if known or self._registers.protocol != 'classic':
+        Tell whether the firmware can be asked for without harm, which an older one does not know.
+
+        Who commands by what only newer firmware has says by that that the drive is not of those.
+        """
+        method = self.model.profile.methods.get(self.settings.control_method)
+        if self.settings.classic_dialect or (method is not None and not method.older):
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
-        mode = await self._registers.read_number(key, Priority.SERVICE)
-        return mode in (Mode.STOP, Mode.EXT)
+        source = await self._registers.read(key, Priority.SERVICE)
+        return self.model.profile.holders.get(int(source)) in dialect.harmless
 
     @property
     def settings_need_control(self) -> bool:
@@ -372,7 +380,7 @@ class Inverter:
         """
         Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``.
 
-        The Optimal has no register that tells it [C58]: it is what the settings expect.
+        Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
         if self._registers.reaches(key):
@@ -390,7 +398,7 @@ class Inverter:
         """Tell whether an ordinary stop releases the motor [C97]."""
         key = self.model.key(Role.STOP_MODE)
         if self._registers.reaches(key):
-            return await self.read_label(key, Priority.STOP) == 'Release'
+            return await self.read_label(key, Priority.STOP) == self.model.profile.releases
         return self.seen is not None and Fact.STOP_MODE_BRAKE not in self.seen.facts
 
     async def read_start_delay(self) -> float:

@@ -18,19 +18,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.inverter import Inverter
 
 #: The driver's own setting that goes with each setting of the line.
-FOLLOWERS = {
-    'serial.bus_type': 'protocol',
-    'serial.address': 'address',
-    'serial.si_baud': 'baud_rate',
-    'serial.si_prot': 'char_format',
+_FOLLOWERS = {
+    Role.BUS_PROTOCOL: 'protocol',
+    Role.BUS_ADDRESS: 'address',
+    Role.BAUD_RATE: 'baud_rate',
+    Role.CHARACTER_FORMAT: 'char_format',
 }
-#: From this firmware on the codes of SiProt mean what the catalog says; before it code 1 is
-#: another format ([C3], [C5]).
-_KNOWN_SI_PROT = 4.28
+
+
+def followers(model: Family) -> Mapping[str, str]:
+    """Return the driver's own setting that goes with each setting of the line."""
+    named = {model.key(role): setting for role, setting in _FOLLOWERS.items()}
+    return {key: setting for key, setting in named.items() if key}
 
 
 def why_not(key: str, inverter: Inverter) -> str:
@@ -40,7 +45,7 @@ def why_not(key: str, inverter: Inverter) -> str:
         return 'control_method is monitor: this driver only reads'
     if inverter.tuning:
         return 'the drive is tuning: wait for its end, or stop it'
-    if not key.startswith('serial.'):
+    if key not in inverter.model.communication:
         return ''
     if not settings.allow_communication_changes:
         return (
@@ -48,7 +53,7 @@ def why_not(key: str, inverter: Inverter) -> str:
             'for the driver may lose the drive'
         )
     firmware = inverter.identity.firmware if inverter.identity else 0.0
-    if key == 'serial.si_prot' and firmware < _KNOWN_SI_PROT:
+    if firmware < inverter.model.profile.uncertain.get(key, 0.0):
         return (
             f'what its codes mean in firmware {firmware:.2f} is not known for sure: '
             'change it at the keypad'
@@ -56,9 +61,10 @@ def why_not(key: str, inverter: Inverter) -> str:
     return ''
 
 
-def after_change(changed: Mapping[str, Value]) -> str:
+def after_change(changed: Mapping[str, Value], model: Family) -> str:
     """Return how to follow a drive to new settings of the line, ``''`` if none was changed."""
-    follow = [f'{FOLLOWERS[key]} ({value})' for key, value in changed.items() if key in FOLLOWERS]
+    settings = followers(model)
+    follow = [f'{settings[key]} ({value})' for key, value in changed.items() if key in settings]
     if not follow:
         return ''
     return (

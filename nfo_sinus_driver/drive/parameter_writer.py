@@ -27,16 +27,15 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.write_access import Allow
 from nfo_sinus_driver.drive.write_access import WriteAccess
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 
 _SERVICE = Priority.SERVICE
 #: How often it is tried to put a value back that the drive refuses.
@@ -64,7 +63,7 @@ class Change:
     """
     A parameter that was written.
 
-    :ivar old: the value before, or the words as text where they had no meaning.
+    :ivar old: the value before, or the bytes as text where they had no meaning.
     """
 
     key: str
@@ -81,8 +80,8 @@ class Written:
     """A parameter that was written and read back, as it stands in the drive."""
 
     key: str
-    before: Words
-    after: Words
+    before: bytes
+    after: bytes
 
 
 def show(value: Value) -> str:
@@ -90,6 +89,11 @@ def show(value: Value) -> str:
     if isinstance(value, bool):
         return 'true' if value else 'false'
     return f'{value:.10g}' if isinstance(value, float) else str(value)
+
+
+def shown_raw(data: bytes) -> str:
+    """Return bytes that mean nothing, as the manuals print numbers."""
+    return f'{data.hex().upper()}h'
 
 
 def describe_drift(drift: Change) -> str:
@@ -101,12 +105,12 @@ def describe_drift(drift: Change) -> str:
 class ParameterWriter:
     """Changes parameters of one drive, for coroutines on the bus."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = registers
-        self._access = WriteAccess(inverter, errands)
+        self._access = WriteAccess(inverter, procedures)
 
-    async def write(self, wanted: Mapping[str, Words]) -> tuple[Change, ...]:
+    async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
         """
         Write what differs from what the drive has; all of it or nothing.
 
@@ -134,7 +138,7 @@ class ParameterWriter:
         return tuple(self.describe(entry) for entry in done)
 
     async def write_each(
-        self, wanted: Mapping[str, Words], wrote: Callable[[Written], None]
+        self, wanted: Mapping[str, bytes], wrote: Callable[[Written], None]
     ) -> None:
         """
         Write what differs, one after the other; what was written before a refusal stays.
@@ -146,7 +150,7 @@ class ParameterWriter:
             await self._write_all(wanted, wrote, allow)
 
     async def _write_all(
-        self, wanted: Mapping[str, Words], wrote: Callable[[Written], None], allow: Allow
+        self, wanted: Mapping[str, bytes], wrote: Callable[[Written], None], allow: Allow
     ) -> None:
         waiting = sorted(wanted, key=self._order)
         while waiting:
@@ -188,16 +192,17 @@ class ParameterWriter:
 
     def _order(self, key: str) -> tuple[bool, bool]:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""
-        return key.startswith('serial.'), not self._registers.model[key].stopped
+        model = self._registers.model
+        return key in model.communication, not model[key].stopped
 
-    async def _write_one(self, key: str, words: Words, allow: Allow) -> Iterable[Written]:
+    async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
         """Write one parameter if it differs; return what was written."""
         try:
             # between any two parameters, everybody who polls has a turn
-            before = await self._registers.read_words(key, Priority.POLL)
+            before = await self._registers.read_data(key, Priority.POLL)
         except LinkError as error:
             raise ParameterError(f'{key}: {self.explain(error)}') from error
-        if before == words:
+        if before == data:
             return ()
         try:
             await allow()
@@ -205,37 +210,37 @@ class ParameterWriter:
             raise ParameterError(f'{key}: {self.explain(error)}') from error
         except DriveError as error:
             raise ParameterError(f'{key}: {error}') from error
-        failure = await self._send(key, words)
-        kept: Words | None = None
+        failure = await self._send(key, data)
+        kept: bytes | None = None
         try:
-            kept = await self._registers.read_words(key, _SERVICE)
+            kept = await self._registers.read_data(key, _SERVICE)
         except LinkError as error:
             failure = failure or error
-        if kept == words:
+        if kept == data:
             # whatever became of the answer to the write, a repeated one too
-            return (Written(key, before, words),)
-        text = f'{key}: {await self._why(key, words, kept, failure)}'
+            return (Written(key, before, data),)
+        text = f'{key}: {await self._why(key, data, kept, failure)}'
         if kept == before and isinstance(failure, Refused):
             bad = failure.code == Refused.ILLEGAL_VALUE
             raise (_BadValue if bad else ParameterError)(text) from failure
         trouble, left = '', list[str]()
         if kept != before:
-            trouble, left = await self._put_back([Written(key, before, words)], allow)
+            trouble, left = await self._put_back([Written(key, before, data)], allow)
         if not left:
             raise ParameterError(f'{text}; it is {self._show(key, before)} as before') from failure
         if kept is None:
-            text += f'; whether the drive took {self._show(key, words)} is not known'
+            text += f'; whether the drive took {self._show(key, data)} is not known'
         raise ParameterError(f'{text}; {trouble}', left) from failure
 
-    async def _send(self, key: str, words: Words) -> LinkError | None:
+    async def _send(self, key: str, data: bytes) -> LinkError | None:
         """Write; return why the drive may not have taken it: reading it back tells."""
         try:
-            await self._registers.write_words(key, words, _SERVICE)
+            await self._registers.write_data(key, data, _SERVICE)
         except LinkError as error:
             return error
         return None
 
-    async def _restore(self, key: str, before: Words, allow: Allow) -> str:
+    async def _restore(self, key: str, before: bytes, allow: Allow) -> str:
         """
         See to it that a parameter is as it was; return why it is not.
 
@@ -251,7 +256,7 @@ class ParameterWriter:
                 return str(refused)
             error = await self._send(key, before)
             try:
-                kept = await self._registers.read_words(key, _SERVICE)
+                kept = await self._registers.read_data(key, _SERVICE)
             except Refused as refused:
                 trouble = str(refused)
                 continue
@@ -282,38 +287,38 @@ class ParameterWriter:
         said = [f'put back: {", ".join(back)}'] if back else []
         return '; '.join((*said, *stuck.values())), list(stuck)
 
-    def value(self, key: str, words: Words) -> Value:
-        """Return what words mean, or the words as text where they have no meaning."""
+    def value(self, key: str, data: bytes) -> Value:
+        """Return what bytes mean, or the bytes as text where they have no meaning."""
         try:
-            return self._registers.value(key, words)
+            return self._registers.value(key, data)
         except ValueError:
-            return ' '.join(f'{word:04X}h' for word in words)
+            return shown_raw(data)
 
-    def _show(self, key: str, words: Words) -> str:
+    def _show(self, key: str, data: bytes) -> str:
         unit = self._registers.model[key].unit
-        return f'{show(self.value(key, words))} {unit}'.rstrip()
+        return f'{show(self.value(key, data))} {unit}'.rstrip()
 
     def explain(self, error: LinkError) -> str:
         """Return what a failed transaction means to a person."""
         return explain(error, self._inverter.settings.address, known=True)
 
     async def _why(
-        self, key: str, words: Words, kept: Words | None, error: LinkError | None
+        self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
     ) -> str:
         """Return why a parameter was not changed."""
         if isinstance(error, Refused):
-            return await self._refusal(key, words, error)
+            return await self._refusal(key, data, error)
         if error is not None:
             return self.explain(error)
         assert kept is not None
-        return f'the drive keeps {self._show(key, kept)} where {self._show(key, words)} was written'
+        return f'the drive keeps {self._show(key, kept)} where {self._show(key, data)} was written'
 
-    async def _refusal(self, key: str, words: Words, error: Refused) -> str:
+    async def _refusal(self, key: str, data: bytes, error: Refused) -> str:
         """Return what the drive said, and what else is known that may be the reason [C87]."""
         inverter = self._inverter
         text = f'{error}'
         if error.code == Refused.ILLEGAL_VALUE:
-            text = f'the drive does not accept {self._show(key, words)}{error.behind}'
+            text = f'the drive does not accept {self._show(key, data)}{error.behind}'
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
             await inverter.look(_SERVICE)

@@ -32,22 +32,21 @@ from typing import Any
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.errand import Errands
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
-from nfo_sinus_driver.drive.parameter_guard import FOLLOWERS
 from nfo_sinus_driver.drive.parameter_guard import after_change
+from nfo_sinus_driver.drive.parameter_guard import followers
 from nfo_sinus_driver.drive.parameter_guard import why_not
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.wanted_state import WantedState
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +80,7 @@ class Parameters:
         bus: Bus,
         inverter: Inverter,
         registers: Registers,
-        errands: Errands,
+        procedures: Procedures,
         run: Run,
         told: Callable[[Collection[str]], None],
     ) -> None:
@@ -90,9 +89,9 @@ class Parameters:
         self._registers = registers
         self._run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, registers, errands)
+        self._writer = ParameterWriter(inverter, registers, procedures)
         self._keys: tuple[str, ...] = ()
-        self._words: dict[str, Words] = {}
+        self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
         self._wanted = WantedState(self, inverter)
         self._turn = Lock(bus)
@@ -110,9 +109,9 @@ class Parameters:
         return self._values
 
     @property
-    def words(self) -> Mapping[str, Words]:
+    def data(self) -> Mapping[str, bytes]:
         """The same as they stand in the drive, meaningful or not."""
-        return self._words
+        return self._data
 
     @property
     def progress(self) -> str:
@@ -126,10 +125,10 @@ class Parameters:
         """What the drive has otherwise than it was wanted, as wanted -> what it has."""
         return self._wanted.drift
 
-    def describe(self, key: str, before: Value, words: Words) -> Change:
-        """Return the difference between a value and what words mean."""
+    def describe(self, key: str, before: Value, data: bytes) -> Change:
+        """Return the difference between a value and what bytes mean."""
         unit = self._inverter.model[key].unit
-        return Change(key, before, self._writer.value(key, words), unit)
+        return Change(key, before, self._writer.value(key, data), unit)
 
     def exact(self, key: str, value: Value) -> Value:
         """
@@ -145,7 +144,7 @@ class Parameters:
         if key not in model or not model[key].is_setting or not self.reaches(key):
             raise ParameterError(f'{key} is no parameter that can be changed here')
         try:
-            return self._registers.value(key, self._registers.words(key, value))
+            return self._registers.value(key, self._registers.encode(key, value))
         except ValueError as error:
             raise ParameterError(str(error)) from None
 
@@ -187,7 +186,7 @@ class Parameters:
         return self._run(lambda: self.change_now(wanted))
 
     def write_each(
-        self, wanted: Mapping[str, Words], wrote: Callable[[Change], None]
+        self, wanted: Mapping[str, bytes], wrote: Callable[[Change], None]
     ) -> Future[None]:
         """Do as :meth:`write_each_now`."""
         return self._run(lambda: self.write_each_now(wanted, wrote))
@@ -216,18 +215,18 @@ class Parameters:
         """
         inverter = self._inverter
         self._keys = ()
-        self._words, self._values = {}, {}
+        self._data, self._values = {}, {}
         keys = self.available(only)
         self._unread = self._total = len(keys)
         started = time.monotonic()
         try:
             await self._read_first(keys)
         except BaseException:
-            self._words, self._values = {}, {}
+            self._data, self._values = {}, {}
             raise
         finally:
             self._unread = 0
-        self._keys = tuple(key for key in keys if key in self._words)
+        self._keys = tuple(key for key in keys if key in self._data)
         took = f'{time.monotonic() - started:.1f} s'
         if keys:
             inverter.tell(Severity.INFO, f'parameters: {self.progress} in {took}')
@@ -268,7 +267,8 @@ class Parameters:
         inverter = self._inverter
         keys = self._keys
         # without these the drive could hardly be read any more, so one of them in a round will do
-        rare = [key for key in keys if key in FOLLOWERS]
+        settings = followers(inverter.model)
+        rare = [key for key in keys if key in settings]
         self._rounds += 1
         skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
@@ -313,29 +313,29 @@ class Parameters:
         if guarded:
             # what may not be changed was only admitted because the drive has it already
             exact = {key: value for key, value in exact.items() if not why_not(key, self._inverter)}
-        words = {key: self._words_of(key, value) for key, value in exact.items()}
-        async with self._alone(words):
-            await self._require_standstill(words)
+        data = {key: self._data_of(key, value) for key, value in exact.items()}
+        async with self._alone(data):
+            await self._require_standstill(data)
             try:
-                changes = await self._writer.write(words)
+                changes = await self._writer.write(data)
             except ParameterError as error:
-                hint = after_change({key: exact[key] for key in error.left})
+                hint = after_change({key: exact[key] for key in error.left}, self._inverter.model)
                 if not hint:
                     raise
                 raise ParameterError(f'{error}; {hint}', error.left) from error
             self._wanted.follow(exact)
             written = {change.key for change in changes}
-            for key in words:
-                self._learn(key, words[key], quiet=key in written)
+            for key in data:
+                self._learn(key, data[key], quiet=key in written)
         for change in changes:
             self._inverter.tell(Severity.INFO, f'{change}{because}')
-        hint = after_change({change.key: change.new for change in changes})
+        hint = after_change({change.key: change.new for change in changes}, self._inverter.model)
         if hint:
             self._inverter.tell(Severity.WARNING, hint)
         return changes
 
     async def write_each_now(
-        self, wanted: Mapping[str, Words], wrote: Callable[[Change], None]
+        self, wanted: Mapping[str, bytes], wrote: Callable[[Change], None]
     ) -> None:
         """
         Write what differs, one after the other; what was written before a refusal stays.
@@ -366,16 +366,16 @@ class Parameters:
         :returns: what reads them again, and returns what has changed.
         :raises LinkError: they cannot be read.
         """
-        before = {key: await self._registers.read_words(key, Priority.SERVICE) for key in keys}
+        before = {key: await self._registers.read_data(key, Priority.SERVICE) for key in keys}
 
         async def changes() -> tuple[Change, ...]:
             found: list[Change] = []
             for key, old in before.items():
-                words = await self._registers.read_words(key, Priority.SERVICE)
-                if key in self._words:
-                    self._learn(key, words, quiet=True)
-                if words != old:
-                    found.append(self.describe(key, self._writer.value(key, old), words))
+                data = await self._registers.read_data(key, Priority.SERVICE)
+                if key in self._data:
+                    self._learn(key, data, quiet=True)
+                if data != old:
+                    found.append(self.describe(key, self._writer.value(key, old), data))
             self._wanted.follow({change.key: change.new for change in found})
             return tuple(found)
 
@@ -396,13 +396,13 @@ class Parameters:
             finally:
                 self._changing = ()
 
-    def _words_of(self, key: str, value: Value) -> Words:
+    def _data_of(self, key: str, value: Value) -> bytes:
         if self._values.get(key) == value:
-            return self._words[key]
-        return self._registers.words(key, value)
+            return self._data[key]
+        return self._registers.encode(key, value)
 
-    async def _require_standstill(self, words: Mapping[str, Words]) -> None:
-        new = [key for key, wanted in words.items() if self._words.get(key) != wanted]
+    async def _require_standstill(self, data: Mapping[str, bytes]) -> None:
+        new = [key for key, wanted in data.items() if self._data.get(key) != wanted]
         await self._writer.require_standstill(new)
 
     async def _refresh(self) -> str:
@@ -423,20 +423,20 @@ class Parameters:
 
         :raises LinkError: it cannot be read.
         """
-        words = await self._registers.read_words(key, priority, once=once)
-        if key not in self._changing or key not in self._words:
-            self._learn(key, words)
+        data = await self._registers.read_data(key, priority, once=once)
+        if key not in self._changing or key not in self._data:
+            self._learn(key, data)
 
-    def _learn(self, key: str, words: Words, *, quiet: bool = False) -> None:
+    def _learn(self, key: str, data: bytes, *, quiet: bool = False) -> None:
         """Take what the drive has for a parameter, and tell it if it is news."""
-        if self._words.get(key) == words:
+        if self._data.get(key) == data:
             return
         # others may be reading the old ones just now
-        self._words = {**self._words, key: words}
+        self._data = {**self._data, key: data}
         values = dict(self._values)
         before = values.pop(key, None)
         try:
-            values[key] = self._registers.value(key, words)
+            values[key] = self._registers.value(key, data)
         except ValueError as error:
             # and nobody may rely on what it was before
             self._inverter.tell(Severity.WARNING, str(error))

@@ -33,9 +33,9 @@ _MOST: Mapping[Role | None, float] = {
 }
 _CODES: Mapping[Role | None, Callable[[Family, int], bool]] = {
     Role.STATUS_CODE: lambda model, code: code in model.status_codes,
-    Role.CONTROL_SOURCE: lambda model, code: code in model.modes,
+    Role.CONTROL_SOURCE: lambda model, code: code in model.profile.holders,
     # the upper half is described nowhere [C24]
-    Role.STATUS_WORD: lambda model, word: model.status_word.may_say(word & 0xFFFF),
+    Role.STATUS_WORD: lambda model, word: model.profile.status_word.may_say(word & 0xFFFF),
 }
 
 

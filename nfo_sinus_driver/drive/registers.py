@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
@@ -32,16 +33,12 @@ from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
-from nfo_sinus_driver.link.classic_refusal import flag_names
 
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
 #: How often at most what cannot be is read, until it is believed that the drive has it.
 _READINGS = 3
-#: The flag of SioErr that says that a fault kept a message from being carried out [M2 table 4].
-_BLOCKED = 1
 #: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
 _SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 
@@ -68,7 +65,7 @@ class Registers:
         #: How many requests nobody answered.
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
-        self._odd: dict[str, Words] = {}
+        self._odd: dict[str, bytes] = {}
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = bus.space
@@ -78,18 +75,17 @@ class Registers:
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
         if key not in self._addresses:
-            place = self.model[key].at(self.protocol)
-            self._addresses[key] = Address(place.numbers, place.words)
+            self._addresses[key] = Address(*self.model[key].at(self.protocol).place)
         return self._addresses[key]
 
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
-        return self.protocol == 'modbus' and self.model.writes_and_reads
+        return self.protocol == 'modbus' and self.model.profile.writes_and_reads
 
-    def words(self, key: str, value: Value) -> Words:
+    def encode(self, key: str, value: Value) -> bytes:
         """
-        Return the words to write for a value.
+        Return the bytes to write for a value.
 
         :raises ValueError: out of range, between two steps, or an unknown label.
         """
@@ -101,24 +97,27 @@ class Registers:
             raise ValueError(f'{key}: {value:g} is out of range, at most {highest} on this bus')
         return parameter.encode(value, self.protocol)
 
-    def nearest_words(self, key: str, value: float) -> Words:
+    def target(self, step: Write) -> tuple[Address, bytes]:
         """
-        Return the words of the drive's step nearest to a set-point.
+        Return where a step of a profile is written, and what; a float as the drive's nearest step.
 
-        :raises ValueError: out of range or not finite.
+        :raises ValueError: out of range, not finite, or an unknown label.
         """
-        return self.model[key].quantise(value, self.protocol)
+        address = self.address(step.at if self.reaches(step.at) else step.key)
+        if isinstance(step.value, float):
+            return address, self.model[step.key].quantise(step.value, self.protocol)
+        return address, self.encode(step.key, step.value)
 
-    def value(self, key: str, words: Words) -> Value:
+    def value(self, key: str, data: bytes) -> Value:
         """
-        Return what the drive means by words.
+        Return what the drive means by bytes.
 
         :raises ValueError: a code that the manual does not list, where the type has no room for it.
         """
         if self.model.role_of.get(key) in _SHORT and self.protocol == 'classic':
-            low, high = words
-            words = (low, high & 0xFF)
-        return self.model[key].decode(words, self.protocol)
+            # the low word, then the high one without its high byte
+            data = data[:2] + b'\0' + data[3:]
+        return self.model[key].decode(data, self.protocol)
 
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
@@ -136,9 +135,9 @@ class Registers:
         role = self.model.role_of.get(key)
         return None if role is None else _HIGHEST.get((self.protocol, role))
 
-    def number(self, key: str, words: Words) -> float:
-        """Return the value of words as the drive understands them."""
-        value = self.value(key, words)
+    def number(self, key: str, data: bytes) -> float:
+        """Return the value of bytes as the drive understands them."""
+        value = self.value(key, data)
         assert not isinstance(value, str), key
         return float(value)
 
@@ -156,11 +155,11 @@ class Registers:
     ) -> tuple[Value, float]:
         """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
         reply = await self.read_reply(key, priority, once=once)
-        return self.value(key, reply.words), reply.arrived
+        return self.value(key, reply.data), reply.arrived
 
-    async def read_words(self, key: str, priority: Priority, *, once: bool = False) -> Words:
+    async def read_data(self, key: str, priority: Priority, *, once: bool = False) -> bytes:
         """Read a parameter as it stands in the drive."""
-        return (await self.read_reply(key, priority, once=once)).words
+        return (await self.read_reply(key, priority, once=once)).data
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
@@ -176,12 +175,13 @@ class Registers:
         """
         return await self._bus.identify(self._unit, priority)
 
-    async def acknowledge(self, key: str, priority: Priority) -> Words:
+    async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        return (await self._ask(self.address(key), priority, None, once=True)).words
+        reply = await self._ask(self.address(key), priority, None, once=True)
+        return self.value(key, reply.data)
 
-    async def acknowledge_and_write(self, key: str, target: str, value: Value) -> None:
+    async def acknowledge_and_write(self, key: str, step: Write) -> None:
         """
         Read a parameter whose reading acknowledges, and write another as the very next frame.
 
@@ -191,65 +191,46 @@ class Registers:
         await self._bus.read_then_write(
             self._unit,
             self.address(key),
-            self.address(target),
-            self.words(target, value),
+            *self.target(step),
             Priority.STOP,
         )
 
-    async def acknowledge_serial_fault(self) -> str:
-        """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
-        key = self.model.key(Role.LINE_FAULTS)
-        if not self.reaches(key):
-            return ''
-        (flags,) = await self.acknowledge(key, Priority.SERVICE)
-        # that it refused a stop since then is no reason of it
-        return ', '.join(flag_names(flags & ~_BLOCKED))
-
     async def write(
         self,
-        key: str,
-        value: Value,
+        step: Write,
         priority: Priority,
-        *,
-        once: bool = False,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         """
-        Write a parameter.
+        Write a parameter as a profile says.
 
-        :param once: do not repeat the request when nobody answers.
         :param require_wanted: called when its turn has come; if it raises, nothing is written.
         :raises LinkError: as the link does.
         """
-        words = self.words(key, value)
-        await self._ask(self.address(key), priority, words, once, require_wanted)
+        address, data = self.target(step)
+        priority = Priority.STOP if step.head else priority
+        await self._ask(address, priority, data, step.once, require_wanted)
 
-    async def write_words(
-        self, key: str, words: Words, priority: Priority, *, once: bool = False
+    async def write_data(
+        self, key: str, data: bytes, priority: Priority, *, once: bool = False
     ) -> None:
         """Write a parameter as it shall stand in the drive, whatever its range."""
-        await self._ask(self.address(key), priority, words, once)
+        await self._ask(self.address(key), priority, data, once)
 
     async def read_from(
         self, address: Address, priority: Priority, *, once: bool = False
-    ) -> Words:
-        """Read words from an address."""
-        return (await self._ask(address, priority, None, once)).words
-
-    async def write_at(
-        self, address: Address, words: Words, priority: Priority, *, once: bool = False
-    ) -> None:
-        """Write words to an address."""
-        await self._ask(address, priority, words, once)
+    ) -> bytes:
+        """Read what stands at an address."""
+        return (await self._ask(address, priority, None, once)).data
 
     def is_odd(self, key: str) -> bool:
         """Tell whether what was read last of a parameter cannot be, and was read more than once."""
         return key in self._odd
 
-    def can_be(self, key: str, words: Words) -> bool:
-        """Tell whether words mean a value that the manual knows of this parameter."""
+    def can_be(self, key: str, data: bytes) -> bool:
+        """Tell whether bytes mean a value that the manual knows of this parameter."""
         try:
-            return can_be(self.model, key, self.value(key, words))
+            return can_be(self.model, key, self.value(key, data))
         except ValueError:
             return False
 
@@ -259,11 +240,11 @@ class Registers:
         reply = await self._ask(address, priority, None, once)
         before = self._odd.pop(key, None)
         readings = 1
-        while not self.can_be(key, reply.words):
-            if reply.words == before or readings == _READINGS:
-                self._odd[key] = reply.words
+        while not self.can_be(key, reply.data):
+            if reply.data == before or readings == _READINGS:
+                self._odd[key] = reply.data
                 break
-            before = reply.words
+            before = reply.data
             reply = await self._ask(address, priority, None, once)
             readings += 1
         return reply
@@ -272,7 +253,7 @@ class Registers:
         self,
         address: Address,
         priority: Priority,
-        words: Words | None,
+        data: bytes | None,
         once: bool,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
@@ -281,9 +262,9 @@ class Registers:
         busy = 0 if once and priority is Priority.STOP else _BUSY_TRIES
         while True:
             try:
-                if words is None:
+                if data is None:
                     return await self._bus.read(self._unit, address, priority)
-                return await self._bus.write(self._unit, address, words, priority, require_wanted)
+                return await self._bus.write(self._unit, address, data, priority, require_wanted)
             except (NoAnswer, DamagedAnswer) as error:
                 self.unanswered += isinstance(error, NoAnswer)
                 tries -= 1

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import replace
 import enum
 import math
 import time
@@ -27,9 +29,8 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
-from nfo_sinus_driver.drive.inverter import STATUS_WORD
+from nfo_sinus_driver.catalog import SetpointTarget
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.reference import Reference
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Severity
@@ -38,7 +39,6 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 #: An unchanged set-point is written again when the last write is this old, s: somebody else may
 #: have changed it meanwhile.
@@ -111,10 +111,12 @@ class Setpoint:
         #: The newest one to all drives of the line.
         self._shared = _NONE
         self.control_mode = ''
-        self._reference: Reference | None = None
+        self._target: SetpointTarget | None = None
+        #: The parameters that a set-point is written to, by where that is.
+        self._keys: dict[Address, str] = {}
         self._armed_at = math.inf
-        self._written: tuple[int, ...] = ()
-        self._written_at = 0.0
+        #: What stands in the drive and since when, by where; nothing where that is not known.
+        self._written: dict[Address, tuple[bytes, float]] = {}
         self._watch: Task | None = None
         #: What reads back whether the drive took what was told to all, and when it last did.
         self._reading_back: Task | None = None
@@ -170,18 +172,22 @@ class Setpoint:
         """
         self.control_mode = control_mode
         follows = self._inverter.settings.follows_setpoints
-        self._reference = Reference(self._registers, control_mode) if follows else None
+        self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
         self._armed_at = time.monotonic()
-        self._written = () if self._reference is None else self._reference.words(0.0)
-        self._written_at = self._armed_at
-        self.commanded = NAN if self._reference is None else 0.0
+        self._keys, self._written = {}, {}
+        if self._target is not None:
+            for step in self._target.writes(0.0):
+                address, data = self._registers.target(step)
+                self._keys[address] = step.key
+                self._written[address] = data, self._armed_at
+        self.commanded = 0.0 if follows else NAN
         self.clamped = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
         self._told_missed = False
         self._busy_since = math.inf
-        if self._reference is not None:
+        if follows:
             self._watch = self._bus.spawn(self._watch_age())
 
     def disarm(self) -> None:
@@ -221,7 +227,9 @@ class Setpoint:
             return 'is only monitored'
         if not settings.follows_setpoints:
             return f'follows a reference of its own ({settings.reference})'
-        return '' if self.armed else 'is not enabled'
+        if not self.armed:
+            return 'is not enabled'
+        return '' if len(self._keys) == 1 else 'takes a set-point in several writes'
 
     @property
     def quantity(self) -> tuple[str, str]:
@@ -231,8 +239,8 @@ class Setpoint:
     @property
     def most(self) -> float:
         """The greatest set-point that it may be given, in either direction."""
-        assert self._reference is not None
-        return min(self._reference.most, self._inverter.settings.setpoint_max or math.inf)
+        assert self._target is not None
+        return min(self._target.most, self._inverter.settings.setpoint_max or math.inf)
 
     def counts(self, request: Request) -> bool:
         """Tell whether a request to all came after the drive was enabled, and is still fresh."""
@@ -252,52 +260,54 @@ class Setpoint:
         self._shared = request
         self._bus.request(self._slot)
 
-    def words(self, request: Request) -> tuple[Address, Words]:
-        """Return what is to be written for a request, and where."""
-        assert self._reference is not None
-        return self._reference.address, self._reference.words(self._limited(request))
+    def due(self, request: Request) -> list[tuple[Address, bytes]]:
+        """Return what has to be written for a request: else other stands in the drive, or long."""
+        assert self._target is not None
+        now, period = time.monotonic(), self._rewrite_period
+        found: list[tuple[Address, bytes]] = []
+        for step in self._target.writes(self._limited(request)):
+            address, data = self._registers.target(step)
+            before, since = self._written.get(address, (b'', -math.inf))
+            if data != before or now - since >= period:
+                found.append((address, data))
+        return found
 
-    def needs(self, words: Words) -> bool:
-        """Tell whether this has to be written, for something else stands in the drive, or long."""
-        fresh = time.monotonic() - self._written_at < self._rewrite_period
-        return words != self._written or not fresh
-
-    def was_told(self, words: Words) -> None:
+    def was_told(self, address: Address, data: bytes) -> None:
         """Take note of what was written to all drives; it is read back whether this one took it."""
         if not self._inverter.answering:
             # it gets its own when it answers
-            self._written = ()
+            self._written = {}
             self._waits_for_answer = True
             return
-        changed = words != self._written
-        self._take_note(words)
+        changed = address not in self._written or data != self._written[address][0]
+        self._take_note(address, data)
         if changed and self._reading_back is None:
             self._reading_back = self._bus.spawn(self._read_back())
 
     async def _read_back(self) -> None:
         """Find out whether the drive took what was told to all; if not, give it its own."""
-        reference = self._reference
-        assert reference is not None
+        ((address, key),) = self._keys.items()
         await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - time.monotonic())
         self._read_back_at = time.monotonic()
         try:
-            kept = await reference.read(Priority.POLL)
+            kept = await self._registers.read_data(key, Priority.POLL, once=True)
         except LinkError as error:
             self.was_missed(error)
             return
         finally:
             self._reading_back = None
         # nothing was written between the reading and this; what nobody knows is written anyway
-        if not self._written or kept == self._written:
+        if not self._written or kept == self._written[address][0]:
             return
         if not self._told_missed:
             self._told_missed = True
             self._tell(
                 Severity.WARNING,
-                f'it did not take the set-point for all drives: it keeps {self._value(kept):g}; '
+                'it did not take the set-point for all drives: it keeps '
+                f'{self._meant({address: kept}):g}; '
                 'it is given its own',
             )
-        self._written = ()
+        self._written = {}
         self._bus.request(self._slot)
 
     # --- to this drive ------------------------------------------------------------------------
@@ -318,8 +328,7 @@ class Setpoint:
         return request.value, limited
 
     def _make(self) -> Transfer | None:
-        reference = self._reference
-        if reference is None or not self.counts(self._request):
+        if self._target is None or not self.counts(self._request):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
@@ -332,39 +341,42 @@ class Setpoint:
                 '(setpoint_max, or the limit of the drive)',
             )
         self._clamp_told = self.clamped
-        words = reference.words(limited)
-        if not self.needs(words):
+        due = self.due(self._request)
+        if not due:
             return None
-        if self._combining is _Combining.GIVEN_UP:
-            return self._bus.write(self._unit, reference.address, words, Priority.SETPOINT)
-        status = self._registers.address(STATUS_WORD)
-        return self._bus.write_and_read(
-            self._unit, reference.address, words, status, Priority.SETPOINT
-        )
+        # of several writes each has a turn of its own, and a newer set-point comes between
+        address, data = due[0]
+        if self._combining is _Combining.GIVEN_UP or len(due) > 1:
+            return self._bus.write(self._unit, address, data, Priority.SETPOINT)
+        status = self._registers.address(self._inverter.word_key)
+        return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
             return
         if error is None:
-            assert transfer.words is not None
+            assert transfer.data is not None
             if transfer.source is not None:
                 self._combining = _Combining.TAKEN
-            self._take_note(transfer.words)
+            self._take_note(transfer.address, transfer.data)
+            if len(self._keys) > 1:
+                self._bus.request(self._slot)
         elif transfer.source is not None and self._gives_up_combining(error):
             # what is wrong with the set-point itself, if anything is, the drive says now
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
-            assert transfer.words is not None
-            self._refused(f'it refused set-point {self._value(transfer.words):g}: {error}')
+            assert transfer.data is not None
+            asked = self._meant({**self._standing, transfer.address: transfer.data})
+            self._refused(f'it refused set-point {asked:g}: {error}')
         else:
             self.was_missed(error)
 
-    def _take_note(self, words: Words) -> None:
-        """Take note that these words stand in the drive now."""
+    def _take_note(self, address: Address, data: bytes) -> None:
+        """Take note that these bytes stand in the drive now."""
         self._busy_since = math.inf
-        self._written = words
-        self._written_at = time.monotonic()
-        self.commanded = self._value(words)
+        self._written[address] = data, time.monotonic()
+        if len(self._written) == len(self._keys):
+            self.commanded = self._meant(self._standing)
 
     def was_missed(self, error: LinkError) -> None:
         """Take note that nobody knows what stands in the drive; it is written when it answers."""
@@ -372,7 +384,7 @@ class Setpoint:
         # take from its neighbours
         self._registers.unanswered += isinstance(error, NoAnswer)
         self._waits_for_answer = True
-        self._written = ()
+        self._written = {}
         self._inverter.missed()
 
     def _gives_up_combining(self, error: LinkError) -> bool:
@@ -401,10 +413,19 @@ class Setpoint:
         self._busy_since = min(self._busy_since, now)
         return now < self._busy_since + _LONGEST_BUSY
 
-    def _value(self, words: Words) -> float:
-        """Return the set-point that words mean to the drive, after its own rounding."""
-        assert self._reference is not None
-        return self._reference.value(words)
+    @property
+    def _standing(self) -> dict[Address, bytes]:
+        """What stands in the drive, as far as that is known."""
+        return {address: data for address, (data, _) in self._written.items()}
+
+    def _meant(self, standing: Mapping[Address, bytes]) -> float:
+        """Return the set-point that bytes mean to the drive, after its own rounding."""
+        assert self._target is not None
+        if len(standing) < len(self._keys):
+            return NAN
+        keys = self._keys.items()
+        value = self._registers.value
+        return self._target.value([value(key, standing[address]) for address, key in keys])
 
     async def _watch_age(self) -> None:
         try:
@@ -424,7 +445,9 @@ class Setpoint:
                 await self._expire(timeout)
 
     async def _expire(self, timeout: float) -> None:
-        if any(self._written) or not self._written:
+        assert self._target is not None
+        zero = self._target.writes(0.0)
+        if self._standing != dict(map(self._registers.target, zero)):
             if not self._warned:
                 self._warned = True
                 self._tell(
@@ -432,22 +455,25 @@ class Setpoint:
                     f'no set-point for {timeout:g} s: the motor ramps to a stop '
                     'until the next one arrives; check what publishes them',
                 )
-            assert self._reference is not None
             before = self._request
-            try:
-                await self._reference.write_zero(Priority.STOP)
-            except LinkError as error:
-                if isinstance(error, Refused) and not self._may_be_busy(error):
-                    self._refused(f'it refused set-point 0: {error}')
+            for step in zero:
+                if self._request is not before:
+                    # that one is written instead
                     return
-                # the poll finds out whether the drive is lost; until then this is tried again
-                await self._bus.sleep(_WATCH_PERIOD)
-                return
+                try:
+                    await self._registers.write(replace(step, once=True), Priority.STOP)
+                except LinkError as error:
+                    if isinstance(error, Refused) and not self._may_be_busy(error):
+                        self._refused(f'it refused set-point 0: {error}')
+                        return
+                    # the poll finds out whether the drive is lost; until then this is tried again
+                    await self._bus.sleep(_WATCH_PERIOD)
+                    return
+                address, data = self._registers.target(step)
+                self._written[address] = data, time.monotonic()
+                self._busy_since = math.inf
             if self._request is before:
                 self.commanded = 0.0
-            self._busy_since = math.inf
-            self._written = self._reference.words(0.0)
-            self._written_at = time.monotonic()
         self._expired = True
 
     def _tell(self, severity: Severity, text: str) -> None:

@@ -105,16 +105,14 @@ class SetpointAll:
             return None
         for setpoint in members:
             setpoint.take(request)
-        address, words = members[0].words(request)
-        if not any(setpoint.needs(words) for setpoint in members):
-            return None
-        return self._bus.write(EVERYBODY, address, words, Priority.SETPOINT)
+        due = [write for setpoint in members for write in setpoint.due(request)]
+        return self._bus.write(EVERYBODY, *due[0], Priority.SETPOINT) if due else None
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         for setpoint in self._setpoints().values():
             if error is None:
-                assert transfer.words is not None
-                setpoint.was_told(transfer.words)
+                assert transfer.data is not None
+                setpoint.was_told(transfer.address, transfer.data)
             else:
                 setpoint.was_missed(error)
 

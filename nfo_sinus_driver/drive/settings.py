@@ -16,27 +16,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from nfo_sinus_driver.catalog import Profile
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_profile
+from nfo_sinus_driver.catalog import usual_family
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
 CLASSIC_DIALECTS = ('', 'v2.03', 'v5.0')
-CONTROL_METHODS = ('mode_scmd', 'drive_control', 'monitor')
-#: The fixed references of the drive, forward and reverse.
-_FIXED = tuple(f'fix{number}{way}' for number in range(1, 8) for way in ('', '_reverse'))
+MONITOR = 'monitor'
+
+
+def _profiles(model: str) -> Sequence[Profile]:
+    """Return the profile of a model; of all while it is not known."""
+    return [load_profile(name) for name in (families() if model == AUTO else (model,))]
+
+
+def _control_methods(model: str) -> tuple[str, ...]:
+    found = dict.fromkeys(name for profile in _profiles(model) for name in profile.methods)
+    return (*found, MONITOR)
+
+
+def _references(model: str, control_method: str) -> tuple[str, ...]:
+    """Return the references of a control method; any will do of a model not known, or only read."""
+    any_will_do = model == AUTO or control_method == MONITOR
+    methods = [
+        method
+        for profile in _profiles(AUTO if any_will_do else model)
+        for name, method in profile.methods.items()
+        if any_will_do or name == control_method
+    ]
+    return tuple(dict.fromkeys(one for method in methods for one in method.references))
+
+
+def _control_modes(model: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(mode for profile in _profiles(model) for mode in profile.setpoints))
+
+
+#: Those of all models together.
+CONTROL_METHODS = _control_methods(AUTO)
 #: Where a running drive takes its reference from.
-REFERENCES = ('fieldbus', 'terminal', 'op_mode', 'analog', 'analog_reverse', *_FIXED)
-#: Those that a model has under a control method; the others have them all.
-_REFERENCES = {
-    ('sinus_g2', 'drive_control'): ('fieldbus', 'terminal'),
-    ('sinus_optimal', 'mode_scmd'): ('fieldbus', 'terminal'),
-    ('sinus_optimal', 'drive_control'): ('terminal',),
-}
+REFERENCES = _references(AUTO, MONITOR)
 #: The control modes by the names that ``expected_control_mode`` takes.
-CONTROL_MODES = ('Freque', 'PI-Reg', 'Torque', 'Speed')
+CONTROL_MODES = _control_modes(AUTO)
 
 #: Why nothing is written in ``monitor``.
 MONITOR_REFUSAL = (
@@ -90,7 +116,7 @@ class DriveSettings:
     """
 
     address: int = 1
-    model: str = 'sinus_g2'
+    model: str = usual_family()
     control_method: str = 'mode_scmd'
     reference: str = 'fieldbus'
     poll_rate: float = 0.0
@@ -113,18 +139,17 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         _one_of('model', self.model, (*families(), AUTO))
-        _one_of('control_method', self.control_method, CONTROL_METHODS)
+        _one_of('control_method', self.control_method, _control_methods(self.model))
         _one_of('reference', self.reference, REFERENCES)
         kind = f'{self.control_method} on {self.model}'
-        allowed = _REFERENCES.get((self.model, self.control_method), REFERENCES)
+        allowed = _references(self.model, self.control_method)
         if self.reference not in allowed:
             raise ValueError(
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
             )
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
-        if (self.classic_dialect, self.control_method) == ('v5.0', 'drive_control'):
-            raise ValueError('classic_dialect v5.0 has no control word: use mode_scmd')
-        modes = ('Freque', 'Speed') if self.model == 'sinus_optimal' else CONTROL_MODES
+        self._require_known_method()
+        modes = _control_modes(self.model)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         if not any(self.address in allowed for allowed in ADDRESSES.values()):
             raise ValueError(f'address {self.address}: allowed are 0 to 247')
@@ -150,6 +175,21 @@ class DriveSettings:
                 f'drive_timeout {self.drive_timeout:g} s lies between two steps of the drive, '
                 f'{math.floor(tenths) / 10:g} and {math.ceil(tenths) / 10:g}'
             )
+
+    def _require_known_method(self) -> None:
+        """
+        See to it that firmware of the chosen dialect has the control method.
+
+        :raises ValueError: it does not, and which it has.
+        """
+        for profile in _profiles(self.model):
+            method = profile.methods.get(self.control_method)
+            dialect = profile.older.name if profile.older is not None else ''
+            if dialect and dialect == self.classic_dialect and method and not method.older:
+                others = ' or '.join(name for name, one in profile.methods.items() if one.older)
+                raise ValueError(
+                    f'classic_dialect {dialect} has no {method.means}: use {others}'
+                )
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -102,7 +102,7 @@ class InverterStatus:
     def facts(self) -> Fact:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
-            return self.model.status_word.facts(self.word, self.listed.kind)
+            return self.model.profile.status_word.facts(self.word, self.listed.kind)
         facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
         if self._from_bus_by_code:
             facts |= Fact.NETWORK_CONTROL
@@ -114,7 +114,7 @@ class InverterStatus:
     def valid(self) -> Fact:
         """What the drive can say of itself at all."""
         if self.word is not None:
-            return self.model.status_word.valid
+            return self.model.profile.status_word.valid
         return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
 
     @functools.cached_property
@@ -122,12 +122,14 @@ class InverterStatus:
         """How grave the code is; the bits have the last word ([C50], [C95])."""
         if self.word is None:
             return self.listed.kind
-        return self.model.status_word.kind(self.word, self.listed.kind)
+        return self.model.profile.status_word.kind(self.word, self.listed.kind)
 
     @functools.cached_property
     def state(self) -> State:
         """The state of the generic state machine."""
-        return State.UNKNOWN if self.word is None else self.model.status_word.state(self.word)
+        if self.word is None:
+            return State.UNKNOWN
+        return self.model.profile.status_word.state(self.word)
 
     @property
     def faulted(self) -> bool:

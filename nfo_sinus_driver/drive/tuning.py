@@ -19,23 +19,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import enum
 import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.drive import withdrawal
-from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.loan import Loan
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Severity
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
@@ -44,28 +44,17 @@ _TELL_PERIOD = 0.5
 #: Longer than any tuning takes; a drive that is still at it then is stopped, s.
 _LONGEST = 900.0
 #: What the motor plate says; a drive cannot tune without.
-_PLATE = ('p_nom', 'u_nom', 'f_nom', 'n_nom', 'i_nom', 'cos_phi')
-
+_PLATE = (
+    Role.NOMINAL_POWER,
+    Role.NOMINAL_VOLTAGE,
+    Role.NOMINAL_FREQUENCY,
+    Role.NOMINAL_SPEED,
+    Role.NOMINAL_CURRENT,
+    Role.NOMINAL_POWER_FACTOR,
+)
 
 #: Told of the status and of how long the procedure takes already, s; on the bus.
 Progress = Callable[[InverterStatus, float], None]
-
-
-class Procedure(enum.Enum):
-    """What can be tuned; the order is that of the action Tune."""
-
-    FULL = 'full tuning'
-    BASIC = 'basic tuning'
-    STATOR_RESISTANCE = 'stator resistance measurement'
-    CALCULATE = 'parameter calculation'
-
-
-_COMMANDS = {
-    Procedure.FULL: Scmd.FULL_TUNING,
-    Procedure.BASIC: Scmd.BASIC_TUNING,
-    Procedure.STATOR_RESISTANCE: Scmd.RS_MEASURE,
-    Procedure.CALCULATE: Scmd.PAR_CALC,
-}
 
 
 @dataclass(frozen=True)
@@ -98,13 +87,13 @@ class Tuning:
         inverter: Inverter,
         registers: Registers,
         parameters: Parameters,
-        errands: Errands,
+        procedures: Procedures,
     ) -> None:
         self._bus = bus
         self._inverter = inverter
         self._registers = registers
         self._parameters = parameters
-        self._errands = errands
+        self._procedures = procedures
 
     async def tune_now(self, procedure: Procedure, progress: Progress) -> Tuned:
         """
@@ -117,26 +106,29 @@ class Tuning:
         """
         what = procedure.value
         # from here on a stop is one of the tuning, too
-        with self._errands.lent(what) as loan:
+        with self._procedures.begun(procedure) as access:
             await self._require_motor_plate(what)
-            keys = [key for key in self._parameters.available() if key.startswith('motor.')]
+            motor = self._inverter.model.group_of(Role.NOMINAL_POWER)
+            keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
-                async with self._errands.sent(loan):
+                async with self._procedures.in_standby(access):
                     self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
-                    await self._errands.tell(loan, _COMMANDS[procedure])
-                    success, text = await self._outcome(what, loan, progress)
+                    await self._procedures.command(access, procedure)
+                    success, text = await self._outcome(what, access, progress)
                 result = Tuned(success, text, await changes())
         grave = Severity.INFO if success else Severity.ERROR
         self._inverter.tell(grave, str(result))
         return result
 
     async def _require_motor_plate(self, what: str) -> None:
-        for name in _PLATE:
-            key = f'motor.{name}'
+        for role in _PLATE:
+            key = self._inverter.model.key(role)
             if not await self._registers.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(f'{what} needs {key}: set it as the motor plate says')
 
-    async def _outcome(self, what: str, loan: Loan, progress: Progress) -> tuple[bool, str]:
+    async def _outcome(
+        self, what: str, access: ExclusiveAccess, progress: Progress
+    ) -> tuple[bool, str]:
         """Wait until the drive says how it ended."""
         inverter = self._inverter
         started = time.monotonic()
@@ -157,14 +149,14 @@ class Tuning:
                 return True, f'{what} finished ({told})'
             if seen.means(Meaning.TUNING):
                 begun = True
-            elif loan.recalled:
+            elif access.aborted:
                 return False, f'{what} was stopped before it was finished ({told})'
             elif begun:
                 return False, (
                     f'{what} ended, and the drive does not say that it has finished ({told}): '
                     'was the RUN input lost, or STOP pressed?'
                 )
-            elif elapsed > withdrawal.PATIENCE:
+            elif elapsed > confirmation.TIMEOUT:
                 return False, (
                     f'{what} does not begin ({told}): is its RUN input (DIN1) active?'
                 )

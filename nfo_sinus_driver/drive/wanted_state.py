@@ -41,11 +41,11 @@ class WantedState:
     @property
     def drift(self) -> tuple[Change, ...]:
         """What the drive has otherwise than it was wanted, as wanted -> what it has."""
-        words, values = self._parameters.words, self._parameters.values
+        data, values = self._parameters.data, self._parameters.values
         return tuple(
-            self._parameters.describe(key, wanted, words[key])
+            self._parameters.describe(key, wanted, data[key])
             for key, wanted in self._values.items()
-            if key in words and values.get(key) != wanted
+            if key in data and values.get(key) != wanted
         )
 
     def follow(self, changed: Mapping[str, Value]) -> None:
@@ -70,7 +70,7 @@ class WantedState:
         :raises ParameterError: the drive cannot have a value, whatever its state.
         """
         inverter = self._inverter
-        here = {key: value for key, value in wanted.items() if key in self._parameters.words}
+        here = {key: value for key, value in wanted.items() if key in self._parameters.data}
         self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
         missing = [key for key in wanted if key not in here]
         if missing:

@@ -31,10 +31,9 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
+from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.errors import DriveError
-from nfo_sinus_driver.drive.inverter import STATUS_WORD
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.motion import Motion
 from nfo_sinus_driver.drive.notices import Notices
 from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.registers import Registers
@@ -93,7 +92,7 @@ class Watch:
     """
     Watches one drive, for ever once it was begun; used on the bus alone.
 
-    :param motion: how it is commanded; ``None`` if this driver only reads.
+    :param controller: how it is commanded; ``None`` if this driver only reads.
     :param connect: connects to the drive again after it was lost.
     """
 
@@ -103,7 +102,7 @@ class Watch:
         inverter: Inverter,
         registers: Registers,
         setpoint: Setpoint,
-        motion: Motion | None,
+        controller: Controller | None,
         listener: Listener,
         connect: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
@@ -111,7 +110,7 @@ class Watch:
         self._inverter = inverter
         self._registers = registers
         self._setpoint = setpoint
-        self._motion = motion
+        self._controller = controller
         self._listener = listener
         self._connect = connect
         self._task: Task | None = None
@@ -160,15 +159,15 @@ class Watch:
         It is the answer to a look that waits for it; else it begins one at once, if it is news.
         """
         inverter, registers = self._inverter, self._registers
-        if self._task is None or not inverter.connected or not reply.words:
+        if self._task is None or not inverter.connected or not reply.data:
             return
-        place = registers.address(STATUS_WORD)
+        place = registers.address(inverter.word_key)
         if self._bus.answer(self._task, inverter.settings.address, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
-        if not registers.can_be(STATUS_WORD, reply.words):
+        if not registers.can_be(inverter.word_key, reply.data):
             return
-        if inverter.seen and inverter.status_word(reply.words) != inverter.seen.word:
+        if inverter.seen and inverter.status_word(reply.data) != inverter.seen.word:
             self._told = reply
             self.wake()
 
@@ -233,7 +232,8 @@ class Watch:
         pause = polled_at + self._period - time.monotonic()
         # however seldom somebody wants to read the status, a motor that runs is watched, and so is
         # one whose run command may still stand, for a fault that ends would let it go on
-        watched = self._setpoint.armed or (self._motion is not None and self._motion.stopping)
+        controller = self._controller
+        watched = controller is not None and (controller.stopping or self._setpoint.armed)
         return min(pause, _WATCH_PERIOD) if watched else pause
 
     @property
@@ -253,8 +253,8 @@ class Watch:
     @property
     def _is_idle(self) -> bool:
         """The motor stands, and nobody has begun anything that may change that."""
-        motion, seen = self._motion, self._inverter.seen
-        commanded = motion is not None and (motion.ours or motion.stopping)
+        controller, seen = self._controller, self._inverter.seen
+        commanded = controller is not None and (controller.commanded or controller.stopping)
         if commanded or seen is None or seen.driven:
             return False
         # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
@@ -287,8 +287,8 @@ class Watch:
     @property
     def _code_holds(self) -> float:
         """How long an inverter status counts while the status word stays the same, s."""
-        motion = self._motion
-        if motion is not None and (motion.stopping or (motion.ours and not motion.armed)):
+        controller = self._controller
+        if controller is not None and controller.changing:
             return 0.0
         if self._registers.unanswered > self._unanswered:
             # it may have been switched off and on
@@ -298,7 +298,7 @@ class Watch:
     async def _look(self) -> InverterStatus:
         """Read the status and judge it."""
         inverter = self._inverter
-        alarming = self._motion.alarmed_by if self._motion is not None else lambda _: False
+        alarming = self._controller.alarmed_by if self._controller is not None else lambda _: False
 
         async def look() -> InverterStatus:
             told, self._told = self._told, None
@@ -318,7 +318,7 @@ class Watch:
         # one that is busy, or whose answer was damaged, was there
         inverter.was_silent = self._registers.unanswered > self._unanswered
         self._unanswered = self._registers.unanswered
-        told = self._motion is not None and self._motion.watch(seen)
+        told = self._controller is not None and self._controller.judge(seen)
         self._tell_fault(seen, told)
         self._notices.take(seen)
         return seen
@@ -332,9 +332,9 @@ class Watch:
             mode = await self._insist(
                 lambda: inverter.read_control_mode(Priority.POLL, once=True)
             )
-            if mode != before and self._motion:
+            if mode != before and self._controller:
                 # before it is told: a set-point never has the unit of another mode
-                self._motion.watch(seen)
+                self._controller.judge(seen)
         actual = _ACTUAL.get(inverter.control_mode)
         steady = True
         if actual is not None:
@@ -423,7 +423,7 @@ class Watch:
         explained = self._explain(error)
         self._bus.recorder.forget_cycle(inverter.settings.address)
         goes_on = 'tried again for ever'
-        if self._motion is not None and self._motion.lost():
+        if self._controller is not None and self._controller.lost():
             goes_on += ', and stopped as soon as it answers; then call ~/enable to go on'
         inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
         try:

@@ -22,10 +22,10 @@ from collections.abc import Callable
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.drive.errand import Errands
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.loan import Loan
+from nfo_sinus_driver.drive.procedure import Procedures
 
 #: Awaited before each write of a setting; raises DriveError if the drive would not take it.
 Allow = Callable[[], Awaitable[None]]
@@ -42,9 +42,9 @@ class WriteAccess:
     else takes settings at any time.
     """
 
-    def __init__(self, inverter: Inverter, errands: Errands) -> None:
+    def __init__(self, inverter: Inverter, procedures: Procedures) -> None:
         self._inverter = inverter
-        self._errands = errands
+        self._procedures = procedures
 
     @contextlib.asynccontextmanager
     async def granted(self) -> AsyncIterator[Allow]:
@@ -54,20 +54,20 @@ class WriteAccess:
         :raises DriveError: the drive does not confirm that it is given back.
         """
         async with contextlib.AsyncExitStack() as stack:
-            loan = Loan(_WHAT)
+            access = ExclusiveAccess(_WHAT)
 
             async def allow() -> None:
-                nonlocal loan
+                nonlocal access
                 if not self._inverter.settings_need_control:
                     return
-                if await self._errands.in_control(Priority.SERVICE):
+                if await self._procedures.in_control(Priority.SERVICE):
                     return
                 # what was had was lost: to somebody who stopped it, or by a serial fault that a
                 # refused write has caused
-                if loan.recalled:
+                if access.aborted:
                     raise DriveError(f'{_WHAT} was stopped')
                 await stack.aclose()
-                loan = stack.enter_context(self._errands.had(_WHAT))
-                await stack.enter_async_context(self._errands.sent(loan))
+                access = stack.enter_context(self._procedures.exclusive(_WHAT))
+                await stack.enter_async_context(self._procedures.in_standby(access))
 
             yield allow

@@ -14,6 +14,7 @@
 
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
+from nfo_sinus_driver.link.consistent_read import consistent_read
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import GatewaySilent
 from nfo_sinus_driver.link.errors import LinkError
@@ -27,12 +28,10 @@ from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.keeper import Keeper
 from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.open import open_link
 from nfo_sinus_driver.link.settings import LineSettings
-from nfo_sinus_driver.link.steps import in_steps
 
 __all__ = [
     'Address',
@@ -50,8 +49,7 @@ __all__ = [
     'PortError',
     'Refused',
     'Reply',
-    'Words',
-    'in_steps',
+    'consistent_read',
     'line_settings',
     'open_link',
 ]

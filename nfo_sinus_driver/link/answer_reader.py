@@ -72,7 +72,7 @@ class AnswerReader(ABC, Generic[_T]):
         """
         Take bytes that came in.
 
-        :returns: the words read, ``()`` for a write done, or what else the request's ``decode``
+        :returns: the bytes read, ``b''`` for a write done, or what else the request's ``decode``
             makes of its answer; ``None`` while there is no answer yet.
         :raises Refused: the unit answered with an exception; feeding may go on after it.
         """

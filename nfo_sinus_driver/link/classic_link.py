@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import contextlib
+import struct
 import time
 from typing import NamedTuple
 
@@ -36,6 +37,7 @@ from nfo_sinus_driver.link.classic_refusal import INV_ST
 from nfo_sinus_driver.link.classic_refusal import MODE
 from nfo_sinus_driver.link.classic_refusal import SIO_ERR
 from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
+from nfo_sinus_driver.link.consistent_read import consistent_read
 from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
@@ -45,11 +47,11 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.serial_link import Port
 from nfo_sinus_driver.link.settings import LineSettings
-from nfo_sinus_driver.link.steps import in_steps
 
+#: Bytes in a message.
+_WORD = 2
 #: SiProt of both firmwares [M0 §6.1.2], [M2 §4], [C5].
 CHAR_FORMATS = ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1')
 
@@ -150,16 +152,20 @@ class ClassicLink:
         serial control [M2 table 4].
         """
 
+    def parts(self, address: Address) -> tuple[Address, ...]:
+        """Return the words: a message carries one."""
+        return tuple(Address(address.space, id_, None, _WORD) for id_ in _ids(address))
+
     def read(self, unit: int, address: Address) -> Reply:
         """
         Read one parameter; one of two words in three transactions or more, until it stands still.
 
         :raises LinkError: as its subclasses say.
         """
-        if len(address.numbers) == 1:
-            word, arrived = self._enquire(unit, address.numbers[0])
-            return Reply((word,), arrived)
-        steps = in_steps(unit, address)
+        if address.sub_index is None:
+            word, arrived = self._enquire(unit, address.index)
+            return Reply(word.to_bytes(_WORD, 'big'), arrived)
+        steps = consistent_read(unit, self.parts(address))
         part = next(steps)
         while True:
             try:
@@ -168,7 +174,7 @@ class ClassicLink:
                 whole: Reply = end.value
                 return whole
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """
         Write one parameter; unit 95 means all of them, and nobody confirms it.
 
@@ -178,41 +184,43 @@ class ClassicLink:
         :raises LinkError: as its subclasses say.
         """
         arrived = 0.0
-        for position, (number, word) in enumerate(zip(address.numbers, words, strict=True)):
+        ids = _ids(address)
+        words = struct.unpack(f'>{len(ids)}H', data)
+        for position, (id_, word) in enumerate(zip(ids, words, strict=True)):
             try:
-                arrived = self._select(Select(unit, number, word))
+                arrived = self._select(Select(unit, id_, word))
             except LinkError as error:
                 error.maybe_done = error.maybe_done or position > 0
                 raise
-        return Reply((), arrived)
+        return Reply(b'', arrived)
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
         """
         Write one parameter, then read another; in as many transactions as that takes.
 
         :raises LinkError: as its subclasses say.
         """
-        self.write(unit, address, words)
+        self.write(unit, address, data)
         return self.read(unit, source)
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
-        request = Enquiry(unit, source.numbers[0])
+        request = Enquiry(unit, source.index)
         self._listen(request)
         try:
             with contextlib.suppress(NoAnswer, DamagedAnswer):
                 _, _, early = self._transact(request)
                 if early:
                     self._distrust(request)
-            return self.write(unit, address, words)
+            return self.write(unit, address, data)
         except LinkError as error:
             error.maybe_done = True
             raise
@@ -403,6 +411,11 @@ class ClassicLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
+
+
+def _ids(address: Address) -> tuple[int, ...]:
+    """Return the id of each word, the low one first."""
+    return (address.index,) if address.sub_index is None else (address.index, address.sub_index)
 
 
 class NothingToAsk:

@@ -21,31 +21,33 @@ from dataclasses import dataclass
 from typing import NamedTuple
 from typing import Protocol
 
-#: 16-bit words, the low one first: what a parameter is made of on every bus of these drives.
-Words = tuple[int, ...]
 
-
-class Address(NamedTuple):
+@dataclass(frozen=True)
+class Address:
     """
     Where a parameter stands on a line; only the link looks inside.
 
-    :ivar numbers: the Modbus base register, or the Classic id of each word.
-    :ivar words: how many 16-bit words it has.
+    :ivar space: which numbering of the protocol ``index`` counts in, such as ``register``.
+    :ivar index: its number there; of several registers the first.
+    :ivar sub_index: which part of it; on Classic the id of the high word.
+    :ivar size: how many bytes it takes.
     """
 
-    numbers: tuple[int, ...]
-    words: int
+    space: str
+    index: int
+    sub_index: int | None
+    size: int
 
 
 class Reply(NamedTuple):
     """
     What a unit answered.
 
-    :ivar words: the words read; empty for a write.
+    :ivar data: the bytes read, as they stand on the bus; empty for a write.
     :ivar arrived: when the last byte came, in seconds of ``time.monotonic``.
     """
 
-    words: Words
+    data: bytes
     arrived: float
 
 
@@ -110,6 +112,9 @@ class Link(Protocol):
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
 
+    def parts(self, address: Address) -> Sequence[Address]:
+        """Return what each takes a transaction of its own to read, the low part first."""
+
     def read(self, unit: int, address: Address) -> Reply:
         """
         Read one parameter.
@@ -117,7 +122,7 @@ class Link(Protocol):
         :raises LinkError: as its subclasses say.
         """
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """
         Write one parameter.
 
@@ -125,18 +130,18 @@ class Link(Protocol):
         """
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
         """
         Write one parameter and read another, in one transaction.
 
-        :returns: the words read; none if it was only written, because what was read could not have
+        :returns: the bytes read; none if it was only written, because what was read could not have
             been believed. A write is not held back for that.
         :raises LinkError: as its subclasses say.
         """
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
@@ -144,7 +149,7 @@ class Link(Protocol):
         For reading that does something, such as acknowledging a fault (02A4h, E00E8). Whatever
         becomes of the read, the write is the next thing on the line.
 
-        :param source: of one word.
+        :param source: what is read in one transaction.
         :returns: the answer to the write.
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """

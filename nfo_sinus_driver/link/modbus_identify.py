@@ -205,7 +205,7 @@ class ModbusInquiry:
                 self._questions.insert(0, ReadDevice(self._unit, REGULAR, following))
         elif isinstance(answer, bytes):
             self._told['serial'] = serial_number(answer)
-        return Reply((), arrived)
+        return Reply(b'', arrived)
 
     def _take(self, answer: DeviceObjects) -> None:
         for number, content in answer.objects:

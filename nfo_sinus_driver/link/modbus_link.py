@@ -23,12 +23,11 @@ from typing import TypeVar
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import read_of
+from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 
 _T = TypeVar('_T')
 
@@ -38,44 +37,47 @@ class ModbusLink(ABC):
 
     space = 'modbus'
 
+    def parts(self, address: Address) -> tuple[Address]:
+        """Return the whole: registers that belong together are read together."""
+        return (address,)
+
     def read(self, unit: int, address: Address) -> Reply:
         """
         Read one parameter (function 03).
 
         :raises LinkError: as its subclasses say.
         """
-        return Reply(*self._ask(read_of(unit, address.numbers[0], address.words)))
+        return Reply(*self._ask(read_of(unit, address)))
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """
-        Write one parameter (function 06 for one word, 16 for several).
+        Write one parameter (function 06 for one register, 16 for several).
 
         :raises LinkError: as its subclasses say.
         """
-        return Reply(*self._ask(Write(unit, address.numbers[0], words)))
+        return Reply(*self._ask(Write(unit, address.index, data)))
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
         """
         Write one parameter and read another, in one transaction (function 23).
 
         :raises LinkError: as its subclasses say.
         """
-        register, read_from = address.numbers[0], source.numbers[0]
-        return Reply(*self._ask(WriteAndRead(unit, register, words, read_from, source.words)))
+        return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
-        self._ask_unheard(read_of(unit, source.numbers[0], source.words))
+        self._ask_unheard(read_of(unit, source))
         try:
-            return self.write(unit, address, words)
+            return self.write(unit, address, data)
         except LinkError as error:
             error.maybe_done = True
             raise

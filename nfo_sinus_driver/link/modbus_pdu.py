@@ -28,7 +28,7 @@ from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.interface import Words
+from nfo_sinus_driver.link.interface import Address
 
 READ_HOLDING_REGISTERS = 3
 WRITE_SINGLE_REGISTER = 6
@@ -79,8 +79,8 @@ class Request(Protocol[_Answer]):
         """Return what a whole message says; ``None`` if it is no answer after all."""
 
 
-class _TellsWords:
-    """What is answered by ``count`` words, and by nothing that names a register."""
+class _TellsRegisters:
+    """What is answered by ``count`` registers, and by nothing that names them."""
 
     unit: int
     function: int
@@ -100,13 +100,13 @@ class _TellsWords:
         """Bytes of the answer: always the same."""
         return self.answer_length
 
-    def decode(self, message: bytes) -> Words:
-        """Return the words read."""
-        return struct.unpack(f'>{self.count}H', message[3:])
+    def decode(self, message: bytes) -> bytes:
+        """Return what the registers hold."""
+        return message[3:]
 
 
 @dataclass(frozen=True)
-class Read(_TellsWords):
+class Read(_TellsRegisters):
     """Read ``count`` registers of ``unit``, from ``register`` on (function 03)."""
 
     unit: int
@@ -123,30 +123,31 @@ class Read(_TellsWords):
 
 @dataclass(frozen=True)
 class Write:
-    """Write ``words`` to the registers of ``unit`` from ``register`` on (function 06 or 16)."""
+    """Write ``data`` to the registers of ``unit`` from ``register`` on (function 06 or 16)."""
 
     unit: int
     register: int
-    words: Words
+    data: bytes
 
     @property
     def function(self) -> int:
-        """06 for one word, 16 for several."""
-        return WRITE_SINGLE_REGISTER if len(self.words) == 1 else WRITE_MULTIPLE_REGISTERS
+        """06 for one register, 16 for several."""
+        return WRITE_SINGLE_REGISTER if len(self.data) == 2 else WRITE_MULTIPLE_REGISTERS
 
     @property
     def body(self) -> bytes:
         """The request without unit and function."""
-        count = len(self.words)
-        if count == 1:
-            return struct.pack('>HH', self.register, self.words[0])
-        return struct.pack(f'>HHB{count}H', self.register, count, 2 * count, *self.words)
+        size = len(self.data)
+        if size == 2:
+            return self.register.to_bytes(2, 'big') + self.data
+        return struct.pack('>HHB', self.register, size // 2, size) + self.data
 
     @property
     def answer_head(self) -> bytes:
         """What of the answer is known beforehand: all of it."""
-        second = self.words[0] if len(self.words) == 1 else len(self.words)
-        return struct.pack('>BBHH', self.unit, self.function, self.register, second)
+        size = len(self.data)
+        second = self.data if size == 2 else (size // 2).to_bytes(2, 'big')
+        return struct.pack('>BBH', self.unit, self.function, self.register) + second
 
     @property
     def answer_length(self) -> int:
@@ -157,15 +158,15 @@ class Write:
         """Bytes of the answer: always the same."""
         return self.answer_length
 
-    def decode(self, message: bytes) -> Words:
-        """Return no words: the answer only says that it was done."""
-        return ()
+    def decode(self, message: bytes) -> bytes:
+        """Return nothing: the answer only says that it was done."""
+        return b''
 
 
 @dataclass(frozen=True)
-class WriteAndRead(_TellsWords):
+class WriteAndRead(_TellsRegisters):
     """
-    Write ``words`` from ``register`` on, then read ``count`` registers from ``source`` on.
+    Write ``data`` from ``register`` on, then read ``count`` registers from ``source`` on.
 
     One transaction (function 23) [M0 §6.2.3]; only the G2 has it [C57]. The answer is that of a
     read: it names no register.
@@ -173,7 +174,7 @@ class WriteAndRead(_TellsWords):
 
     unit: int
     register: int
-    words: Words
+    data: bytes
     source: int
     count: int
 
@@ -182,15 +183,20 @@ class WriteAndRead(_TellsWords):
     @property
     def body(self) -> bytes:
         """The request without unit and function."""
-        size = len(self.words)
-        where = (self.source, self.count, self.register, size)
-        return struct.pack(f'>4HB{size}H', *where, 2 * size, *self.words)
+        size = len(self.data)
+        where = (self.source, self.count, self.register, size // 2)
+        return struct.pack('>4HB', *where, size) + self.data
 
 
 @functools.lru_cache(PREPARED)
-def read_of(unit: int, register: int, count: int) -> Read:
+def read_of(unit: int, address: Address) -> Read:
     """Return the request that reads; one that comes again is the same."""
-    return Read(unit, register, count)
+    return Read(unit, address.index, address.size // 2)
+
+
+def write_and_read_of(unit: int, address: Address, data: bytes, source: Address) -> WriteAndRead:
+    """Return the request that writes to one address and reads another."""
+    return WriteAndRead(unit, address.index, data, source.index, source.size // 2)
 
 
 @functools.lru_cache(PREPARED)
@@ -209,7 +215,7 @@ def understand(request: Request[_T], message: bytes) -> _T | None:
     """
     Return what a whole message says as the answer to a request.
 
-    :returns: the words read, ``()`` for a write done, or what else the request's ``decode`` makes
+    :returns: the bytes read, ``b''`` for a write done, or what else the request's ``decode`` makes
         of it; ``None`` if it is the answer to something else.
     :raises Refused: the unit answered with an exception.
     """

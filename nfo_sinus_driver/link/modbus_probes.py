@@ -24,8 +24,8 @@ from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.modbus_identify import SPECIFIC
 from nfo_sinus_driver.link.modbus_identify import ReadDevice
 from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
 
 #: The object of function 43/14 whose text is empty, so its answer is the shortest [M0 §6.2.4].
@@ -48,7 +48,7 @@ def probes(
     the function, so that tells as much.
     """
     for address in addresses:
-        read = Read(unit, address.numbers[0], address.words)
+        read = read_of(unit, address)
         yield read, (read.answer_head,)
     for request in (ReportSlaveId(unit), ReadDevice(unit, SPECIFIC, _PRODUCT_CODE)):
         yield request, answer_kinds(request)

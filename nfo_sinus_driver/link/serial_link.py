@@ -36,12 +36,12 @@ from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
+from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 from nfo_sinus_driver.link.modbus_probes import answer_kinds
 from nfo_sinus_driver.link.modbus_probes import probes
 from nfo_sinus_driver.link.settings import LineSettings
@@ -58,8 +58,8 @@ _DECAY = 0.95
 _PAUSES = 3
 #: How long a write waits at least for a line that is not silent, s.
 _WRITE_PATIENCE = 0.02
-#: Bytes in the answer to a read of two words.
-_TWO_WORDS = 7
+#: Bytes in the answer to a read of two registers.
+_TWO_REGISTERS = 7
 
 
 class Port(Protocol):
@@ -142,7 +142,7 @@ class SerialLink(ModbusLink):
         self._safe[unit] = tuple(probes)
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
         """
         Write one parameter and read another (function 23), or only write it.
@@ -152,10 +152,10 @@ class SerialLink(ModbusLink):
 
         :raises LinkError: as its subclasses say.
         """
-        request = WriteAndRead(unit, address.numbers[0], words, source.numbers[0], source.words)
+        request = write_and_read_of(unit, address, data, source)
         self._await_silence(request)
         if not self._doubts.of(unit).isdisjoint(answer_kinds(request)):
-            return self.write(unit, address, words)
+            return self.write(unit, address, data)
         return Reply(*self._ask(request))
 
     # --- what the protocols differ in -------------------------------------------------------------
@@ -324,8 +324,8 @@ class SerialLink(ModbusLink):
 
     @property
     def _write_patience(self) -> float:
-        """How long a write waits for a line that is not silent, s: one answer of two words."""
-        longest = self._frame_length(_TWO_WORDS) * self._settings.char_time
+        """How long a write waits for a line that is not silent, s: one answer of two registers."""
+        longest = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
         return max(_WRITE_PATIENCE, longest)
 
     # --- one transaction --------------------------------------------------------------------------

@@ -88,7 +88,8 @@ class AllDrives:
 
     def _broadcast(self) -> str:
         try:
-            self._line.bus.run(broadcast_stop(self._line.bus)).result(_LONGEST_STOP)
+            models = [node.drive.model for node in self._line.drives]
+            self._line.bus.run(broadcast_stop(self._line.bus, models)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'

@@ -31,6 +31,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter as CatalogParameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Change
@@ -226,7 +227,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
         name=key,
         type=Parameter.Type.from_parameter_value(value).value,
         description=f'{parameter.name}: {parameter.description}{unit}',
-        additional_constraints='; '.join(_constraints(parameter)),
+        additional_constraints='; '.join(_constraints(parameter, drive.model)),
     )
     if isinstance(value, (bool, str)):
         return shown
@@ -244,10 +245,10 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     return shown
 
 
-def _constraints(parameter: CatalogParameter) -> Iterator[str]:
+def _constraints(parameter: CatalogParameter, model: Family) -> Iterator[str]:
     if parameter.kind is str:
         yield f'one of {", ".join(parameter.labels.values())}'
     if parameter.stopped:
         yield 'the motor must be stopped'
-    if parameter.key.startswith('serial.'):
+    if parameter.key in model.communication:
         yield 'needs allow_communication_changes'

@@ -48,7 +48,7 @@ class Faults:
     ) -> None:
         self._model = model
         self._kinds = {Kind.FAULT}
-        if model.status_word.tells_alarms:
+        if model.profile.status_word.tells_alarms:
             self._kinds.add(Kind.ALARM)
         self._kept = kept
         self.log_size = log_size

@@ -28,8 +28,6 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -128,14 +126,14 @@ class Memory:
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]
-        words = parameter.encode(value, home(parameter))
-        self._raw[key] = parameter.at(home(parameter)).number.decode(to_bytes(words))
+        data = parameter.encode(value, home(parameter))
+        self._raw[key] = parameter.at(home(parameter)).number.decode(data)
 
     @staticmethod
     def show(parameter: Parameter, raw: int) -> Value:
         """Turn a raw number of this memory into engineering units."""
         protocol = home(parameter)
-        return parameter.decode(to_words(parameter.at(protocol).number.encode(raw)), protocol)
+        return parameter.decode(parameter.at(protocol).number.encode(raw), protocol)
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:

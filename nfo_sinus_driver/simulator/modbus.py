@@ -145,7 +145,7 @@ class Server:
         entry, rest = divmod(register - log.first, log.stride) if log else (-1, 0)
         if log is None or not 0 <= entry < log.limit:
             return None
-        if rest or count != log.words:
+        if rest or 2 * count != log.codec.size:
             raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
         return to_words(log.codec.encode(self.drive.faults.log_entry(entry)))
 
@@ -154,9 +154,9 @@ class Server:
         parameter = self._by_base.get(register)
         if parameter is None:
             raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
-        words = parameter.at('modbus').words
-        if count != words:
-            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {words} registers, not {count}')
+        whole = parameter.at('modbus').codec.size // 2
+        if count != whole:
+            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {whole} registers, not {count}')
         return parameter
 
     # ---- requests ----

@@ -31,6 +31,8 @@ import re
 import struct
 from typing import Any
 
+from support.addresses import packed
+
 from fuzz import judges
 from fuzz.judges import Asked
 from fuzz.judges import Meaning
@@ -68,8 +70,8 @@ def _asked(random: Random) -> Asked:
     place = random.choice((0x0002, 0x000E, 0x00E8, 0x0228, 0xC000, random.getrandbits(16)))
     if function in (judges.WRITE_ONE, judges.WRITE_SEVERAL, judges.WRITE_AND_READ):
         size = 1 if function == judges.WRITE_ONE else 2 + random.getrandbits(1)
-        words = tuple(random.choice((0, 1, 0x101, random.getrandbits(16))) for _ in range(size))
-        return Asked(unit, function, place, random.choice((1, 2, 4)), words)
+        words = [random.choice((0, 1, 0x101, random.getrandbits(16))) for _ in range(size)]
+        return Asked(unit, function, place, random.choice((1, 2, 4)), packed(*words))
     if function == judges.IDENTIFY:
         return Asked(unit, function, random.choice((0, 0, 2, 4)), random.choice((1, 2, 4)))
     return Asked(unit, function, place, random.choice((1, 1, 2, 4, 16)))
@@ -77,13 +79,13 @@ def _asked(random: Random) -> Asked:
 
 def _request(asked: Asked) -> modbus_pdu.Request[Any]:
     """Return the driver's own object for a request."""
-    unit, function, place, count, words = asked
+    unit, function, place, count, data = asked
     if function == judges.READ:
         return modbus_pdu.Read(unit, place, count)
     if function in (judges.WRITE_ONE, judges.WRITE_SEVERAL):
-        return modbus_pdu.Write(unit, place, words)
+        return modbus_pdu.Write(unit, place, data)
     if function == judges.WRITE_AND_READ:
-        return modbus_pdu.WriteAndRead(unit, place, words, place ^ 2, count)
+        return modbus_pdu.WriteAndRead(unit, place, data, place ^ 2, count)
     if function == judges.REPORT_ID:
         return modbus_identify.ReportSlaveId(unit)
     return modbus_identify.ReadDevice(unit, count, place)
@@ -95,9 +97,9 @@ def _answer(asked: Asked, random: Random) -> bytes:
     if asked.function in (judges.READ, judges.WRITE_AND_READ):
         return head + bytes((2 * asked.count,)) + random.randbytes(2 * asked.count)
     if asked.function == judges.WRITE_ONE:
-        return head + struct.pack('>HH', asked.place, asked.words[0])
+        return head + struct.pack('>H', asked.place) + asked.data
     if asked.function == judges.WRITE_SEVERAL:
-        return head + struct.pack('>HH', asked.place, len(asked.words))
+        return head + struct.pack('>HH', asked.place, len(asked.data) // 2)
     if asked.function == judges.REPORT_ID:
         report = random.choice((b'201540123       ', b'\x01\xff', random.randbytes(12), b''))
         return head + bytes((len(report),)) + report

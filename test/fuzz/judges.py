@@ -42,14 +42,14 @@ class Asked(NamedTuple):
 
     :ivar place: the register written to; of IDENTIFY the object asked for.
     :ivar count: how many registers are read; of IDENTIFY the code.
-    :ivar words: what is written.
+    :ivar data: what is written.
     """
 
     unit: int
     function: int
     place: int = 0
     count: int = 0
-    words: tuple[int, ...] = ()
+    data: bytes = b''
 
 
 class Refusal(NamedTuple):
@@ -65,8 +65,8 @@ class Objects(NamedTuple):
     following: int | None
 
 
-#: What an answer says: the words read, nothing, the objects, or the raw report.
-Meaning = tuple[int, ...] | Objects | bytes | Refusal
+#: What an answer says: what was read or reported, nothing, the objects, or a refusal.
+Meaning = bytes | Objects | Refusal
 
 
 def meaning(asked: Asked, message: bytes) -> Meaning | None:
@@ -81,10 +81,11 @@ def meaning(asked: Asked, message: bytes) -> Meaning | None:
     if asked.function in (READ, WRITE_AND_READ):
         if not data or data[0] != 2 * asked.count or len(data) != 1 + data[0]:
             return None
-        return tuple(data[i] << 8 | data[i + 1] for i in range(1, len(data), 2))
+        return data[1:]
     if asked.function in (WRITE_ONE, WRITE_SEVERAL):
-        second = asked.words[0] if asked.function == WRITE_ONE else len(asked.words)
-        return () if data == struct.pack('>HH', asked.place, second) else None
+        count = struct.pack('>H', len(asked.data) // 2)
+        second = asked.data if asked.function == WRITE_ONE else count
+        return b'' if data == struct.pack('>H', asked.place) + second else None
     if asked.function == REPORT_ID:
         return data[1:] if data and data[0] == len(data) - 1 and len(data) <= _LONGEST - 2 else None
     return _objects(asked, data)

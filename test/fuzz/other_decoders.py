@@ -23,6 +23,8 @@ import math
 from random import Random
 import struct
 
+from support.addresses import packed
+
 from fuzz import judges
 from fuzz.decoders import Case
 from fuzz.decoders import classic_frame
@@ -64,17 +66,18 @@ def _catalog(random: Random, frames: int) -> None:
     for _ in range(frames):
         parameter, protocol = random.choice(_PARAMETERS)
         place = parameter.addresses[protocol]
-        count = place.words if random.random() < 0.9 else random.choice((0, 1, 2, 3))
+        whole = place.codec.size // 2
+        count = whole if random.random() < 0.9 else random.choice((0, 1, 2, 3))
         raw = [
             random.choice((0, 1, 0x7FFF, 0x8000, 0xFFFF, random.getrandbits(16)))
             for _ in range(count)
         ]
         try:
-            value = parameter.decode(raw, protocol)
+            value = parameter.decode(packed(*raw), protocol)
         except ValueError:
-            assert count != place.words or parameter.kind in (bool, int), 'it has a value'
+            assert count != whole or parameter.kind in (bool, int), 'it has a value'
             continue
-        assert count == place.words, f'{value!r} from {count} words'
+        assert count == whole, f'{value!r} from {count} words'
         form = {(1, False): '<H', (1, True): '<h', (2, False): '<I', (2, True): '<i'}
         data = struct.pack(f'<{count}H', *raw)
         number = struct.unpack(form[count, place.number.signed], data)[0]

@@ -25,21 +25,21 @@ _TRACE = 'test/ros/test_trace.py'
 _RTU_LINK = 'test/unit/link/test_rtu_link.py'
 _ECHO = 'test/unit/link/test_echo.py'
 
-_MOTION = 'nfo_sinus_driver/drive/motion.py'
+_CONTROLLER = 'nfo_sinus_driver/drive/controller.py'
+_TABLE = 'nfo_sinus_driver/drive/control_state.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
 _ADVICE = 'nfo_sinus_driver/drive/advice.py'
 _DRIVE = 'nfo_sinus_driver/drive/drive.py'
 _WATCH = 'nfo_sinus_driver/drive/watch.py'
 _WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
 _TUNING = 'test/unit/drive/test_tuning.py'
-_METHOD = 'nfo_sinus_driver/drive/mode_scmd.py'
+_COMMANDS = 'nfo_sinus_driver/drive/commands.py'
+_G2 = 'nfo_sinus_driver/families/sinus_g2/profile.py'
 _NODE = 'nfo_sinus_driver/node/drive_node.py'
 _MAIN = 'nfo_sinus_driver/node/main.py'
 _SIGNALS = 'nfo_sinus_driver/signals.py'
-_WITHDRAWAL = 'nfo_sinus_driver/drive/withdrawal.py'
-_CONTROL = 'nfo_sinus_driver/drive/drive_control.py'
-_REFERENCE = 'nfo_sinus_driver/drive/reference.py'
-_ERRAND = 'nfo_sinus_driver/drive/errand.py'
+_SEQUENCE = 'nfo_sinus_driver/drive/stop_sequence.py'
+_PROFILE = 'nfo_sinus_driver/catalog/profile.py'
 _ANY_ORDER = 'test/unit/drive/test_any_order.py'
 _STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
 _CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
@@ -116,7 +116,7 @@ MUTANTS = (
     Mutant(
         2,
         'a fault that a refused set-point shows first is not told',
-        _MOTION,
+        _CONTROLLER,
         'if seen.faulted else reason)',
         'if False else reason)',
         ('test/unit/drive/test_watching.py', '-k', 'shows_first'),
@@ -141,39 +141,40 @@ MUTANTS = (
         2,
         'a lost line does not disarm',
         _WATCH,
-        'self._motion is not None and self._motion.lost():',
+        'self._controller is not None and self._controller.lost():',
         'False:',
         (_NO_RESTART, '-k', 'line_gone'),
     ),
     Mutant(
         2,
         'the motor is enabled while it is being tuned',
-        _MOTION,
-        '        if self.loan is not None:\n            raise',
-        '        if False:\n            raise',
+        _CONTROLLER,
+        '        if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:\n',
+        '        if self._access is not None:\n            self._state = ControlState.IDLE\n'
+        '        if True:\n',
         (_TUNING, '-k', 'two_at_a_time'),
     ),
     Mutant(
         2,
         'a tuning is taken for a motor that nobody enabled',
-        _MOTION,
-        'self._arming is not None or self.loan is not None',
-        'self._arming is not None',
+        _TABLE,
+        '        ControlState.PROCEDURE,\n',
+        '',
         (_TUNING, '-k', 'take_over'),
     ),
     Mutant(
         2,
         'a restarted driver lets run what runs',
-        _MOTION,
+        _CONTROLLER,
         '        if await self._method.in_control(Priority.SERVICE):\n            if seen',
-        '        self._changed_at = float("inf")\n        if False:\n            if seen',
+        '        self._since = float("inf")\n        if False:\n            if seen',
         (_NO_RESTART, '-k', 'restarted_driver'),
     ),
     Mutant(
         2,
         'the run command is not taken back before an acknowledgement',
-        _METHOD,
-        'await self._registers.write(self._command, Scmd.STOP, Priority.STOP, once=True)',
+        _G2,
+        'yield Write(self._command, Scmd.STOP, once=True)',
         'pass',
         (_NO_RESTART, '-k', 'fault_and_ack'),
     ),
@@ -188,16 +189,16 @@ MUTANTS = (
     Mutant(
         2,
         'a refused enable leaves its run command standing',
-        _MOTION,
-        'a run command may stand by now\n            self._withdrawal.begin()',
+        _CONTROLLER,
+        'a run command may stand by now\n            self._stop()',
         'a run command may stand by now',
         (_NO_RESTART, '-k', 'without_run_input'),
     ),
     Mutant(
         2,
         'no set-point 0 before a run command',
-        _REFERENCE,
-        '        await self.write_zero(priority, once=False)\n',
+        _PROFILE,
+        '        yield from self.zero(once=False)\n',
         '',
         (_TRACE,),
     ),
@@ -261,9 +262,9 @@ MUTANTS = (
     Mutant(
         3,
         'a stop waits behind everything else',
-        _METHOD,
-        'write(self._command, Scmd.STOP, Priority.STOP, once=True)',
-        "write('fieldbus.scmd', Scmd.STOP, Priority.REFRESH, once=True)",
+        _COMMANDS,
+        'carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)',
+        'carry_out(self._method.stop(control_mode), self._registers, Priority.REFRESH)',
         ('test/unit/drive/test_stop_first.py',),
     ),
     Mutant(
@@ -302,18 +303,18 @@ MUTANTS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/registers.py',
-        'Address(place.numbers, place.words)',
-        'Address(place.numbers, 2)',
+        'Address(*self.model[key].at(self.protocol).place)',
+        'Address(*self.model[key].at(self.protocol).place[:3], 4)',
         (_TRACE,),
     ),
     Mutant(
         6,
         'control is given back by MODE = Ext',
-        _METHOD,
-        "            await self._registers.write('fieldbus.mode', Mode.STOP, Priority.SERVICE)\n\n"
-        '    async def remove',
-        "            await self._registers.write('fieldbus.mode', Mode.EXT, Priority.SERVICE)\n\n"
-        '    async def remove',
+        _G2,
+        '            yield Write(MODE, Mode.STOP)\n\n'
+        '    def remove(self, control_mode: str) -> Steps[Removal]:\n        """Write SCMD',
+        '            yield Write(MODE, Mode.EXT)\n\n'
+        '    def remove(self, control_mode: str) -> Steps[Removal]:\n        """Write SCMD',
         (_TRACE,),
     ),
     Mutant(
@@ -391,7 +392,7 @@ MUTANTS = (
     Mutant(
         9,
         'a clean exit leaves the time-out of the drive to strike',
-        _MOTION,
+        _CONTROLLER,
         '        await self._method.release()\n',
         '',
         (_WAYS_OUT, '-k', 'leaves_no_fault'),
@@ -409,9 +410,9 @@ MUTANTS = (
         Mutant(
             2,
             f'{what} does not disarm ({tests[-1]})',
-            _MOTION,
-            '        if reason:\n            self.secure',
-            f'        if {new}:\n            self.secure',
+            _CONTROLLER,
+            '        if reason:\n            self._stop()',
+            f'        if {new}:\n            self._stop()',
             tests,
         )
         for tests in (_G2_SCMD, _G2_CONTROL, _OPTIMAL_SCMD)
@@ -431,16 +432,16 @@ MUTANTS = (
         2,
         'in any order: a lost line does not disarm',
         _WATCH,
-        '        if self._motion is not None and self._motion.lost():',
+        '        if self._controller is not None and self._controller.lost():',
         '        if False:',
         _G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: a driver that begins lets run what runs',
-        _MOTION,
+        _CONTROLLER,
         '        if await self._method.in_control(Priority.SERVICE):\n            if seen',
-        '        self._changed_at = float("inf")\n        if False:\n            if seen',
+        '        self._since = float("inf")\n        if False:\n            if seen',
         _G2_CONTROL,
     ),
     Mutant(
@@ -454,8 +455,8 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: no set-point 0 before a run command',
-        _REFERENCE,
-        '        await self.write_zero(priority, once=False)\n',
+        _PROFILE,
+        '        yield from self.zero(once=False)\n',
         '',
         _G2_CONTROL,
     ),
@@ -470,24 +471,23 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: a refused enable leaves its run command standing',
-        _MOTION,
-        'a run command may stand by now\n            self._withdrawal.begin()',
+        _CONTROLLER,
+        'a run command may stand by now\n            self._stop()',
         'a run command may stand by now',
         _G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: what ends a ride leaves the run command standing',
-        _MOTION,
-        '        self.disarm()\n        self._withdrawal.begin()\n'
-        '        self._tell_stopped(reason)',
-        '        self.disarm()\n        self._tell_stopped(reason)',
+        _CONTROLLER,
+        '            self._stop()\n            self._tell_stopped(reason)',
+        '            self._happened(ControlEvent.STOP)\n            self._tell_stopped(reason)',
         _G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: a stop that a fault holds is forgotten',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '            return _Outcome.BLOCKED_BY_FAULT\n',
         '            return _Outcome.CONFIRMED\n',
         _G2_SCMD,
@@ -495,7 +495,7 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: a start that the RUN input ended waits for it',
-        _MOTION,
+        _CONTROLLER,
         ' or (delayed and seen.standby):',
         ':',
         ('test/unit/drive/test_any_order_found.py',),
@@ -511,7 +511,7 @@ MUTANTS = (
     Mutant(
         3,
         'in any order: a stop is answered before it is confirmed',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '        while task is not None and not await',
         '        while False and not await',
         _G2_SCMD,
@@ -519,7 +519,7 @@ MUTANTS = (
     Mutant(
         3,
         'in any order: a motor that cannot be stopped is not said to be',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '            if time.monotonic() >= complain_at:',
         '            if False:',
         _G2_SCMD,
@@ -528,7 +528,7 @@ MUTANTS = (
         3,
         'in any order: deactivate does not stop the motor',
         _DRIVE,
-        '        return await self._motion.stop(patience)\n',
+        '        return await self._controller.stop(patience)\n',
         "        return ''\n",
         _G2_CONTROL,
     ),
@@ -536,7 +536,7 @@ MUTANTS = (
         3,
         'in any order: a clean-up does not stop the motor',
         _DRIVE,
-        '            return await self._motion.release(timeout)\n',
+        '            return await self._controller.release(timeout)\n',
         "            return ''\n",
         _OPTIMAL_SCMD,
     ),
@@ -575,7 +575,7 @@ MUTANTS = (
     Mutant(
         6,
         'in any order: both directions at once',
-        _CONTROL,
+        _G2,
         'switched_on | Control.ENABLE_OP,',
         'switched_on | Control.ENABLE_OP | Control.ENABLE_REV_OP,',
         _G2_CONTROL,
@@ -583,16 +583,16 @@ MUTANTS = (
     Mutant(
         6,
         'in any order: the register of the other method is written',
-        _CONTROL,
-        '            await self._change(~_RUN, Control(0), Priority.STOP)\n',
-        '            await self._change(~_RUN, Control(0), Priority.STOP)\n'
-        "            await self._registers.write('fieldbus.scmd', 0, Priority.STOP)\n",
+        _G2,
+        '            yield from self._change(~_RUN, Control(0))\n',
+        '            yield from self._change(~_RUN, Control(0))\n'
+        "            yield Write('fieldbus.scmd', 0)\n",
         _G2_CONTROL,
     ),
     Mutant(
         3,
         'a tuning that refuses the stop is taken for a motor that stands',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '        if seen.tuning:\n',
         '        if False:\n',
         _STOP_CONFIRMED,
@@ -600,15 +600,15 @@ MUTANTS = (
     Mutant(
         2,
         'an enable waits for a stop and then runs',
-        _MOTION,
-        '        if self.stopping or self._releasing:\n            raise',
-        '        if False:\n            raise',
+        _TABLE,
+        'ENABLE        .         ENABLING  .        .        .         .        .     ',
+        'ENABLE        .         ENABLING  .        .        .         .        ENABLING',
         _STOP_CONFIRMED,
     ),
     Mutant(
         3,
         'a stop that was lost is not repeated at once',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '        elif self._outcome is not _Outcome.UNHEARD:\n',
         '        else:\n',
         _STOP_CONFIRMED,
@@ -616,23 +616,23 @@ MUTANTS = (
     Mutant(
         2,
         'a fault is acknowledged with the run command still there',
-        _METHOD,
-        '        if ours and await self.remove(control_mode) is not Removal.COMMAND:\n',
+        _G2,
+        '        if ours and (yield from self.remove(control_mode)) is not Removal.COMMAND:\n',
         '        if False:\n',
         _NO_TURN,
     ),
     Mutant(
         2,
         'nothing follows the acknowledgement of a drive that refuses everything',
-        _METHOD,
-        '                await self._registers.acknowledge_and_write(key, *self._soonest)\n',
-        '                await self._registers.acknowledge(key, _ACK)\n',
+        _G2,
+        '                yield AcknowledgeThenWrite(INV_ST_WITH_ACK, self._soonest)\n',
+        '                yield Acknowledge(INV_ST_WITH_ACK)\n',
         _NO_TURN,
     ),
     Mutant(
         2,
         'control is taken with the set-point of an earlier session',
-        _MOTION,
+        _CONTROLLER,
         '        if not self._inverter.settings_need_control:\n',
         '        if False:\n',
         _CONTROL_TAKEN,
@@ -640,24 +640,23 @@ MUTANTS = (
     Mutant(
         2,
         'no stop follows MODE = Bus',
-        _METHOD,
-        '                await self._registers.write(self._command, Scmd.STOP, Priority.STOP)\n'
-        '                return\n',
+        _G2,
+        '                yield stop\n                return\n',
         '                return\n',
         _CONTROL_TAKEN,
     ),
     Mutant(
         2,
         'a tuning that waits for the line is sent after a stop',
-        _ERRAND,
-        '                    require_wanted=loan.require_wanted,\n',
-        '',
+        _COMMANDS,
+        'await self._registers.write(write, Priority.STOP, require_wanted)',
+        'await self._registers.write(write, Priority.STOP)',
         _TUNING_BEGINS,
     ),
     Mutant(
         3,
         'a stop is confirmed by what was seen before its reason',
-        _WITHDRAWAL,
+        _SEQUENCE,
         '        if self._reasons > reasons:\n',
         '        if False:\n',
         _STOP_CONFIRMED,
@@ -665,17 +664,17 @@ MUTANTS = (
     Mutant(
         2,
         'a quick stop ends what keeps others from enabling',
-        _MOTION,
-        '            self._releasing -= 1\n',
-        '            self._releasing = 0\n',
+        _SEQUENCE,
+        '            self._held -= 1\n',
+        '            self._held = 0\n',
         _STOP_CONFIRMED,
     ),
     Mutant(
         2,
         'the acknowledgement of a serial fault takes control from the terminals',
-        _METHOD,
-        '        if not elsewhere:\n',
-        '        if True:\n',
+        _G2,
+        '        if not elsewhere:\n            yield from self._remove_control()\n',
+        '        yield from self._remove_control()\n',
         _EVERY_WAY,
     ),
     Mutant(

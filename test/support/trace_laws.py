@@ -188,7 +188,7 @@ def _places(model: str, protocol: str) -> _Places:
         if bus == 'classic':
             whole |= {(number, 1) for number in place.numbers}
         else:
-            whole.add((place.index, place.words))
+            whole.add((place.index, place.codec.size // 2))
     area = load_family(model).error_logs.get(bus)
     if area is not None:
         for entry in range(area.entries if bus == 'modbus' else area.limit):

@@ -23,10 +23,6 @@ from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusWord
 
-TITLE = 'NFO Sinus G2'
-#: It has Modbus function 23 ([M0 §6.2.3], [C57]).
-WRITES_AND_READS = True
-
 
 class Mode(enum.IntEnum):
     """Who controls the drive [M0 table 17]."""

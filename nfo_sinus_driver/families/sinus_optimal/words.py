@@ -29,10 +29,6 @@ from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusWord
 
-TITLE = 'NFO Sinus Optimal'
-#: It has Modbus function 23 ([M0 §6.2.3], [C57]).
-WRITES_AND_READS = False
-
 
 class Mode(enum.IntEnum):
     """Who controls the drive; only BUS means the same as on the G2 [C51]."""

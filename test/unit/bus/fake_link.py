@@ -25,10 +25,12 @@ import threading
 import time
 from typing import NamedTuple
 
+from support.addresses import packed
+from support.addresses import register
+
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 #: No honest wait takes this long, on any machine, s.
 PATIENCE = 30.0
@@ -42,21 +44,16 @@ def wait_until(condition: Callable[[], object], timeout: float = PATIENCE) -> No
         time.sleep(0.001)
 
 
-def register(number: int, words: int = 1) -> Address:
-    """An address that tests can tell by its number."""
-    return Address((number,), words)
-
-
 class Done(NamedTuple):
     """
-    One transaction that the link saw; ``words`` is ``None`` for a read.
+    One transaction that the link saw; ``data`` is ``None`` for a read.
 
     :ivar source: what was read in the same transaction as the write.
     """
 
     unit: int
     number: int
-    words: Words | None
+    data: bytes | None
     source: int | None = None
 
 
@@ -65,7 +62,7 @@ class FakeLink:
     A link that notes what it is asked and does as it is told.
 
     :ivar done: every transaction, in order.
-    :ivar answer: called with each; returns the words, or raises.
+    :ivar answer: called with each; returns the bytes, or raises.
     :ivar opening: called when the port is opened; may raise.
     """
 
@@ -73,7 +70,7 @@ class FakeLink:
 
     def __init__(self) -> None:
         self.done: list[Done] = []
-        self.answer: Callable[[Done], Words] = lambda done: (done.number,)
+        self.answer: Callable[[Done], bytes] = lambda done: packed(done.number)
         self.opening: Callable[[], None] = lambda: None
         self.closing: Callable[[], None] = lambda: None
         self.opened = 0
@@ -112,23 +109,28 @@ class FakeLink:
         self.closed += 1
         self.closing()
 
-    def read(self, unit: int, address: Address) -> Reply:
-        return self._transact(Done(unit, address.numbers[0], None))
+    def parts(self, address: Address) -> Sequence[Address]:
+        if address.sub_index is None:
+            return (address,)
+        return tuple(register(number) for number in (address.index, address.sub_index))
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
-        return self._transact(Done(unit, address.numbers[0], words))
+    def read(self, unit: int, address: Address) -> Reply:
+        return self._transact(Done(unit, address.index, None))
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        return self._transact(Done(unit, address.index, data))
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
-        return self._transact(Done(unit, address.numbers[0], words, source.numbers[0]))
+        return self._transact(Done(unit, address.index, data, source.index))
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         with contextlib.suppress(NoAnswer):
             self.read(unit, source)
-        return self.write(unit, address, words)
+        return self.write(unit, address, data)
 
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         self.probes[unit] = tuple(probes)

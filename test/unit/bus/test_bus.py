@@ -29,9 +29,10 @@ from typing import Any
 from fake_link import PATIENCE
 from fake_link import Done
 from fake_link import FakeLink
-from fake_link import register
 from fake_link import wait_until
 import pytest
+from support.addresses import packed
+from support.addresses import register
 
 from nfo_sinus_driver import bus as bus_module
 from nfo_sinus_driver import statistics as statistics_module
@@ -48,7 +49,6 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.turns import BACKGROUND_SHARE
 
 UNIT = 1
@@ -70,14 +70,14 @@ def bus(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bus]:
 
 
 def ask(
-    bus: Bus, number: int, priority: Priority, words: Words | None = None, unit: int = UNIT
-) -> Future[Words]:
-    """Let a coroutine read or write one register; the future has the words read."""
+    bus: Bus, number: int, priority: Priority, data: bytes | None = None, unit: int = UNIT
+) -> Future[bytes]:
+    """Let a coroutine read or write one register; the future has the bytes read."""
 
-    async def job() -> Words:
-        if words is None:
-            return (await bus.read(unit, register(number), priority)).words
-        return (await bus.write(unit, register(number), words, priority)).words
+    async def job() -> bytes:
+        if data is None:
+            return (await bus.read(unit, register(number), priority)).data
+        return (await bus.write(unit, register(number), data, priority)).data
 
     return bus.run(job())
 
@@ -90,7 +90,7 @@ def failure(future: Future[Any]) -> BaseException | None:
     return future.exception(PATIENCE)
 
 
-def hold(bus: Bus, link: FakeLink, priority: Priority = Priority.REFRESH) -> Future[Words]:
+def hold(bus: Bus, link: FakeLink, priority: Priority = Priority.REFRESH) -> Future[bytes]:
     """Have a transaction kept on the line; to be used while the link is held."""
     future = ask(bus, 0, priority)
     link.wait_until_held()
@@ -103,7 +103,7 @@ class Writer:
     def __init__(self, bus: Bus, number: int = 50, unit: int = UNIT) -> None:
         self.bus = bus
         self.wanted: int | None = None
-        self.outcomes: list[tuple[Words | None, LinkError | None]] = []
+        self.outcomes: list[tuple[bytes | None, LinkError | None]] = []
         self.slot = Slot(self.make, self.done)
         self.address = register(number)
         self.unit = unit
@@ -115,20 +115,20 @@ class Writer:
     def make(self) -> Transfer | None:
         if self.wanted is None:
             return None
-        return Transfer(self.unit, self.address, Priority.SETPOINT, (self.wanted,))
+        return Transfer(self.unit, self.address, Priority.SETPOINT, packed(self.wanted))
 
     def done(self, transfer: Transfer, error: LinkError | None) -> None:
-        self.outcomes.append((transfer.words, error))
+        self.outcomes.append((transfer.data, error))
 
 
 # --- coroutines -----------------------------------------------------------------------------------
 
 
 def test_read_and_write(bus: Bus, link: FakeLink) -> None:
-    assert result(ask(bus, 7, Priority.SERVICE)) == (7,)
-    link.answer = lambda done: ()
-    assert result(ask(bus, 8, Priority.SERVICE, (1, 2))) == ()
-    assert link.done == [Done(UNIT, 7, None), Done(UNIT, 8, (1, 2))]
+    assert result(ask(bus, 7, Priority.SERVICE)) == packed(7)
+    link.answer = lambda done: b''
+    assert result(ask(bus, 8, Priority.SERVICE, packed(1, 2))) == b''
+    assert link.done == [Done(UNIT, 7, None), Done(UNIT, 8, packed(1, 2))]
 
 
 def test_result_and_mistake_of_a_coroutine(bus: Bus) -> None:
@@ -152,7 +152,7 @@ def test_result_and_mistake_of_a_coroutine(bus: Bus) -> None:
 def test_error_of_the_link_reaches_the_coroutine(
     bus: Bus, link: FakeLink, error: LinkError
 ) -> None:
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         raise error
 
     caught: list[LinkError] = []
@@ -176,7 +176,7 @@ def test_future_cannot_be_cancelled_from_outside(bus: Bus, link: FakeLink) -> No
         assert not future.cancel()
         waiting = ask(bus, 1, Priority.SERVICE)
         assert not waiting.cancel()
-    assert result(waiting) == (1,)
+    assert result(waiting) == packed(1)
     assert not future.cancelled()
 
 
@@ -195,20 +195,24 @@ def test_calls_are_made_between_transactions_in_order(bus: Bus, link: FakeLink) 
 def test_nothing_goes_between_a_read_and_the_write_behind_it(
     bus: Bus, link: FakeLink, lost: bool
 ) -> None:
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         if lost and done.number == 1:
             raise NoAnswer('silence')
-        return (done.number,)
+        return packed(done.number)
 
-    async def job() -> Words:
-        reply = await bus.read_then_write(UNIT, register(1), register(2), (0,), Priority.STOP)
-        return reply.words
+    async def job() -> bytes:
+        reply = await bus.read_then_write(UNIT, register(1), register(2), packed(0), Priority.STOP)
+        return reply.data
 
     link.answer = answer
     with link.held():
         hold(bus, link)
-        waiting = [ask(bus, 3, Priority.STOP), bus.run(job()), ask(bus, 4, Priority.STOP, (1,))]
-    assert [result(future) for future in waiting] == [(3,), (2,), (4,)]
+        waiting = [
+            ask(bus, 3, Priority.STOP),
+            bus.run(job()),
+            ask(bus, 4, Priority.STOP, packed(1)),
+        ]
+    assert [result(future) for future in waiting] == [packed(3), packed(2), packed(4)]
     # as any write of a stop it goes ahead of what only looks
     assert link.numbers == [0, 1, 2, 4, 3]
 
@@ -278,15 +282,15 @@ def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> Non
 
 def test_stop_goes_between_the_words_of_a_value(bus: Bus, link: FakeLink) -> None:
     # over Classic each word is a transaction: the high one, the low one, the high one again
-    async def read() -> Words:
-        return (await bus.read(UNIT, Address((5, 6), 2), Priority.REFRESH)).words
+    async def read() -> bytes:
+        return (await bus.read(UNIT, Address('register', 5, 6, 4), Priority.REFRESH)).data
 
     with link.held():
         value = bus.run(read())
         link.wait_until_held()
         stop = ask(bus, 1, Priority.STOP)
     result(stop)
-    assert len(result(value)) == 2
+    assert result(value) == packed(5, 6)
     assert link.numbers == [6, 1, 5, 6]
 
 
@@ -323,9 +327,9 @@ def take_time(
     """Let transactions take a time by their register, on a clock of their own."""
     clock = Clock(took)
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         clock.now += took.get(done.number, 0.0)
-        return (done.number,)
+        return packed(done.number)
 
     link.answer = answer
     for module in (bus_module, statistics_module):
@@ -368,7 +372,7 @@ def test_background_has_a_sixth_of_the_time_each(
 
 def test_background_alone_has_the_whole_line(bus: Bus, link: FakeLink) -> None:
     for number in range(20):
-        assert result(ask(bus, number, Priority.REFRESH)) == (number,)
+        assert result(ask(bus, number, Priority.REFRESH)) == packed(number)
 
 
 def test_set_point_goes_before_all_that_the_background_is_owed(
@@ -405,8 +409,8 @@ def test_slot_sends_the_latest_value_only(bus: Bus, link: FakeLink) -> None:
             writer.want(value)
     wait_until(lambda: writer.outcomes)
     result(ask(bus, 1, Priority.REFRESH))
-    assert writer.outcomes == [((99,), None)]
-    assert [done for done in link.done if done.number == 50] == [Done(UNIT, 50, (99,))]
+    assert writer.outcomes == [(packed(99), None)]
+    assert [done for done in link.done if done.number == 50] == [Done(UNIT, 50, packed(99))]
 
 
 def test_slot_that_has_nothing_to_say_any_more(bus: Bus, link: FakeLink) -> None:
@@ -423,7 +427,7 @@ def test_slot_that_has_nothing_to_say_any_more(bus: Bus, link: FakeLink) -> None
     # it can be asked for again
     writer.want(3)
     wait_until(lambda: writer.outcomes)
-    assert writer.outcomes == [((3,), None)]
+    assert writer.outcomes == [(packed(3), None)]
 
 
 def test_slots_take_turns(bus: Bus, link: FakeLink) -> None:
@@ -431,12 +435,12 @@ def test_slots_take_turns(bus: Bus, link: FakeLink) -> None:
     hasty, calm = Writer(bus, 50), Writer(bus, 51)
     count = 0
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         nonlocal count
         if done.number == 50 and count < 100:
             count += 1
             hasty.want(count)
-        return ()
+        return b''
 
     with link.held():
         hold(bus, link)
@@ -451,13 +455,13 @@ def test_error_reaches_the_owner_of_a_slot(bus: Bus, link: FakeLink) -> None:
     writer = Writer(bus)
     error = Refused(3)
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         raise error
 
     link.answer = answer
     writer.want(1)
     wait_until(lambda: writer.outcomes)
-    assert writer.outcomes == [((1,), error)]
+    assert writer.outcomes == [(packed(1), error)]
 
 
 # --- whatever is raised ---------------------------------------------------------------------------
@@ -480,14 +484,14 @@ def test_coroutine_that_raises(bus: Bus, error: BaseException) -> None:
 
     future = bus.run(job())
     wait_until(future.done)
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
     assert future.exception() is error
 
 
 @RAISED
 def test_call_that_raises(bus: Bus, error: BaseException) -> None:
     bus.call(raiser(error))
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 
 @RAISED
@@ -498,7 +502,7 @@ def test_call_that_raises_keeps_nobody_else_out(
         hold(bus, link)
         bus.call(raiser(error))
         future = ask(bus, 1, Priority.POLL)
-    assert result(future) == (1,)
+    assert result(future) == packed(1)
 
 
 @RAISED
@@ -508,11 +512,11 @@ def test_slot_that_raises(bus: Bus, link: FakeLink, error: BaseException, which:
     good = getattr(writer, which)
     setattr(writer.slot, which, raiser(error))
     writer.want(1)
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
     setattr(writer.slot, which, good)
     writer.want(2)
     wait_until(lambda: writer.outcomes)
-    assert writer.outcomes[-1] == ((2,), None)
+    assert writer.outcomes[-1] == (packed(2), None)
 
 
 @RAISED
@@ -524,8 +528,8 @@ def test_link_that_raises(bus: Bus, link: FakeLink, error: BaseException) -> Non
     writer.want(1)
     wait_until(lambda: writer.outcomes)
     assert isinstance(writer.outcomes[0][1], LinkError)
-    link.answer = lambda done: (done.number,)
-    assert result(ask(bus, 2, Priority.POLL)) == (2,)
+    link.answer = lambda done: packed(done.number)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
 
 
 @RAISED
@@ -552,7 +556,7 @@ def test_link_that_raises_when_it_is_opened(
     assert time.monotonic() - start >= 0.03
     link.opening = lambda: None
     wait_until(lambda: bus.port_error is None)
-    assert result(ask(bus, 2, Priority.POLL)) == (2,)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
     bus.close()
 
 
@@ -563,9 +567,9 @@ def test_link_that_raises_when_it_is_closed(
     link.closing = raiser(error)
     link.answer = raiser(PortError('gone'))
     assert isinstance(failure(ask(bus, 1, Priority.POLL)), PortError)
-    link.answer = lambda done: (done.number,)
+    link.answer = lambda done: packed(done.number)
     wait_until(lambda: bus.port_error is None)
-    assert result(ask(bus, 2, Priority.POLL)) == (2,)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
     bus.close()
     assert not bus.alive
 
@@ -573,7 +577,7 @@ def test_link_that_raises_when_it_is_closed(
 def test_probes_that_raise(bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, 'use_probes', raiser(RuntimeError()))
     bus.use_probes(1, ())
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 
 # --- time -----------------------------------------------------------------------------------------
@@ -588,7 +592,7 @@ def test_sleep_takes_its_time_and_keeps_nobody_waiting(bus: Bus, link: FakeLink)
 
     start = time.monotonic()
     future = bus.run(sleeper())
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
     result(future)
     assert woken[0] - start >= 0.05
 
@@ -630,7 +634,7 @@ def test_sleeper_can_be_woken(bus: Bus) -> None:
     assert result(task.future) == 'awake'
     # harmless afterwards
     bus.call(lambda: bus.wake(task))
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 
 def test_waking_does_not_shorten_the_next_sleep(bus: Bus) -> None:
@@ -657,8 +661,8 @@ def test_waking_does_not_shorten_the_next_sleep(bus: Bus) -> None:
 
 
 def test_waking_one_who_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLink) -> None:
-    async def job() -> Words:
-        return (await bus.read(UNIT, register(9), Priority.REFRESH)).words
+    async def job() -> bytes:
+        return (await bus.read(UNIT, register(9), Priority.REFRESH)).data
 
     with link.held():
         hold(bus, link, Priority.POLL)
@@ -666,7 +670,7 @@ def test_waking_one_who_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLin
         bus.call(lambda: tasks.append(bus.spawn(job())))
     wait_until(lambda: tasks)
     bus.call(lambda: bus.wake(tasks[0]))
-    assert result(tasks[0].future) == (9,)
+    assert result(tasks[0].future) == packed(9)
 
 
 def test_join(bus: Bus) -> None:
@@ -729,8 +733,8 @@ def test_cancelled_sleeper(bus: Bus) -> None:
 
 
 def test_cancelling_one_leaves_the_others(bus: Bus, link: FakeLink) -> None:
-    async def job(number: int) -> Words:
-        return (await bus.read(UNIT, register(number), Priority.REFRESH)).words
+    async def job(number: int) -> bytes:
+        return (await bus.read(UNIT, register(number), Priority.REFRESH)).data
 
     tasks: list[Task] = []
     with link.held():
@@ -781,23 +785,23 @@ def test_cancelling_what_has_ended_does_nothing(bus: Bus) -> None:
 def test_cancelled_task_may_still_talk_while_it_cleans_up(bus: Bus, link: FakeLink) -> None:
     ready = threading.Event()
 
-    async def job() -> Words:
+    async def job() -> bytes:
         try:
             await bus.sleep(3600)
         except Cancelled:
-            return (await bus.read(UNIT, register(8), Priority.STOP)).words
-        return ()
+            return (await bus.read(UNIT, register(8), Priority.STOP)).data
+        return b''
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         if not ready.is_set():
             ready.set()
             raise NotReady(time.monotonic() + 0.01)
-        return (done.number,)
+        return packed(done.number)
 
     link.answer = answer
     task = spawned(bus, job())
     bus.call(lambda: bus.cancel(task))
-    assert result(task.future) == (8,)
+    assert result(task.future) == packed(8)
 
 
 def test_current_task(bus: Bus) -> None:
@@ -818,23 +822,23 @@ def test_current_task(bus: Bus) -> None:
 def test_unit_in_doubt_keeps_nobody_waiting(bus: Bus, link: FakeLink) -> None:
     ready = threading.Event()
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         if done.unit == UNIT and not ready.is_set():
             raise NotReady(time.monotonic() + 0.01)
-        return (done.number,)
+        return packed(done.number)
 
     link.answer = answer
     writer = Writer(bus)
     writer.want(7)
     mine = ask(bus, 1, Priority.SERVICE)
     for number in range(10):
-        assert result(ask(bus, number, Priority.REFRESH, unit=OTHER)) == (number,)
+        assert result(ask(bus, number, Priority.REFRESH, unit=OTHER)) == packed(number)
     assert not mine.done()
     assert writer.outcomes == []
     ready.set()
-    assert result(mine) == (1,)
+    assert result(mine) == packed(1)
     wait_until(lambda: writer.outcomes)
-    assert writer.outcomes == [((7,), None)]
+    assert writer.outcomes == [(packed(7), None)]
     # nothing was sent while it was in doubt, so nothing is counted
     assert bus.statistics().transactions == 12
 
@@ -842,11 +846,11 @@ def test_unit_in_doubt_keeps_nobody_waiting(bus: Bus, link: FakeLink) -> None:
 def test_cancelled_while_its_unit_is_in_doubt(bus: Bus, link: FakeLink) -> None:
     asked = threading.Event()
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         if done.number == 66:
             asked.set()
             raise NotReady(time.monotonic() + 0.02)
-        return (done.number,)
+        return packed(done.number)
 
     async def job() -> None:
         await bus.read(UNIT, register(66), Priority.POLL)
@@ -868,7 +872,7 @@ def test_cancelled_while_its_unit_is_in_doubt(bus: Bus, link: FakeLink) -> None:
 
 
 def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
-    assert result(ask(bus, 1, Priority.POLL)) == (1,)
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
     assert bus.port_error is None
     gone = PortError('gone')
     link.answer = raiser(gone)
@@ -888,12 +892,39 @@ def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
     # who asks now is told at once
     assert isinstance(failure(ask(bus, 1, Priority.STOP)), PortError)
     sent = len(link.done)
-    link.answer = lambda done: (done.number,)
+    link.answer = lambda done: packed(done.number)
     link.opening = lambda: None
     wait_until(lambda: bus.port_error is None)
-    assert result(ask(bus, 2, Priority.POLL)) == (2,)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
     assert len(link.done) == sent + 1
     assert bus.statistics().reconnects == 1
+
+
+def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
+    bus: Bus, link: FakeLink
+) -> None:
+    link.answer = raiser(PortError('gone'))
+    tasks: list[Task] = []
+
+    async def end_the_other() -> None:
+        try:
+            await bus.read(UNIT, register(1), Priority.POLL)
+        except PortError:
+            bus.cancel(tasks[0])
+            raise
+
+    async def wait_behind() -> None:
+        tasks.append(bus.current)
+        await bus.read(UNIT, register(2), Priority.POLL)
+
+    with link.held():
+        lost = hold(bus, link)
+        first = bus.run(end_the_other())
+        ended = bus.run(wait_behind())
+        last = ask(bus, 3, Priority.POLL)
+    for future in (lost, first, last):
+        assert isinstance(failure(future), PortError)
+    assert isinstance(failure(ended), Cancelled)
 
 
 def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -905,7 +936,7 @@ def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.Monkey
     assert str(failure(ask(bus, 1, Priority.POLL))) == 'absent'
     link.opening = lambda: None
     wait_until(lambda: bus.port_error is None)
-    assert result(ask(bus, 2, Priority.POLL)) == (2,)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
     # it was opened once, so nothing was reconnected
     assert bus.statistics().reconnects == 0
     bus.close()
@@ -945,7 +976,7 @@ def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:
     for times in range(1, 4):
         link.answer = raiser(PortError('gone'))
         failure(ask(bus, 1, Priority.POLL))
-        link.answer = lambda done: (done.number,)
+        link.answer = lambda done: packed(done.number)
         wait_until(lambda times=times: bus.statistics().reconnects == times)
 
 
@@ -988,7 +1019,7 @@ def test_close_waits_for_the_transaction_on_the_line(link: FakeLink) -> None:
         assert link.closed == 0
     closer.join(PATIENCE)
     assert link.closed == 1
-    assert result(future) == (0,)
+    assert result(future) == packed(0)
 
 
 def test_coroutine_that_will_not_end_does_not_keep_the_bus(link: FakeLink) -> None:
@@ -1039,12 +1070,12 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
     ]
     steps = iter(script)
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         took, error = next(steps)
         clock.now += took
         if error is not None:
             raise error
-        return (1,)
+        return packed(1)
 
     link.answer = answer
     bus = Bus(link)

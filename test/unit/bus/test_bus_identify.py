@@ -22,8 +22,9 @@ from collections.abc import Iterator
 from fake_link import PATIENCE
 from fake_link import Done
 from fake_link import FakeLink
-from fake_link import register
 import pytest
+from support.addresses import packed
+from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
@@ -35,7 +36,6 @@ from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 
 _UNIT = 1
 _FIRST, _SECOND, _STOP = 43, 17, 99
@@ -83,11 +83,11 @@ def bus(link: _Link) -> Iterator[Bus]:
     bus.close()
 
 
-def _failing(error: Exception, *numbers: int) -> Callable[[Done], Words]:
-    def answer(done: Done) -> Words:
+def _failing(error: Exception, *numbers: int) -> Callable[[Done], bytes]:
+    def answer(done: Done) -> bytes:
         if done.number in numbers:
             raise error
-        return (done.number,)
+        return packed(done.number)
 
     return answer
 
@@ -101,7 +101,7 @@ def test_each_question_is_asked_once(link: _Link, bus: Bus) -> None:
 
 def test_a_stop_goes_between_two_questions(link: _Link, bus: Bus) -> None:
     async def stop() -> None:
-        await bus.write(_UNIT, register(_STOP), (0,), Priority.STOP)
+        await bus.write(_UNIT, register(_STOP), packed(0), Priority.STOP)
 
     with link.held():
         inquiry = bus.run(bus.identify(_UNIT, Priority.SERVICE))
@@ -129,11 +129,11 @@ def test_what_fails_stays_unknown(link: _Link, bus: Bus, error: LinkError) -> No
 def test_what_cannot_be_asked_yet_is_asked_later(link: _Link, bus: Bus) -> None:
     refusals = iter([NotReady(0.0), NotReady(0.0)])
 
-    def answer(done: Done) -> Words:
+    def answer(done: Done) -> bytes:
         error = next(refusals, None)
         if error is not None:
             raise error
-        return (done.number,)
+        return packed(done.number)
 
     link.answer = answer
     found = bus.run(bus.identify(_UNIT, Priority.SERVICE)).result(PATIENCE)

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from fake_link import Done
 from fake_link import FakeLink
-from fake_link import register
 from fake_link import wait_until
+from support.addresses import packed
+from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
@@ -39,7 +40,7 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
         # wanted again before it is written: somebody publishes faster than the line can carry
         for slot in slots:
             bus.request(slot)
-        return Transfer(1, register(_SETPOINT), Priority.SETPOINT, (1,))
+        return Transfer(1, register(_SETPOINT), Priority.SETPOINT, packed(1))
 
     slots = [Slot(write, lambda transfer, error: None) for _ in range(8)]
 

@@ -22,12 +22,13 @@ from typing import Any
 from typing import cast
 
 import pytest
+from support.addresses import packed
+from support.addresses import register
 
 from nfo_sinus_driver.jobs import Priority
 from nfo_sinus_driver.jobs import Slot
 from nfo_sinus_driver.jobs import Task
 from nfo_sinus_driver.jobs import Transfer
-from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.turns import BACKGROUND_SHARE
 from nfo_sinus_driver.turns import Turns
 from nfo_sinus_driver.turns import Waiting
@@ -43,7 +44,7 @@ def entry(kind: object, name: str = '') -> Slot | Waiting:
     """Something that waits; a name stands for its task."""
     if kind == _SLOT:
         return Slot(lambda: None, lambda transfer, error: None)
-    transfer = Transfer(1, Address((1,), 1), cast(Priority, kind))
+    transfer = Transfer(1, register(1), cast(Priority, kind))
     return Waiting(cast(Task, name), transfer)
 
 
@@ -107,9 +108,10 @@ def test_equals_go_in_the_order_they_came(kind: object) -> None:
 def test_who_is_told_to_stop_goes_before_who_is_asked_whether_he_does() -> None:
     turns = Turns()
     look = entry(Priority.STOP, 'look')
-    address = Address((1,), 1)
+    address = register(1)
     stops = [
-        Waiting(cast(Task, name), Transfer(1, address, Priority.STOP, (0,))) for name in ('1', '2')
+        Waiting(cast(Task, name), Transfer(1, address, Priority.STOP, packed(0)))
+        for name in ('1', '2')
     ]
     for waiting in (look, *stops):
         turns.add(waiting)
@@ -149,7 +151,7 @@ def test_set_points_without_end_halve_the_turns_of_polls_and_background_alike(
 def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     silent, timeout = {7, 8}, 0.2
     turns = Turns(silent.__contains__)
-    polls = {unit: Transfer(unit, Address((1,), 1), Priority.POLL) for unit in (1, 2, 7, 8)}
+    polls = {unit: Transfer(unit, register(1), Priority.POLL) for unit in (1, 2, 7, 8)}
     for transfer in polls.values():
         turns.add(Waiting(cast(Task, ''), transfer))
     took: Counter[int] = Counter()
@@ -281,7 +283,7 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
 
 def stop_of(unit: int) -> Waiting:
     """A stop that waits."""
-    transfer = Transfer(unit, Address((1,), 1), Priority.STOP, (0,))
+    transfer = Transfer(unit, register(1), Priority.STOP, packed(0))
     return Waiting(cast(Task, f'stop {unit}'), transfer)
 
 
@@ -313,7 +315,7 @@ def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
 ) -> None:
     turns = Turns({2, 4}.__contains__)
     urgent, silent = entry(kind), stop_of(2)
-    retry = Waiting(cast(Task, 'retry'), Transfer(4, Address((1,), 1), Priority.POLL))
+    retry = Waiting(cast(Task, 'retry'), Transfer(4, register(1), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
         turns.add(waiting)
     # it costs so much that everybody else has a claim on the line
@@ -341,7 +343,7 @@ def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
 
 def poll_of(unit: int) -> Waiting:
     """A poll of one unit."""
-    return Waiting(cast(Task, 'poll'), Transfer(unit, Address((1,), 1), Priority.POLL))
+    return Waiting(cast(Task, 'poll'), Transfer(unit, register(1), Priority.POLL))
 
 
 def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
@@ -364,7 +366,7 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
 ) -> None:
     missing: set[int] = set()
     turns = Turns(missing.__contains__, missing.__contains__)
-    waiting = Waiting(cast(Task, 'asks'), Transfer(7, Address((1,), 1), kind))
+    waiting = Waiting(cast(Task, 'asks'), Transfer(7, register(1), kind))
     turns.add(waiting)
     missing.add(7)
     assert turns.take(missing=False) is None

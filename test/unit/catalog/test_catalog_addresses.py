@@ -85,7 +85,7 @@ def test_keys_and_addresses_are_unique() -> None:
         for parameter in MODBUS
         for register in range(
             parameter.at('modbus').index,
-            parameter.at('modbus').index + parameter.at('modbus').words,
+            parameter.at('modbus').index + parameter.at('modbus').codec.size // 2,
         )
     ]
     ids = [number for p in CLASSIC for number in p.at('classic').numbers]
@@ -119,7 +119,7 @@ def test_the_three_formulas(parameter: Parameter) -> None:
     place = parameter.at('modbus')
     assert place.index == base + offset
     # no parameter reaches into the next instance
-    assert offset + place.words <= 4
+    assert offset + place.codec.size // 2 <= 4
 
 
 def test_what_only_one_bus_has() -> None:
@@ -157,12 +157,15 @@ def test_error_log_is_where_no_parameter_is() -> None:
     assert classic.address(127) == 0x2FE
     assert modbus.entries == classic.entries == 32
     assert G2.error_logs['profibus'].address(31) == 13188
+    # on Classic each word has an id of its own
+    assert modbus.place(1) == ('register', 0xC004, None, 4)
+    assert classic.place(1) == ('id', 0x202, 0x203, 4)
     for area, rows, protocol in (
         (modbus, MODBUS, 'modbus'),
         (classic, CLASSIC, 'classic'),
     ):
         taken = {number for row in rows for number in row.at(protocol).occupied}
-        words = range(area.words)
+        words = range(area.codec.size // 2)
         log = {(area.address(n) + word,) for n in range(area.limit) for word in words}
         assert taken.isdisjoint(log)
         for entry in (-1, area.limit):

@@ -18,9 +18,9 @@
 from __future__ import annotations
 
 import pytest
+from support.addresses import packed
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 G2 = load_family('sinus_g2')
@@ -145,11 +145,11 @@ def test_enumeration_is_well_formed(key: str) -> None:
     assert not any(',' in label or '|' in label for label in labels)
     for protocol, place in row.addresses.items():
         assert place.factor == 1
-        assert place.words == 1
+        assert place.codec.size == 2
         for code, label in row.labels.items():
             assert place.number.fits(code)
-            words = row.encode(row.kind(label) if row.kind is not bool else label, protocol)
-            assert place.number.decode(to_bytes(words)) == code
+            data = row.encode(row.kind(label) if row.kind is not bool else label, protocol)
+            assert place.number.decode(data) == code
 
 
 def test_type_of_enumerations() -> None:
@@ -166,7 +166,7 @@ def test_type_of_enumerations() -> None:
 @pytest.mark.parametrize('key', ['freque.op_mode', 'speed.op_mode'])
 def test_any_bus_is_read_and_never_offered(key: str) -> None:
     # 193 is in [M2 table 1] only [C19]
-    assert G2[key].decode((193,)) == '193'
+    assert G2[key].decode(packed(193)) == '193'
     with pytest.raises(ValueError, match="'AnyBus' is none of Terminal"):
         G2[key].encode('AnyBus')
 
@@ -183,9 +183,9 @@ def test_sources_of_the_setpoint_are_start_commands_too() -> None:
 def test_amplification_is_one_of_two_numbers(protocol: str) -> None:
     row = G2['pi_reg.reg_amp']
     assert row.kind is int
-    assert row.encode(-1, protocol) == (0xFFFF,)
-    assert row.encode(1, protocol) == (1,)
-    assert row.decode((0xFFFF,), protocol) == -1
+    assert row.encode(-1, protocol) == packed(0xFFFF)
+    assert row.encode(1, protocol) == packed(1)
+    assert row.decode(packed(0xFFFF), protocol) == -1
     for value in (0, -2, 2, 0.5, float('nan'), float('inf'), True):
         with pytest.raises(ValueError, match=r'^pi_reg\.reg_amp: .* is none of -1, 1$'):
             row.encode(value, protocol)

@@ -26,7 +26,6 @@ from setting_names import SETTINGS
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_words
 
 G2 = load_family('sinus_g2')
 NAMES = Path(__file__).resolve().parents[4] / 'shared' / 'design' / 'parameter_names.csv'
@@ -39,7 +38,7 @@ ROS_TYPES = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
 def test_zero_is_of_the_parameters_kind(parameter: Parameter) -> None:
     for protocol, place in parameter.addresses.items():
         raw = next(iter(parameter.labels), 0)
-        value = parameter.decode(to_words(place.number.encode(raw)), protocol)
+        value = parameter.decode(place.number.encode(raw), protocol)
         assert type(value) is parameter.kind
 
 

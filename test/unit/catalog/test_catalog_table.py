@@ -20,13 +20,13 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+from support.addresses import packed
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_words
 
 G2 = load_family('sinus_g2')
 ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))
@@ -172,11 +172,11 @@ SCALED_OTHERWISE = {
 }
 
 
-def words_of(parameter: Parameter, protocol: str, value: Fraction) -> tuple[int, ...]:
-    """The words of an exact value; fails unless it is a whole number of counts that fits."""
+def bytes_of(parameter: Parameter, protocol: str, value: Fraction) -> bytes:
+    """The bytes of an exact value; fails unless it is a whole number of counts that fits."""
     raw = value / parameter.factor(protocol)
     assert raw.denominator == 1, f'{parameter.key}: {value} is between two counts'
-    return to_words(parameter.at(protocol).number.encode(raw.numerator))
+    return parameter.at(protocol).number.encode(raw.numerator)
 
 
 @ROWS
@@ -193,7 +193,7 @@ def test_row_is_consistent(parameter: Parameter) -> None:
         assert protocol == address.protocol
         assert all(0 <= number <= 0xFFFF for number in address.numbers)
         if protocol in ('modbus', 'classic'):
-            assert len(address.numbers) == (address.words if protocol == 'classic' else 1)
+            assert len(address.numbers) == (address.codec.size // 2 if protocol == 'classic' else 1)
         assert address.source.startswith('M0 table ')
         assert address.factor > 0
 
@@ -203,7 +203,7 @@ def test_range_is_made_of_counts_that_fit(parameter: Parameter) -> None:
     for protocol in parameter.addresses:
         for bound in (parameter.minimum, parameter.maximum):
             if bound is not None:
-                words_of(parameter, protocol, bound)
+                bytes_of(parameter, protocol, bound)
         for code in parameter.labels:
             codec = parameter.at(protocol).number
             assert codec.size == 2
@@ -309,8 +309,8 @@ def test_golden_row(
     row = G2[key]
     place = row.at('modbus')
     assert (place.index, place.codec.name, row.unit) == (register, CODECS[type_], unit)
-    assert row.decode(words) == value
-    assert row.encode(value) == words
+    assert row.decode(packed(*words)) == value
+    assert row.encode(value) == packed(*words)
 
 
 @pytest.mark.parametrize(('key', 'ids', 'type_', 'value', 'words'), GOLDEN_CLASSIC)
@@ -320,15 +320,15 @@ def test_golden_row_of_classic(
     row = G2[key]
     place = row.at('classic')
     assert (place.numbers, place.codec.name) == (ids, CODECS[type_])
-    assert row.decode(words, 'classic') == value
-    assert row.encode(value, 'classic') == words
+    assert row.decode(packed(*words), 'classic') == value
+    assert row.encode(value, 'classic') == packed(*words)
 
 
 def test_parameter_that_is_not_on_a_bus_says_so() -> None:
     with pytest.raises(KeyError, match=r'control\.any_bus cannot be reached over modbus'):
         G2['control.any_bus'].at('modbus')
     with pytest.raises(KeyError, match='cannot be reached over classic'):
-        G2['fieldbus.profidrive_status'].decode((0,), 'classic')
+        G2['fieldbus.profidrive_status'].decode(packed(0), 'classic')
 
 
 def test_model_is_a_mapping_of_its_parameters() -> None:

@@ -22,6 +22,7 @@ from fractions import Fraction
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.addresses import packed
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
@@ -142,7 +143,7 @@ def test_texts_of_old_firmware(firmware: str, old: bool) -> None:
 def test_texts_of_firmware_as_it_is_read() -> None:
     # SWVer comes as a binary fraction, a hair beside 4.28
     for raw, text in ((428, 'Bus Stby'), (427, 'Sio Stby')):
-        firmware = Fraction(G2['fieldbus.sw_ver'].decode((raw,)))
+        firmware = Fraction(G2['fieldbus.sw_ver'].decode(packed(raw)))
         assert G2.status_code(37).shown(firmware) == text
 
 

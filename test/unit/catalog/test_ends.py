@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from support.addresses import packed
 from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
 
@@ -56,7 +57,7 @@ def test_where_it_stands(ends: Ends) -> None:
         assert 'modbus' not in row.addresses
     else:
         assert row.at('modbus').index == ends.register
-    assert row.at(protocol).words == ends.words
+    assert row.at(protocol).codec.size == 2 * ends.words
     assert tuple(f'E{id_:04X}' for id_ in row.at('classic').numbers) == ends.classic
 
 
@@ -75,8 +76,8 @@ def test_both_ends_there_and_back(ends: Ends) -> None:
     row, protocol = parameter(ends)
     for value, words in ((ends.low, ends.low_words), (ends.high, ends.high_words)):
         assert len(words) == ends.words
-        assert row.encode(value, protocol) == words
-        back = row.decode(words, protocol)
+        assert row.encode(value, protocol) == packed(*words)
+        back = row.decode(packed(*words), protocol)
         assert back == value
         assert type(back) is type(value)
 
@@ -106,6 +107,6 @@ def test_between_two_steps(ends: Ends) -> None:
 def test_every_label(ends: Ends) -> None:
     row, protocol = parameter(ends)
     for label, code in ends.codes:
-        assert row.encode(label, protocol) == (code,)
-        assert row.decode((code,), protocol) == label
+        assert row.encode(label, protocol) == packed(code)
+        assert row.decode(packed(code), protocol) == label
     assert {(label, code) for code, label in row.labels.items()} == set(ends.codes)

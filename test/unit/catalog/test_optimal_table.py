@@ -24,12 +24,12 @@ from hypothesis import example
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.addresses import packed
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import family
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.drive.settings import DriveSettings
 
 G2 = load_family('sinus_g2')
@@ -87,8 +87,8 @@ def test_register(
     assert place.codec.name == f'{type_.lower()}_{"ws" if last > first else "be"}'
     assert row.access is Access(access)
     assert row.unit == unit
-    assert row.decode(words) == pytest.approx(value, abs=1e-9)
-    assert row.encode(value) == words
+    assert row.decode(packed(*words)) == pytest.approx(value, abs=1e-9)
+    assert row.encode(value) == packed(*words)
 
 
 def test_registers_are_used_once() -> None:
@@ -128,9 +128,9 @@ def test_the_same_thing_has_the_same_key() -> None:
 def test_counters_are_not_those_of_the_g2() -> None:
     # 36 s a tick against a tenth of an hour: ten times wrong if mixed [C48]
     for key in ('status.op_time', 'status.rn_time'):
-        assert OPTIMAL[key].decode((100, 0)) == 1
-        assert G2[key].decode((100, 0)) == 10
-        assert OPTIMAL[key].decode((0, 0x8000)) == pytest.approx(21474836.48)
+        assert OPTIMAL[key].decode(packed(100, 0)) == 1
+        assert G2[key].decode(packed(100, 0)) == 10
+        assert OPTIMAL[key].decode(packed(0, 0x8000)) == pytest.approx(21474836.48)
 
 
 @given(WORD, WORD)
@@ -143,13 +143,13 @@ def test_counters_are_not_those_of_the_g2() -> None:
 def test_every_register_there_and_back(low: int, high: int) -> None:
     for row in OPTIMAL.values():
         place = row.at('modbus')
-        words = (low, high)[: place.words]
-        value = row.decode(words)
+        data = packed(low, high)[: place.codec.size]
+        value = row.decode(data)
         assert type(value) is row.kind
         assert isinstance(value, (int, float))
-        assert value == float(place.number.decode(to_bytes(words)) * row.factor('modbus'))
-        assert row.encode(value) == words
-        assert row.quantise(value) == words
+        assert value == float(place.number.decode(data) * row.factor('modbus'))
+        assert row.encode(value) == data
+        assert row.quantise(value) == data
 
 
 def test_it_is_one_of_the_models() -> None:

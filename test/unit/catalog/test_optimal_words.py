@@ -282,7 +282,7 @@ def test_facts_are_those_of_the_message() -> None:
 )
 def test_fact_of_a_bit(bit: int, facts: Fact) -> None:
     for listed in Kind:
-        assert OPTIMAL.status_word.facts(1 << bit, listed) == facts
+        assert OPTIMAL.profile.status_word.facts(1 << bit, listed) == facts
 
 
 @pytest.mark.parametrize(
@@ -307,23 +307,23 @@ def test_fact_of_a_bit(bit: int, facts: Fact) -> None:
     ],
 )
 def test_fact_of_a_bit_of_the_g2(bit: int, facts: Fact) -> None:
-    assert G2.status_word.facts(1 << bit, Kind.STATUS) == facts
+    assert G2.profile.status_word.facts(1 << bit, Kind.STATUS) == facts
 
 
 @pytest.mark.parametrize(
     ('word', 'quick'), [(0x8007, True), (0xC003, True), (0x8027, False), (0x0000, False)]
 )
 def test_quick_stop_of_the_g2_is_told_by_the_state(word: int, quick: bool) -> None:
-    assert (Fact.QUICK_STOP_ACTIVE in G2.status_word.facts(word, Kind.STATUS)) == quick
+    assert (Fact.QUICK_STOP_ACTIVE in G2.profile.status_word.facts(word, Kind.STATUS)) == quick
 
 
 def test_facts_that_a_model_does_not_tell() -> None:
     everything = Fact(0x1FFFF)
-    assert everything & ~G2.status_word.valid == (
+    assert everything & ~G2.profile.status_word.valid == (
         Fact.SLEEPING | Fact.STOP_MODE_BRAKE | Fact.RUN_INPUT_MISSING
     )
     # C55: bits 4 and 5 are echoes, 6 is the RUN input, 8 is not used
-    assert everything & ~OPTIMAL.status_word.valid == (
+    assert everything & ~OPTIMAL.profile.status_word.valid == (
         Fact.VOLTAGE_ENABLED
         | Fact.QUICK_STOP_ACTIVE
         | Fact.SWITCH_ON_DISABLED
@@ -334,7 +334,7 @@ def test_facts_that_a_model_does_not_tell() -> None:
 @pytest.mark.parametrize('name', families())
 @given(word=WORD, listed=KIND)
 def test_nothing_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -> None:
-    tells = load_family(name).status_word
+    tells = load_family(name).profile.status_word
     facts = tells.facts(word, listed)
     assert not facts & ~tells.valid
     # the bits and the kind never contradict each other
@@ -358,12 +358,12 @@ def test_nothing_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -
 )
 def test_the_bits_have_the_last_word(word: int, listed: Kind, g2: Kind, optimal: Kind) -> None:
     # [C50], [C95]
-    assert G2.status_word.kind(word, listed) is g2
-    assert OPTIMAL.status_word.kind(word, listed) is optimal
+    assert G2.profile.status_word.kind(word, listed) is g2
+    assert OPTIMAL.profile.status_word.kind(word, listed) is optimal
 
 
 def test_each_family_has_its_own_words() -> None:
-    assert (G2.modes, OPTIMAL.modes) == (set(words.Mode), set(Mode))
+    assert (set(G2.profile.holders), set(OPTIMAL.profile.holders)) == (set(words.Mode), set(Mode))
     # an Optimal that is enabled and waits looks to the G2's eyes like no state at all
-    assert G2.status_word.state(0x0205) is State.UNKNOWN
-    assert OPTIMAL.status_word.state(0x0205) is State.SWITCHED_ON
+    assert G2.profile.status_word.state(0x0205) is State.UNKNOWN
+    assert OPTIMAL.profile.status_word.state(0x0205) is State.SWITCHED_ON

@@ -25,7 +25,6 @@ import yaml
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.cli.parameter_file import HEADER
 from nfo_sinus_driver.cli.parameter_file import format_file
 from nfo_sinus_driver.cli.parameter_file import parse_file
@@ -42,7 +41,7 @@ def values_of(parameter: Parameter) -> st.SearchStrategy[Value]:
         raws = st.sampled_from(sorted(parameter.labels))
     else:
         raws = st.integers(codec.minimum, codec.maximum)
-    return raws.map(lambda raw: parameter.decode(to_words(codec.encode(raw)), protocol))
+    return raws.map(lambda raw: parameter.decode(codec.encode(raw), protocol))
 
 
 EVERYTHING = st.fixed_dictionaries(

@@ -36,6 +36,9 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from support.addresses import Words
+from support.addresses import packed
+from support.addresses import words_of
 from support.wire import crc
 
 from nfo_sinus_driver.bus import Bus
@@ -53,7 +56,6 @@ from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Refused as FarRefusal
@@ -184,6 +186,9 @@ class DirectLink:
     def close(self) -> None:
         pass
 
+    def parts(self, address: Address) -> tuple[Address]:
+        return (address,)
+
     def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
         pass
 
@@ -193,20 +198,19 @@ class DirectLink:
     def read(self, unit: int, address: Address) -> Reply:
         if self._rig.clock.now < self._not_ready_until:
             raise NotReady(self._not_ready_until)
-        register, count = address.numbers[0], address.words
+        register, count = address.index, address.size // 2
         request = struct.pack('>BBHH', unit, 3, register, count)
         words = self._exchange(
             request, 5 + 2 * count, lambda far: server(far).read(register, count)
         )
-        return Reply(words, self._rig.clock.now)
+        return Reply(packed(*words), self._rig.clock.now)
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
-        register, count = address.numbers[0], address.words
-        if count == 1:
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        register, words = address.index, words_of(data)
+        if len(words) == 1:
             request = struct.pack('>BBHH', unit, 6, register, words[0])
         else:
-            head = struct.pack('>BBHHB', unit, 16, register, count, 2 * count)
-            request = head + struct.pack(f'>{count}H', *words)
+            request = struct.pack('>BBHHB', unit, 16, register, len(words), len(data)) + data
 
         def carry_out(far: SimulatedDrive) -> Words:
             server(far).write(register, words)
@@ -214,30 +218,28 @@ class DirectLink:
 
         self._rig.judge(lambda: self._rig.wrote(register, words))
         self._exchange(request, 8, carry_out)
-        return Reply((), self._rig.clock.now)
+        return Reply(b'', self._rig.clock.now)
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
-        register, count, size = address.numbers[0], source.words, len(words)
-        head = struct.pack(
-            '>BB4HB', unit, 23, source.numbers[0], count, register, size, 2 * size
-        )
-        request = head + struct.pack(f'>{size}H', *words)
+        register, count, words = address.index, source.size // 2, words_of(data)
+        where = (source.index, count, register, len(words))
+        request = struct.pack('>BB4HB', unit, 23, *where, len(data)) + data
         self._rig.judge(lambda: self._rig.wrote(register, words))
         told = self._exchange(
             request,
             5 + 2 * count,
-            lambda far: server(far).write_and_read(register, words, source.numbers[0], count),
+            lambda far: server(far).write_and_read(register, words, source.index, count),
         )
-        return Reply(told, self._rig.clock.now)
+        return Reply(packed(*told), self._rig.clock.now)
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NotReady):
             self.read(unit, source)
-        return self.write(unit, address, words)
+        return self.write(unit, address, data)
 
     def _require_port(self) -> None:
         if self.state == 'gone':

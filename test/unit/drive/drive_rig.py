@@ -29,6 +29,8 @@ from typing import Any
 
 import pytest
 from support import trace_laws
+from support.addresses import Words
+from support.addresses import words_of
 from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
@@ -43,7 +45,6 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -107,29 +108,30 @@ class Tap:
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         self.open = link.open
         self.close = link.close
+        self.parts = link.parts
         self.use_probes = link.use_probes
         self.identify = link.identify
 
     def read(self, unit: int, address: Address) -> Reply:
-        self.before(address.numbers[0], None)
+        self.before(address.index, None)
         return self._link.read(unit, address)
 
-    def write(self, unit: int, address: Address, words: Words) -> Reply:
-        self.before(address.numbers[0], words)
-        return self._link.write(unit, address, words)
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        self.before(address.index, words_of(data))
+        return self._link.write(unit, address, data)
 
     def write_and_read(
-        self, unit: int, address: Address, words: Words, source: Address
+        self, unit: int, address: Address, data: bytes, source: Address
     ) -> Reply:
-        self.before(address.numbers[0], words)
-        return self._link.write_and_read(unit, address, words, source)
+        self.before(address.index, words_of(data))
+        return self._link.write_and_read(unit, address, data, source)
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, words: Words
+        self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
-        self.before(source.numbers[0], None)
-        self.before(address.numbers[0], words)
-        return self._link.read_then_write(unit, source, address, words)
+        self.before(source.index, None)
+        self.before(address.index, words_of(data))
+        return self._link.read_then_write(unit, source, address, data)
 
 
 class Rig:

@@ -175,7 +175,7 @@ class NoiseRig(Rig):
 
     def register(self, key: str) -> int:
         """Return where a parameter stands."""
-        return self.drive._registers.address(key).numbers[0]
+        return self.drive._registers.address(key).index
 
     @property
     def ends(self) -> list[str]:

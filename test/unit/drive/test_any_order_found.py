@@ -24,6 +24,7 @@ from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
+from support.addresses import Words
 from test_any_order import AnyOrder
 from test_any_order import G2DriveControl
 from test_any_order import G2ModeScmd
@@ -33,7 +34,6 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 
 BUS_FAIL = 15
 

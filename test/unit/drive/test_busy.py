@@ -25,12 +25,12 @@ from drive_rig import SCMD
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 
 ACCEL = 0x2B0
 FREQUENCY = 0x3FC
@@ -88,7 +88,7 @@ def test_a_stop_is_tried_on(rig: Rig) -> None:
 
 def test_a_setpoint_is_written_again(rig: Rig) -> None:
     rig.turn(20.0)
-    register = rig.drive._registers.address('status.frq_set').numbers[0]
+    register = rig.drive._registers.address('status.frq_set').index
     busy = Busy(rig, 3, register, writes=True)
     rig.publish(10.0)
     rig.wait_for_frequency(10.0)
@@ -98,7 +98,7 @@ def test_a_setpoint_is_written_again(rig: Rig) -> None:
 
 def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
     rig.turn(20.0)
-    register = rig.drive._registers.address('status.frq_set').numbers[0]
+    register = rig.drive._registers.address('status.frq_set').index
     Busy(rig, 10_000, register, writes=True)
     rig.publish(10.0)
     wait_until(lambda: not rig.drive.armed)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from drive_rig import MODE
 from drive_rig import RUN
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
@@ -26,7 +27,6 @@ from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
 
 _COMMANDS = {'sinus_g2': 'fieldbus.scmd', 'sinus_optimal': 'fieldbus.smode'}

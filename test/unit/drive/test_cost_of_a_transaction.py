@@ -22,6 +22,7 @@ from types import FrameType
 from typing import Any
 
 from any_order_rig import Clock
+from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
@@ -163,11 +164,11 @@ def test_a_transaction_costs_no_more_with_many_drives() -> None:
 
 
 def test_a_request_that_comes_again_is_prepared_once() -> None:
-    frame = rtu.encode(read_of(7, 0x258, 2))
-    assert rtu.encode(read_of(7, 0x258, 2)) is frame
+    frame = rtu.encode(read_of(7, register(0x258, 2)))
+    assert rtu.encode(read_of(7, register(0x258, 2))) is frame
     kept = rtu.encode.cache_info().maxsize
     assert kept is not None
     for unit in range(kept // 8 + 1):
-        for register in range(8):
-            rtu.encode(read_of(unit % 248, 0x400 + unit // 248 * 8 + register, 1))
+        for number in range(8):
+            rtu.encode(read_of(unit % 248, register(0x400 + unit // 248 * 8 + number)))
     assert rtu.encode.cache_info().currsize <= kept

@@ -34,7 +34,7 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -47,7 +47,7 @@ ONLY_READ = {3, 17, 43}
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.2)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.2)
 
 
 # --- connecting -----------------------------------------------------------------------------------

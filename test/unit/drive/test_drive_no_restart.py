@@ -29,14 +29,14 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import watch as watch_module
-from nfo_sinus_driver.drive import withdrawal
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
@@ -86,7 +86,7 @@ def test_fault_that_ends_while_the_drive_is_polled_seldom(make_rig: MakeRig) -> 
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     # the drive refuses every command now, and its run command stands
-    wait_until(lambda: rig.drive._motion and rig.drive._motion.taking_back.held_by_fault)
+    wait_until(lambda: rig.drive.blocked_by_fault)
     with rig.simulator.lock:
         rig.far.faults.acknowledge()
         rig.far._settle()
@@ -439,7 +439,7 @@ def test_stop_during_the_start_delay(make_rig: MakeRig) -> None:
 def test_stop_when_nobody_answers_is_tried_on_and_on(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.5)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.5)
     rig = make_rig(retries=1)
     rig.turn()
     rig.set_response_timeout(0.1)
@@ -476,7 +476,7 @@ def test_exit_while_the_drive_restarts(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the same, and nobody polls any more whose answers would tell
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.2)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.2)
     rig = make_rig(retries=0)
     rig.turn()
     rig.set_response_timeout(0.2)
@@ -491,7 +491,7 @@ def test_exit_while_the_drive_restarts(
 def test_stop_that_is_refused_is_tried_on_and_on(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.3)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.3)
     rig.turn()
     write = rig.far.write_raw
 

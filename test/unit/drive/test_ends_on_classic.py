@@ -21,6 +21,7 @@ import re
 from types import SimpleNamespace
 
 import pytest
+from support.addresses import packed
 from support.classic_ends import OTHER_ON_CLASSIC
 from support.classic_ends import on_classic
 from support.parameter_ends import ENDS
@@ -42,8 +43,8 @@ def registers() -> Registers:
 @EVERY
 def test_both_ends_there_and_back(registers: Registers, ends: Ends) -> None:
     for value, words in ((ends.low, ends.low_words), (ends.high, ends.high_words)):
-        assert registers.words(ends.name, value) == words
-        back = registers.value(ends.name, words)
+        assert registers.encode(ends.name, value) == packed(*words)
+        back = registers.value(ends.name, packed(*words))
         assert back == value
         assert type(back) is type(value)
 
@@ -53,9 +54,9 @@ def test_one_step_beyond_each_end_and_between_two(registers: Registers, ends: En
     for value in (ends.below, ends.above, ends.between):
         if value is not None:
             with pytest.raises(ValueError, match=f'{re.escape(ends.name)}: '):
-                registers.words(ends.name, value)
+                registers.encode(ends.name, value)
     for neighbour in ends.neighbours or ():
-        assert registers.value(ends.name, registers.words(ends.name, neighbour)) == neighbour
+        assert registers.value(ends.name, registers.encode(ends.name, neighbour)) == neighbour
 
 
 @pytest.mark.parametrize('name', sorted(OTHER_ON_CLASSIC))

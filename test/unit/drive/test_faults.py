@@ -233,7 +233,7 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.drive._motion.taking_back.held_by_fault)
+    wait_until(lambda: rig.drive.blocked_by_fault)
     assert rig.far.control_unit.scmd == Scmd.FIELDBUS
     # its 2 s are over, and it runs again by itself
     with rig.simulator.lock:

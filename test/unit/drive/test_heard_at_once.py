@@ -25,14 +25,14 @@ from drive_rig import SCMD
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
+from support.addresses import register
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Words
 
 _STATUS, _INV_ST, _CONTROL_MODE = 0x258, 0x2A5, 0x29C
 #: What the others ask for: FrqAct.
-_CHATTER = Address((0x400,), 1)
+_CHATTER = register(0x400)
 
 
 @contextlib.contextmanager
@@ -120,5 +120,5 @@ def test_what_goes_on_as_it_did_has_no_claim_on_the_line(rig: Rig) -> None:
         rig.next_snapshots()
         asked = _asked(rig)[begun:]
     follows = [asked[number + 1 :][:1] for number, what in enumerate(asked) if what == _STATUS]
-    assert [_CHATTER.numbers[0]] in follows
+    assert [_CHATTER.index] in follows
     assert [_INV_ST] not in follows

@@ -20,6 +20,7 @@ from collections.abc import Callable
 import math
 
 import pytest
+from support.addresses import packed
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
@@ -54,9 +55,9 @@ class Spoiler:
 
     def _answer(self, unit: int, address: Address) -> Reply:
         reply = self._read(unit, address)
-        if self.left and address.numbers[0] == self._register:
+        if self.left and address.index == self._register:
             self.left -= 1
-            return reply._replace(words=self._words)
+            return reply._replace(data=packed(*self._words))
         return reply
 
 

@@ -26,6 +26,7 @@ from drive_rig import wait_until
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.addresses import packed
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Severity
@@ -284,9 +285,9 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
 
     def absurd(unit: int, address: Address) -> Reply:
         reply = read(unit, address)
-        if address.numbers[0] != hours:
+        if address.index != hours:
             return reply
-        return Reply((0xFFFF, 0x7FFF), reply.arrived)
+        return Reply(packed(0xFFFF, 0x7FFF), reply.arrived)
 
     monkeypatch.setattr(rig.link, 'read', absurd)
     # nobody looked for long, so that only the hours tell when the entry came

@@ -25,12 +25,12 @@ import random
 from drive_rig import MODE
 from drive_rig import SCMD
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.sinus.variant import ALL
 from nfo_sinus_driver.simulator.sinus.variant import DROPS
 from nfo_sinus_driver.simulator.sinus.variant import KEEPS

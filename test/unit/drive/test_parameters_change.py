@@ -40,7 +40,7 @@ from nfo_sinus_driver.drive.parameter_writer import ParameterError
 
 
 def register(rig: Rig, key: str) -> int:
-    return rig.drive.parameters._registers.address(key).numbers[0]
+    return rig.drive.parameters._registers.address(key).index
 
 
 # --- what is written ------------------------------------------------------------------------------

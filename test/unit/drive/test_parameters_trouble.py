@@ -80,7 +80,7 @@ def test_refusal_because_the_motor_runs(rig: Rig, monkeypatch: pytest.MonkeyPatc
     rig.publish(20.0)
     rig.wait_for_frequency(20.0)
     # it started after the driver had looked
-    parameters._words = {**parameters._words, 'motor.i_magn': parameters._registers.words(
+    parameters._data = {**parameters._data, 'motor.i_magn': parameters._registers.encode(
         'motor.i_magn', 2.0
     )}  # fmt: skip
     message = rig.refused(parameters.change({'motor.i_magn': 2.0}))

@@ -22,13 +22,13 @@ import itertools
 
 from any_order_rig import Notes
 import pytest
+from support.addresses import register
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 
 STATUS, INV_ST, FREQUENCY, SPEED, TORQUE = 0x258, 0x2A5, 0x400, 0x264, 0x40C
@@ -75,7 +75,7 @@ def fast(make_virtual: MakeVirtual, **settings: object) -> VirtualRig:
 
 async def busy(rig: VirtualRig) -> None:
     """Read something again and again, as other drives of a line are read."""
-    voltage = Address((rig.register('status.u_rms'),), 1)
+    voltage = register(rig.register('status.u_rms'))
     while True:
         await rig.bus.read(1, voltage, Priority.POLL)
 

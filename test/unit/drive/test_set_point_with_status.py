@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import pytest
+from support.addresses import Words
 from support.wire import Request
 from support.wire import understand
 from virtual_rig import MakeVirtual
@@ -24,7 +25,6 @@ from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 

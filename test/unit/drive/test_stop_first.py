@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Collection
 import threading
 
+from support.addresses import register
+
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Drive
@@ -27,14 +29,13 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 _PATIENCE = 60.0
 _EACH = 20
-_DRIVE_STATUS = Address((0x0258,), 2)
+_DRIVE_STATUS = register(0x0258, 2)
 _STOP = '010602980000'
 
 

@@ -28,6 +28,7 @@ from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
@@ -39,7 +40,6 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.sinus_g2 import control_unit
 
 WAYS: dict[str, Callable[[Drive], Future[str]]] = {
@@ -220,7 +220,7 @@ def test_a_stop_that_ends_with_the_driver_is_no_success(make_virtual: MakeVirtua
     stop = rig.drive.stop()
     rig.pass_time(0.05)
     # as the end of the bus does, which ends what it is to be confirmed by before who waits for it
-    sequence = rig.drive._motion._withdrawal._task
+    sequence = rig.drive._controller._sequence._task
     rig.bus.call(lambda: rig.bus.cancel(sequence))
     rig.pass_time(0.3)
     assert rig.far.motor.driven
@@ -248,7 +248,7 @@ def test_callers_who_were_answered_are_forgotten(make_virtual: MakeVirtual) -> N
     rig.pass_time(3.0)
     for _ in range(5):
         assert not answered(rig, rig.drive.stop())
-    assert not rig.drive._motion._withdrawal._task.joiners
+    assert not rig.drive._controller._sequence._task.joiners
 
 
 def test_what_was_seen_before_a_new_reason_to_stop_confirms_nothing(
@@ -262,7 +262,7 @@ def test_what_was_seen_before_a_new_reason_to_stop_confirms_nothing(
         if words is None and len(rig.written(SCMD)) > begun:
             # it is being looked whether the drive stops
             rig.before = lambda *_: None
-            rig.drive._motion.taking_back.begin_anew()
+            rig.drive._controller._sequence.request_anew()
 
     rig.before = know_better
     rig.answer(rig.drive.stop())

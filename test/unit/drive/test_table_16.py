@@ -29,11 +29,11 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.addresses import Words
 
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.drive import withdrawal
+from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator import motor as motor_module
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
@@ -422,12 +422,12 @@ def test_table_16_idle(make_rig: MakeRig, exits: Exits, words, wanted, cause: st
 def test_table_16_switched_on_that_is_left_while_it_is_being_enabled(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 0.3)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.3)
     rig = make_rig(control_method='drive_control')
     answer = when_switched_on(rig, lambda: command(rig, ON & ~Control.ENABLE_VOLTAGE))
     assert 'does not start' in answer or 'RUN input' in answer
     assert not rig.drive.armed
-    monkeypatch.setattr(withdrawal, 'PATIENCE', 2.0)
+    monkeypatch.setattr(confirmation, 'TIMEOUT', 2.0)
     assert_it_can_be_enabled(rig)
 
 

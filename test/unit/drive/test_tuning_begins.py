@@ -22,6 +22,7 @@ import itertools
 
 from drive_rig import SCMD
 import pytest
+from support.addresses import Words
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
@@ -29,7 +30,6 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Words
 
 STOPS: dict[str, Callable[[Drive], Future[str]]] = {
     'stop': lambda drive: drive.stop(),

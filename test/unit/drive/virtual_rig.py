@@ -21,6 +21,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import any_order_rig
+from support.addresses import Words
+from support.addresses import words_of
 from support.variants import hardest
 from support.wire import understand
 
@@ -29,7 +31,6 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Words
 from nfo_sinus_driver.simulator.family import simulated_drive
 
 #: What a drive takes to say that it is busy, s.
@@ -63,18 +64,18 @@ class VirtualRig(any_order_rig.Rig):
         write_and_read = self.link.write_and_read
 
         def meet_read(unit: int, address: Address) -> Reply:
-            self.before(address.numbers[0], None)
+            self.before(address.index, None)
             return read(unit, address)
 
-        def meet_write(unit: int, address: Address, words: Words) -> Reply:
-            self.before(address.numbers[0], words)
-            return write(unit, address, words)
+        def meet_write(unit: int, address: Address, data: bytes) -> Reply:
+            self.before(address.index, words_of(data))
+            return write(unit, address, data)
 
         def meet_write_and_read(
-            unit: int, address: Address, words: Words, source: Address
+            unit: int, address: Address, data: bytes, source: Address
         ) -> Reply:
-            self.before_both(address.numbers[0], words)
-            return write_and_read(unit, address, words, source)
+            self.before_both(address.index, words_of(data))
+            return write_and_read(unit, address, data, source)
 
         self.link.read, self.link.write = meet_read, meet_write
         self.link.write_and_read = meet_write_and_read  # type: ignore[method-assign]
@@ -97,7 +98,7 @@ class VirtualRig(any_order_rig.Rig):
 
     def register(self, key: str) -> int:
         """Return where a parameter stands."""
-        return self.drive._registers.address(key).numbers[0]
+        return self.drive._registers.address(key).index
 
     def be_busy(self, register: int, times: int = 1, *, writes: bool = False) -> None:
         """Have the drive say so many times that it is busy, to whoever reads or writes this."""

@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from support.addresses import packed
+from support.addresses import register
 from virtual_wire import Fate
 from virtual_wire import Slave
 from virtual_wire import Wire
@@ -34,12 +36,12 @@ TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
 UNIT = 1
 #: Probes of one word and of two, as a drive has them.
-ONE = Address((0x2A5,), 1)
-TWO = Address((0x258,), 2)
-A = Address((0x400,), 1)
-B = Address((0x264,), 1)
-C = Address((0x3EC,), 2)
-D = Address((0x2A8,), 2)
+ONE = register(0x2A5)
+TWO = register(0x258, 2)
+A = register(0x400)
+B = register(0x264)
+C = register(0x3EC, 2)
+D = register(0x2A8, 2)
 
 
 class Bench:
@@ -74,7 +76,7 @@ class Bench:
 
     def write(self, address: Address, *words: int, unit: int = UNIT) -> Reply:
         with self.wire.time():
-            return self.link.write(unit, address, words)
+            return self.link.write(unit, address, packed(*words))
 
     def expect(self, error: type[LinkError], action: Callable[[], object]) -> LinkError:
         with pytest.raises(error) as raised:
@@ -83,17 +85,17 @@ class Bench:
         return raised.value
 
     def write_and_read(
-        self, address: Address, words: tuple[int, ...], source: Address
+        self, address: Address, data: bytes, source: Address
     ) -> Reply:
         with self.wire.time():
-            return self.link.write_and_read(UNIT, address, words, source)
+            return self.link.write_and_read(UNIT, address, data, source)
 
     @property
     def asked(self) -> list[int]:
         """The registers of all requests so far."""
         return [register for _, _, register, _ in self.slave.requests]
 
-    def answer_of(self, number: int) -> tuple[int, ...]:
+    def answer_of(self, number: int) -> bytes:
         """What the slave says to the request with this number."""
-        _, _, register, count = self.slave.requests[number]
-        return self.slave.words(register, count, number)
+        _, _, place, count = self.slave.requests[number]
+        return packed(*self.slave.words(place, count, number))

@@ -26,6 +26,7 @@ from link_bench import Bench
 from link_bench import C
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
 
 # what holds for RTU holds for ASCII, unless it is about the silence between frames
 from test_rtu_link import test_babbling_line_is_no_reason_to_hang  # noqa: F401
@@ -88,7 +89,7 @@ def in_parts(bench: Bench, frame: bytes, cuts: list[int], pause: float) -> None:
 def test_frame_may_pause_as_long_as_it_may_take_to_begin(cuts: list[int]) -> None:
     bench = Bench()
     in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d'), cuts, 0.95 * TIMEOUT)
-    assert bench.read(A).words == (77,)
+    assert bench.read(A).data == packed(77)
 
 
 def test_frame_may_pause_for_a_second_at_most() -> None:
@@ -99,7 +100,7 @@ def test_frame_may_pause_for_a_second_at_most() -> None:
         # the time for the answer to begin is over with its first characters
         bench.wire.far_end = lambda frame, end, take=in_time: take(frame, end + 1.99)
         if whole:
-            assert bench.read(A).words == (77,)
+            assert bench.read(A).data == packed(77)
         else:
             bench.expect(DamagedAnswer, lambda bench=bench: bench.read(A))
 
@@ -116,7 +117,7 @@ def test_frame_that_pauses_longer_is_given_up() -> None:
 def test_lower_case_is_read() -> None:
     bench = Bench()
     in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\xab\xcd').lower(), [], 0.0)
-    assert bench.read(A).words == (0xABCD,)
+    assert bench.read(A).data == packed(0xABCD)
 
 
 def test_noise_costs_no_second() -> None:
@@ -139,15 +140,15 @@ def test_frame_begun_again_is_found() -> None:
     bench = Bench()
     frame = opinion.ascii_frame(b'\x01\x03\x02\x00\x4d')
     in_parts(bench, frame[:9] + frame, [9], 0.5 * TIMEOUT)
-    assert bench.read(A).words == (77,)
+    assert bench.read(A).data == packed(77)
 
 
 @pytest.mark.parametrize('baud', [1200, 57600])
 def test_answer_takes_as_long_as_it_is(baud: int) -> None:
     line = LineSettings(baud_rate=baud, char_format='7E1', response_timeout=0.02)
     bench = Bench([Fate(0.5)] * 2, line)
-    assert bench.read(C).words == bench.answer_of(0)
-    assert bench.read(B).words == bench.answer_of(1)
+    assert bench.read(C).data == bench.answer_of(0)
+    assert bench.read(B).data == bench.answer_of(1)
     bench.wire.check_gaps()
 
 

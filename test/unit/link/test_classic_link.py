@@ -32,6 +32,8 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 import pytest
+from support.addresses import classic_id
+from support.addresses import packed
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.classic_link import CHAR_FORMATS
@@ -52,10 +54,10 @@ TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=9600, char_format='7E1', response_timeout=TIMEOUT)
 UNIT = 1
 MODE = 0x29
-A = Address((0x1E,), 1)
-B = Address((0xB6,), 1)
+A = classic_id(0x1E)
+B = classic_id(0xB6)
 #: OpTime, as the manual prints it: the low word first.
-LONG = Address((0x27, 0x127), 2)
+LONG = classic_id(0x27, 0x127)
 
 _T = TypeVar('_T')
 
@@ -79,7 +81,7 @@ class Bench:
 
     def write(self, address: Address, *words: int, unit: int | None = None) -> Reply:
         unit = self.unit if unit is None else unit
-        return self.do(lambda: self.link.write(unit, address, words))
+        return self.do(lambda: self.link.write(unit, address, packed(*words)))
 
     def refused(self, code: int, *words: str) -> Refused:
         with pytest.raises(Refused) as raised:
@@ -94,9 +96,9 @@ class Bench:
         """The parameters of all requests so far."""
         return [number for _, number, _, _ in self.drive.requests]
 
-    def answer_of(self, index: int) -> tuple[int, ...]:
+    def answer_of(self, index: int) -> bytes:
         """What the drive says to the request with this index."""
-        return (self.drive.word(self.asked[index], index),)
+        return packed(self.drive.word(self.asked[index], index))
 
 
 # --- plain transactions ---------------------------------------------------------------------------
@@ -106,8 +108,8 @@ class Bench:
 @pytest.mark.parametrize('unit', [0, 1, 94])
 def test_read_and_write(lump: bool, unit: int) -> None:
     bench = Bench(*[Fate(lump=lump)] * 2, unit=unit)
-    assert bench.read(A).words == bench.answer_of(0)
-    assert bench.write(A, 0xFF9C).words == ()
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.write(A, 0xFF9C).data == b''
     assert bench.drive.requests == [(unit, 0x1E, None, 'answer'), (unit, 0x1E, 0xFF9C, 'answer')]
 
 
@@ -152,15 +154,15 @@ def test_lower_case_answers_are_read() -> None:
     bench = Bench()
     bench.drive.lower = True
     bench.drive.values[0xB6] = 0xABCD
-    assert bench.read(B).words == (0xABCD,)
+    assert bench.read(B).data == packed(0xABCD)
 
 
 @pytest.mark.parametrize('address', [0, 1, 17, 94])
 def test_point_to_point_either_address_answers(address: int) -> None:
     bench = Bench(unit=0)
     bench.drive.address = address
-    assert bench.read(A).words == bench.answer_of(0)
-    assert bench.write(B, 1).words == ()
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.write(B, 1).data == b''
     assert {unit for unit, *_ in bench.drive.requests} == {0}
 
 
@@ -183,7 +185,7 @@ def test_time_out_counts_from_the_end_of_the_request() -> None:
 
 def test_answer_just_in_time_is_taken_whole() -> None:
     bench = Bench(Fate(0.95))
-    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(A).data == bench.answer_of(0)
 
 
 def test_babbling_line_is_no_reason_to_hang() -> None:
@@ -228,7 +230,8 @@ def test_there_is_nothing_to_ask() -> None:
 
 def test_write_and_read_takes_two_transactions() -> None:
     bench = Bench()
-    assert bench.do(lambda: bench.link.write_and_read(UNIT, A, (7,), B)).words == bench.answer_of(1)
+    reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, packed(7), B))
+    assert reply.data == bench.answer_of(1)
     assert bench.drive.requests == [(1, 0x1E, 7, 'answer'), (1, 0xB6, None, 'answer')]
 
 
@@ -238,9 +241,9 @@ def test_write_and_read_takes_two_transactions() -> None:
 def test_broadcast_awaits_no_answer() -> None:
     bench = Bench()
     start = bench.wire.now
-    assert bench.write(Address((MODE,), 1), 1, unit=95).words == ()
+    assert bench.write(classic_id(MODE), 1, unit=95).data == b''
     assert bench.wire.sent[0][1].startswith(b'\x04\x7f\x02E0029=0001')
-    assert bench.read(A).words == bench.answer_of(1)
+    assert bench.read(A).data == bench.answer_of(1)
     # the drives have had time to obey
     assert bench.wire.sent[1][0] - start > 15 * SETTINGS.char_time + 0.09
 
@@ -250,7 +253,7 @@ def test_drives_that_answer_fast_need_little_time_for_a_broadcast() -> None:
     for number in range(300):
         bench.read(A if number % 2 else B)
     start = bench.wire.now
-    bench.write(Address((MODE,), 1), 1, unit=95)
+    bench.write(classic_id(MODE), 1, unit=95)
     bench.read(A)
     assert bench.wire.sent[-1][0] - start < 15 * SETTINGS.char_time + 0.01
     # one that took long lately needs it, but none needs longer than all drives may
@@ -259,7 +262,7 @@ def test_drives_that_answer_fast_need_little_time_for_a_broadcast() -> None:
         for number in range(301):
             bench.read(A if number % 2 else B)
         start = bench.wire.now
-        bench.write(Address((MODE,), 1), 1, unit=95)
+        bench.write(classic_id(MODE), 1, unit=95)
         pause = bench.wire.now - start - 15 * SETTINGS.char_time
         assert min(2 * delay * TIMEOUT, 0.1) - 0.001 <= pause <= 0.101
 
@@ -279,7 +282,7 @@ def test_nobody_reads_a_broadcast() -> None:
 def test_two_words_are_read_high_low_high() -> None:
     bench = Bench()
     bench.drive.values = {0x27: 0xFFFF, 0x127: 3}
-    assert bench.read(LONG).words == (0xFFFF, 3)
+    assert bench.read(LONG).data == packed(0xFFFF, 3)
     assert bench.asked == [0x127, 0x27, 0x127]
 
 
@@ -289,7 +292,7 @@ def test_two_words_that_change_meanwhile_are_read_again() -> None:
     high = iter([3, 4, 4])
     low = iter([0, 1])
     bench.drive.values = {0x127: lambda: next(high), 0x27: lambda: next(low)}
-    assert bench.read(LONG).words == (1, 4)
+    assert bench.read(LONG).data == packed(1, 4)
     assert bench.asked == [0x127, 0x27, 0x127, 0x27, 0x127]
 
 
@@ -360,7 +363,7 @@ def own_fault_bench(before: int, pause: float, sio_err: int) -> Bench:
     bench = refusal_bench(14, sio_err)
     bench.drive.values[INV_ST] = before
     bench.drive.heal(Fate(), Fate(what='refuse'))
-    bench.read(Address((INV_ST,), 1))
+    bench.read(classic_id(INV_ST))
     bench.wire.now += pause
     bench.drive.values[INV_ST] = 14
     return bench
@@ -419,12 +422,12 @@ def test_late_reply_is_not_taken_for_the_answer_to_the_same_question(late: float
         bench.read(A)
     for _ in range(50):
         try:
-            words = bench.read(A).words
+            told = bench.read(A).data
         except (NoAnswer, DamagedAnswer, NotReady):
             bench.wire.now += 0.1 * TIMEOUT
             continue
         assert bench.asked[-1] == 0x1E
-        assert words == bench.answer_of(len(bench.asked) - 1)
+        assert told == bench.answer_of(len(bench.asked) - 1)
         return
     raise AssertionError('never answered')
 
@@ -435,12 +438,12 @@ def test_late_reply_is_not_taken_for_the_answer_to_another_question(late: float)
     with pytest.raises(NoAnswer):
         bench.read(A)
     try:
-        words = bench.read(B).words
+        told = bench.read(B).data
     except (NoAnswer, DamagedAnswer):
         return
-    assert words == bench.answer_of(1)
+    assert told == bench.answer_of(1)
     # and what answered has cleared the line
-    assert bench.read(A).words == bench.answer_of(2)
+    assert bench.read(A).data == bench.answer_of(2)
     assert bench.asked == [0x1E, 0xB6, 0x1E]
 
 
@@ -480,7 +483,7 @@ def test_late_nak_is_not_taken_for_the_answer_to_another_question() -> None:
     bench = Bench(Fate(1.2, 'refuse'))
     with pytest.raises(NoAnswer):
         bench.read(A)
-    assert bench.read(B).words == bench.answer_of(1)
+    assert bench.read(B).data == bench.answer_of(1)
     bench = Bench(Fate(1.2, 'refuse'))
     with pytest.raises(NoAnswer):
         bench.read(A)
@@ -491,19 +494,19 @@ def test_late_nak_is_not_taken_for_the_answer_to_another_question() -> None:
 def test_probes_are_those_that_every_firmware_has() -> None:
     # whatever is named: to ask for what a drive does not have makes it stop
     bench = Bench(*[Fate(what='drop')] * 5)
-    bench.link.use_probes(UNIT, [Address((0x7D,), 1)])
+    bench.link.use_probes(UNIT, [classic_id(0x7D)])
     for _ in range(5):
         with pytest.raises(NoAnswer):
             bench.read(A)
     assert bench.asked == [0x1E, INV_ST, MODE, 0x30, 0x1E]
-    assert bench.read(B).words == bench.answer_of(5)
+    assert bench.read(B).data == bench.answer_of(5)
 
 
 def test_doubt_of_one_unit_is_not_that_of_another() -> None:
     bench = Bench(Fate(what='drop'))
     with pytest.raises(NoAnswer):
         bench.read(A)
-    assert bench.read(A, unit=2).words == bench.answer_of(1)
+    assert bench.read(A, unit=2).data == bench.answer_of(1)
     assert bench.asked == [0x1E, 0x1E]
 
 
@@ -518,14 +521,14 @@ def test_closing_forgets_all_doubts() -> None:
 
 
 @pytest.mark.parametrize('lump', [False, True])
-@pytest.mark.parametrize('address', [A, Address((INV_ST,), 1)])
+@pytest.mark.parametrize('address', [A, classic_id(INV_ST)])
 def test_doubled_reply(lump: bool, address: Address) -> None:
     bench = Bench(Fate(what='double', lump=lump))
-    (number,) = address.numbers
+    number = address.index
     probe = MODE if number == INV_ST else INV_ST
     bench.read(address)
     # in a lump it is seen at once, else when it comes before it can
-    assert bench.read(address).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(address).data == bench.answer_of(len(bench.asked) - 1)
     assert bench.asked == ([number, probe, number] if lump else [number, number, probe, number])
 
 
@@ -533,7 +536,7 @@ def test_the_same_question_on_a_line_without_speed() -> None:
     bench = Bench(settings=LineSettings(1200, '7E1', TIMEOUT))
     bench.drive.pace = 0.0
     for _ in range(5):
-        assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
+        assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
         bench.write(A, 1)
         bench.write(B, 1)
 
@@ -542,7 +545,7 @@ def test_the_same_question_on_a_line_without_speed() -> None:
 def test_doubled_reply_before_another_question(lump: bool) -> None:
     bench = Bench(Fate(what='double', lump=lump))
     bench.read(A)
-    assert bench.read(B).words == bench.answer_of(1)
+    assert bench.read(B).data == bench.answer_of(1)
     assert bench.asked == [0x1E, 0xB6]
 
 
@@ -559,15 +562,15 @@ def test_doubled_nak(lump: bool) -> None:
     bench = Bench(Fate(what='refuse twice', lump=lump))
     with pytest.raises(Refused):
         bench.read(A)
-    assert bench.read(B).words == bench.answer_of(1)
+    assert bench.read(B).data == bench.answer_of(1)
 
 
 @pytest.mark.parametrize('noise', [b'\x00', b'\x7f\x7f', b'\x02', b'!', b'!\x02E0', b'\x1b[0m'])
 def test_noise_before_an_answer(noise: bytes) -> None:
     bench = Bench()
     bench.drive.before = noise
-    assert bench.read(A).words == bench.answer_of(0)
-    assert bench.write(A, 1).words == ()
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.write(A, 1).data == b''
 
 
 def test_damaged_answer() -> None:
@@ -581,7 +584,7 @@ def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
     bench.read(A)
     bench.wire.now += 1
     bench.wire.arrive(bench.wire.now - 0.1, b'!')
-    assert bench.read(A).words == bench.answer_of(2)
+    assert bench.read(A).data == bench.answer_of(2)
     assert bench.asked == [0x1E, INV_ST, 0x1E]
 
 
@@ -592,12 +595,12 @@ def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
 def test_echo_of_our_own_requests_is_stripped(lump: bool) -> None:
     bench = Bench(*[Fate(lump=lump)] * 4)
     bench.drive.echo = True
-    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(A).data == bench.answer_of(0)
     bench.write(A, 0x1234)
     # the echo of a SELECT has the form of a REPLY behind its EOT
-    assert bench.read(A).words == bench.answer_of(2)
-    bench.write(Address((MODE,), 1), 1, unit=95)
-    assert bench.read(B).words == bench.answer_of(4)
+    assert bench.read(A).data == bench.answer_of(2)
+    bench.write(classic_id(MODE), 1, unit=95)
+    assert bench.read(B).data == bench.answer_of(4)
     assert len(bench.asked) == 5
 
 
@@ -621,7 +624,7 @@ def test_what_comes_before_the_echo_is_no_answer() -> None:
         take(frame, end)
 
     bench.wire.far_end = stale_first
-    assert bench.read(B).words == bench.answer_of(1)
+    assert bench.read(B).data == bench.answer_of(1)
 
 
 def test_an_adapter_that_echoes_no_more() -> None:
@@ -631,7 +634,7 @@ def test_an_adapter_that_echoes_no_more() -> None:
     bench.drive.echo = False
     with pytest.raises(DamagedAnswer):
         bench.read(B)
-    assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
 
 
 # --- whatever the drive does ----------------------------------------------------------------------
@@ -654,7 +657,7 @@ STEPS = st.lists(
     ),
     max_size=25,
 )
-NAMES = {'A': A, 'B': B, 'InvSt': Address((INV_ST,), 1)}
+NAMES = {'A': A, 'B': B, 'InvSt': classic_id(INV_ST)}
 
 
 @hypothesis_settings(max_examples=400)
@@ -674,17 +677,17 @@ def test_every_answer_belongs_to_its_request(
         before = len(requests)
         try:
             if what.startswith('write'):
-                assert bench.write(address, 7).words == ()
+                assert bench.write(address, 7).data == b''
                 # one transaction, and this very one was confirmed
                 assert len(requests) == before + 1
                 assert requests[before][3] in ('answer', 'double')
             else:
-                words = bench.read(address).words
-                assert requests[-1][1] == address.numbers[0]
-                assert words == bench.answer_of(len(requests) - 1)
+                told = bench.read(address).data
+                assert requests[-1][1] == address.index
+                assert told == bench.answer_of(len(requests) - 1)
         except Refused:
             refused = before if what.startswith('write') else len(requests) - 1
-            assert requests[refused][1] == address.numbers[0]
+            assert requests[refused][1] == address.index
             assert requests[refused][3].startswith('refuse')
         except NotReady as refusal:
             assert not what.startswith('write')
@@ -694,4 +697,4 @@ def test_every_answer_belongs_to_its_request(
             assert isinstance(error, LinkError) and error.maybe_done
         assert len(requests) - before <= (3 if what.startswith('write') else 5)
         if what.startswith('write'):
-            assert requests[before][1:3] == (address.numbers[0], 7)
+            assert requests[before][1:3] == (address.index, 7)

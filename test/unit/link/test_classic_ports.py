@@ -26,6 +26,8 @@ import tty
 
 import classic_far_end as far
 import pytest
+from support.addresses import classic_id
+from support.addresses import packed
 
 from nfo_sinus_driver.link.classic_link import CHAR_FORMATS
 from nfo_sinus_driver.link.classic_link import ClassicLink
@@ -34,7 +36,6 @@ from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.open import open_link
 
@@ -43,11 +44,11 @@ PATIENT = 10.0
 #: For those that never answer, s.
 SHORT = 0.05
 
-SPEED = Address((0x94,), 1)
-SETPOINT = Address((0x1E,), 1)
-OP_TIME = Address((0x27, 0x127), 2)
-INV_ST = Address((far.INV_ST,), 1)
-MODE = Address((0x29,), 1)
+SPEED = classic_id(0x94)
+SETPOINT = classic_id(0x1E)
+OP_TIME = classic_id(0x27, 0x127)
+INV_ST = classic_id(far.INV_ST)
+MODE = classic_id(0x29)
 
 
 class PtyDrive:
@@ -162,55 +163,55 @@ def test_the_factory_setting_is_that_of_the_drive() -> None:
 
 @pytest.mark.parametrize('unit', [0, 1])
 def test_read_and_write(drive: PtyDrive, link: ClassicLink, unit: int) -> None:
-    assert link.read(unit, SPEED).words == (1450,)
-    assert link.write(unit, SETPOINT, (500,)).words == ()
-    assert link.read(unit, SETPOINT).words == (500,)
-    assert link.read(unit, OP_TIME).words == (0xFFFE, 2)
+    assert link.read(unit, SPEED).data == packed(1450)
+    assert link.write(unit, SETPOINT, packed(500)).data == b''
+    assert link.read(unit, SETPOINT).data == packed(500)
+    assert link.read(unit, OP_TIME).data == packed(0xFFFE, 2)
     assert drive.asked[-3:] == [(0x127, None), (0x27, None), (0x127, None)]
 
 
 @pytest.mark.parametrize('char_format', CHAR_FORMATS)
 def test_every_format(drive: PtyDrive, char_format: str) -> None:
     link = connect(drive, char_format=char_format)
-    assert link.read(1, SPEED).words == (1450,)
+    assert link.read(1, SPEED).data == packed(1450)
     link.close()
 
 
 def test_refused_value(drive: PtyDrive, link: ClassicLink) -> None:
     with pytest.raises(Refused, match='does not accept this value') as raised:
-        link.write(1, SETPOINT, (1501,))
+        link.write(1, SETPOINT, packed(1501))
     assert raised.value.code == Refused.ILLEGAL_VALUE
     assert [number for number, _ in drive.asked] == [0x1E, far.INV_ST]
-    assert link.read(1, SPEED).words == (1450,)
+    assert link.read(1, SPEED).data == packed(1450)
 
 
 def test_refused_value_under_serial_control(drive: PtyDrive, link: ClassicLink) -> None:
     drive.serial_control = True
     link.read(1, INV_ST)
     with pytest.raises(Refused, match='out of range') as raised:
-        link.write(1, SETPOINT, (1501,))
+        link.write(1, SETPOINT, packed(1501))
     assert (raised.value.code, raised.value.inv_st) == (Refused.ILLEGAL_VALUE, 14)
-    assert link.read(1, INV_ST).words == (24,)
+    assert link.read(1, INV_ST).data == packed(24)
 
 
 def test_a_standing_fault_stays(drive: PtyDrive, link: ClassicLink) -> None:
     drive.values[far.INV_ST] = 14
     link.read(1, INV_ST)
     with pytest.raises(Refused, match='a serial fault') as raised:
-        link.write(1, SETPOINT, (1,))
+        link.write(1, SETPOINT, packed(1))
     assert raised.value.code == Refused.DEVICE_FAILURE
     assert drive.values[far.INV_ST] == 14
 
 
 def test_no_such_parameter(drive: PtyDrive, link: ClassicLink) -> None:
     with pytest.raises(Refused) as raised:
-        link.read(1, Address((0x1234,), 1))
+        link.read(1, classic_id(0x1234))
     assert raised.value.code == Refused.ILLEGAL_ADDRESS
 
 
 def test_broadcast(drive: PtyDrive, link: ClassicLink) -> None:
-    link.write(95, MODE, (1,))
-    assert link.read(1, MODE).words == (1,)
+    link.write(95, MODE, packed(1))
+    assert link.read(1, MODE).data == packed(1)
 
 
 def test_echo(drive: PtyDrive, link: ClassicLink) -> None:
@@ -221,15 +222,15 @@ def test_echo(drive: PtyDrive, link: ClassicLink) -> None:
 
 def test_answer_byte_by_byte(drive: PtyDrive, link: ClassicLink) -> None:
     drive.answer = lambda data: [drive.send(bytes((byte,))) for byte in data] and None
-    assert link.read(1, OP_TIME).words == (0xFFFE, 2)
-    link.write(1, SETPOINT, (5,))
+    assert link.read(1, OP_TIME).data == packed(0xFFFE, 2)
+    link.write(1, SETPOINT, packed(5))
 
 
 def test_nobody_there(hasty: ClassicLink) -> None:
     with pytest.raises(NoAnswer):
         hasty.read(2, SPEED)
     with pytest.raises(NoAnswer):
-        hasty.write(2, SETPOINT, (1,))
+        hasty.write(2, SETPOINT, packed(1))
 
 
 @pytest.mark.parametrize('late', [1.5, 3.0])
@@ -245,14 +246,14 @@ def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
         hasty.read(1, SPEED)
     drive.values[0x94] = 7
     deadline = time.monotonic() + PATIENT
-    words: tuple[int, ...] = ()
-    while not words:
+    told = b''
+    while not told:
         assert time.monotonic() < deadline
         try:
-            words = hasty.read(1, SPEED).words
+            told = hasty.read(1, SPEED).data
         except LinkError as error:
             assert not isinstance(error, (PortError, Refused))
-    assert words == (7,)
+    assert told == packed(7)
 
 
 def test_answer_of_another(drive: PtyDrive, hasty: ClassicLink) -> None:
@@ -265,8 +266,8 @@ def test_noise_and_doubled_answers(drive: PtyDrive, link: ClassicLink) -> None:
     drive.answer = lambda data: drive.send(b'\x00!\x02E' + data + data)
     for speed in range(20):
         drive.values[0x94] = speed
-        assert link.read(1, SPEED).words == (speed,)
-        assert link.read(1, OP_TIME).words == (0xFFFE, 2)
+        assert link.read(1, SPEED).data == packed(speed)
+        assert link.read(1, OP_TIME).data == packed(0xFFFE, 2)
 
 
 def test_hang_up(drive: PtyDrive) -> None:

@@ -37,6 +37,7 @@ from link_bench import C
 from link_bench import D
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
 from test_link_ports import PATIENCE
 from test_link_ports import Pty
 from test_rtu_link import NAMES
@@ -126,10 +127,10 @@ class EchoingBench(Bench):
 def test_reads_and_writes_with_an_echo() -> None:
     bench = EchoingBench()
     for _ in range(2):
-        assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
-        assert bench.read(C).words == bench.answer_of(len(bench.asked) - 1)
-        assert bench.write(A, 5).words == ()
-        assert bench.write(C, 5, 6).words == ()
+        assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
+        assert bench.read(C).data == bench.answer_of(len(bench.asked) - 1)
+        assert bench.write(A, 5).data == b''
+        assert bench.write(C, 5, 6).data == b''
     # nothing had to be probed
     assert bench.asked == [0x400, 0x3EC, 0x400, 0x3EC] * 2
     bench.wire.check_gaps()
@@ -140,7 +141,7 @@ def test_echo_of_function_06_is_not_its_answer() -> None:
     bench.read(A)
     error = bench.expect(NoAnswer, lambda: bench.write(A, 5))
     assert error.maybe_done
-    assert bench.write(A, 5).words == ()
+    assert bench.write(A, 5).data == b''
 
 
 def test_echo_is_learnt_even_from_a_drive_that_is_silent() -> None:
@@ -152,7 +153,7 @@ def test_echo_is_learnt_even_from_a_drive_that_is_silent() -> None:
 def test_echo_is_learnt_behind_noise() -> None:
     bench = EchoingBench([Fate(), Fate(what='drop')])
     bench.echo = lambda frame: b'\x00\xff' + frame
-    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(A).data == bench.answer_of(0)
     bench.expect(NoAnswer, lambda: bench.write(A, 5))
 
 
@@ -183,15 +184,15 @@ def test_damaged_echo(what: str) -> None:
     if what != 'nothing':
         bench.echo = lambda frame: frame
     # the next read tells whether there is an echo at all
-    assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
-    assert bench.write(B, 5).words == ()
+    assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
+    assert bench.write(B, 5).data == b''
 
 
 def test_late_answer_behind_an_echo() -> None:
     bench = EchoingBench([Fate(), Fate(1.5)])
     bench.read(D)
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.read(B).words == bench.answer_of(3)
+    assert bench.read(B).data == bench.answer_of(3)
     assert bench.asked == [0x2A8, 0x400, 0x258, 0x264]
 
 
@@ -203,7 +204,7 @@ def test_opening_again_forgets_the_echo() -> None:
         bench.link.open()
     bench.echo = lambda frame: b''
     before = bench.wire.now
-    assert bench.write(A, 5).words == ()
+    assert bench.write(A, 5).data == b''
     assert bench.wire.now - before < TIMEOUT
 
 
@@ -227,11 +228,11 @@ def numbers_of(bench: Bench, address: Address, since: int) -> list[int]:
     return [
         number
         for number in range(max(0, since - 1), len(bench.asked))
-        if bench.asked[number] == address.numbers[0]
+        if bench.asked[number] == address.index
     ]
 
 
-def answers(bench: Bench, address: Address, since: int) -> list[tuple[int, ...]]:
+def answers(bench: Bench, address: Address, since: int) -> list[bytes]:
     """What the drive said about a parameter."""
     return [bench.answer_of(number) for number in numbers_of(bench, address, since)]
 
@@ -243,12 +244,12 @@ def test_second_answer_is_not_taken_for_the_next_one(
     again: float, lump: bool, echoes: bool
 ) -> None:
     bench = (EchoingBench if echoes else Bench)([Fate(what='double', again=again, lump=lump)])
-    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(A).data == bench.answer_of(0)
     for address in (B, A, B):
         before = len(bench.asked)
         with contextlib.suppress(DamagedAnswer):
-            words = bench.read(address).words
-            assert words in answers(bench, address, before)
+            told = bench.read(address).data
+            assert told in answers(bench, address, before)
 
 
 def test_second_answer_is_said() -> None:
@@ -257,7 +258,7 @@ def test_second_answer_is_said() -> None:
     error = bench.expect(DamagedAnswer, lambda: bench.read(B))
     assert 'came twice' in str(error)
     # that is over now
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
     assert bench.asked == [0x400, 0x264, 0x258, 0x264]
 
 
@@ -265,7 +266,7 @@ def test_same_words_twice_are_believed_after_a_probe() -> None:
     bench = Bench()
     bench.slave = SameWords(bench.wire)
     for address in (A, B, C, D, A):
-        assert bench.read(address).words == (0,) * address.words
+        assert bench.read(address).data == bytes(address.size)
     assert bench.asked == [0x400, 0x264, 0x258, 0x3EC, 0x2A5, 0x2A8, 0x400]
     bench.wire.check_gaps()
 
@@ -303,7 +304,7 @@ def test_second_refusal_is_not_taken_for_that_of_the_next_request() -> None:
     bench = Bench([Fate(what='refuse twice', again=0.2)])
     bench.expect(Refused, lambda: bench.read(A))
     bench.expect(DamagedAnswer, lambda: bench.read(B))
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
 class SameRefusal(Slave):
@@ -386,10 +387,10 @@ def test_every_answer_belongs_to_its_request(
         before = len(bench.asked)
         try:
             if what.startswith('write'):
-                bench.write(address, *(7,) * address.words)
+                bench.write(address, *(7,) * (address.size // 2))
             else:
-                words = bench.read(address).words
-                assert words in answers(bench, address, before)
+                told = bench.read(address).data
+                assert told in answers(bench, address, before)
         except Refused as refusal:
             numbers = numbers_of(bench, address, before)
             assert refusal.code in [bench.slave.code(number) for number in numbers]
@@ -444,14 +445,14 @@ def test_echo_on_a_real_port(pty: Pty, kind: str) -> None:
     line = EchoingLine(pty, kind)
     link.open()
     try:
-        assert link.read(1, A).words == (37,)
-        assert link.write(1, A, (5,)).words == ()
+        assert link.read(1, A).data == packed(37)
+        assert link.write(1, A, packed(5)).data == b''
         line.silent = True
         with pytest.raises(NoAnswer):
-            link.write(1, A, (5,))
+            link.write(1, A, packed(5))
         line.silent = False
-        assert link.write(1, A, (6,)).words == ()
-        assert link.read(1, A).words == (37,)
+        assert link.write(1, A, packed(6)).data == b''
+        assert link.read(1, A).data == packed(37)
     finally:
         link.close()
         line.stop = True

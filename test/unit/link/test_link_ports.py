@@ -33,12 +33,13 @@ import tty
 from types import SimpleNamespace
 
 import pytest
+from support.addresses import packed
+from support.addresses import register
 
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link import serial_port
 from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.rtu import crc
 from nfo_sinus_driver.link.rtu import encode
@@ -558,7 +559,7 @@ def test_link_over_a_serial_port(pty: Pty) -> None:
     link.open()
     drive = threading.Thread(target=answer_one_read, args=(pty.far,))
     drive.start()
-    assert link.read(1, Address((0x2A5,), 1)).words == (37,)
+    assert link.read(1, register(0x2A5)).data == packed(37)
     drive.join()
     link.close()
 
@@ -568,7 +569,7 @@ def test_link_over_tcp(server: Server) -> None:
     link.open()
     drive = threading.Thread(target=answer_one_read, args=(server.accept(),))
     drive.start()
-    assert link.read(1, Address((0x2A5,), 1)).words == (37,)
+    assert link.read(1, register(0x2A5)).data == packed(37)
     drive.join()
     link.close()
 

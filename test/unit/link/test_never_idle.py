@@ -38,6 +38,9 @@ from link_bench import C
 from link_bench import D
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import classic_id
+from support.addresses import packed
+from support.addresses import register
 from test_classic_link import Bench as ClassicBench
 from test_read_then_write import AsciiBench
 from test_rtu_link import FATES
@@ -103,14 +106,14 @@ def test_however_many_answers_are_lost_something_is_asked_at_once(
         assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
     # what was read last, then two questions of other kinds, and none is asked in doubt
     assert [function for _, function, _, _ in bench.slave.requests[:6]] == [3, 3, 17, 43, 3, 3]
-    assert bench.asked[:2] == [A.numbers[0], TWO.numbers[0]]
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.asked[:2] == [A.index, TWO.index]
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
 def test_a_unit_of_which_nothing_is_known_is_asked_who_it_is() -> None:
     bench = Bench([LOST], probes=())
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(B).data == bench.answer_of(2)
     assert [function for _, function, _, _ in bench.slave.requests] == [3, 17, 3]
 
 
@@ -122,15 +125,15 @@ def test_a_unit_of_which_nothing_is_known_is_left_alone_for_one_time_out_at_most
     assert isinstance(error, NotReady)
     assert bench.wire.now < error.until <= bench.wire.now + TIMEOUT
     bench.wire.now = error.until
-    assert bench.read(A).words == bench.answer_of(3)
+    assert bench.read(A).data == bench.answer_of(3)
 
 
 def test_what_cannot_be_confused_needs_no_probe() -> None:
     bench = Bench([Fate(1.5)])
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.read(C).words == bench.answer_of(1)
+    assert bench.read(C).data == bench.answer_of(1)
     # and it has told that nothing is left
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(B).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 
 
@@ -154,13 +157,13 @@ def test_whatever_is_lost_late_doubled_or_damaged_the_line_is_used(
         before = len(bench.asked)
         try:
             if what.startswith('write'):
-                bench.write(address, *(7,) * address.words)
+                bench.write(address, *(7,) * (address.size // 2))
             else:
-                words = bench.read(address).words
-                assert bench.asked[-1] == address.numbers[0]
-                assert words == bench.answer_of(len(bench.asked) - 1)
+                told = bench.read(address).data
+                assert bench.asked[-1] == address.index
+                assert told == bench.answer_of(len(bench.asked) - 1)
         except Refused as refusal:
-            assert bench.asked[-1] == address.numbers[0]
+            assert bench.asked[-1] == address.index
             assert refusal.code == bench.slave.code(len(bench.asked) - 1)
         except NotReady as refusal:
             assert not what.startswith('write')
@@ -186,11 +189,11 @@ def test_nobody_waits_where_answers_are_only_lost_or_late(
     for name in names:
         before = bench.wire.now, len(bench.wire.sent)
         try:
-            words = bench.read(NAMES[name]).words
+            told = bench.read(NAMES[name]).data
         except (NoAnswer, DamagedAnswer):
             pass
         else:
-            assert words == bench.answer_of(len(bench.asked) - 1)
+            assert told == bench.answer_of(len(bench.asked) - 1)
         first = bench.wire.sent[before[1]][0]
         # a late answer may have to end first
         assert first - before[0] <= 2 * bench.wire.gap + 9 * SETTINGS.char_time
@@ -272,7 +275,7 @@ def test_classic_after_a_burst_the_line_is_used_and_the_status_known_at_once(
     bench = ClassicBench(settings=LineSettings(rate, '7E1', 0.2))
     at = bench.wire.now + begin
     lose(bench.wire, at, at + burst, noise=noise)
-    status = [functools.partial(bench.read, Address((number,), 1)) for number in (0xE9, 0x29)]
+    status = [functools.partial(bench.read, register(number)) for number in (0xE9, 0x29)]
     check_status(bench.wire, at + burst, status)
 
 
@@ -294,7 +297,7 @@ def test_a_stop_is_sent_into_noise_that_does_not_end(make: type[Bench], rate: in
     before = bench.wire.now
     with contextlib.suppress(DamagedAnswer):
         bench.write(A, 0)
-    assert bench.asked[1:] == [A.numbers[0]]
+    assert bench.asked[1:] == [A.index]
     longest = (9 if make is Bench else 17) * settings.char_time
     assert bench.wire.sent[-1][0] - before <= 2 * bench.wire.gap + max(0.02, longest)
 
@@ -306,7 +309,7 @@ def test_what_was_not_sent_was_not_done() -> None:
         bench.read(A)
     assert not raised.value.maybe_done
     with pytest.raises(DamagedAnswer, match='never silent') as raised, bench.wire.time():
-        bench.link.read_then_write(UNIT, A, B, (0,))
+        bench.link.read_then_write(UNIT, A, B, packed(0))
     assert not raised.value.maybe_done
     assert bench.wire.sent == []
 
@@ -314,7 +317,7 @@ def test_what_was_not_sent_was_not_done() -> None:
 def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
     bench = Bench()
     bench.wire.far_end = lambda frame, end: None
-    bench.expect(NoAnswer, lambda: bench.write_and_read(A, (7,), B))
+    bench.expect(NoAnswer, lambda: bench.write_and_read(A, packed(7), B))
 
     def answer(frame: bytes, end: float) -> None:
         message = bytes((UNIT, 23, 2, 0, 5))
@@ -323,10 +326,10 @@ def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
 
     bench.wire.far_end = answer
     before = bench.wire.now
-    assert bench.write_and_read(A, (8,), B).words == ()
+    assert bench.write_and_read(A, packed(8), B).data == b''
     assert bench.wire.now < before + 0.1
     # what was late has come before the answer to that
-    assert bench.write_and_read(A, (9,), B).words == (5,)
+    assert bench.write_and_read(A, packed(9), B).data == packed(5)
     assert [frame[1] for _, frame in bench.wire.sent] == [23, 6, 23]
 
 
@@ -336,7 +339,7 @@ def test_a_write_and_read_goes_out_at_once_on_a_line_that_is_never_silent() -> N
     babble(bench.wire, 0x55, SETTINGS.frame_gap / 2)
     before = bench.wire.now
     with contextlib.suppress(DamagedAnswer), bench.wire.time():
-        bench.link.write_and_read(UNIT, A, (7,), B)
+        bench.link.write_and_read(UNIT, A, packed(7), B)
     assert bench.wire.sent
     assert bench.wire.sent[0][0] < before + 0.1
 
@@ -347,7 +350,7 @@ def test_a_write_goes_out_at_once_whatever_is_in_doubt(lost: int) -> None:
     for _ in range(lost):
         bench.expect(NoAnswer, lambda: bench.read(A))
     before = bench.wire.now
-    assert bench.write(A, 0).words == ()
+    assert bench.write(A, 0).data == b''
     assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
     assert len(bench.asked) == lost + 1
 
@@ -360,7 +363,7 @@ def test_classic_however_many_answers_are_lost_something_is_asked_at_once() -> N
     for _ in range(30):
         before = bench.wire.now
         with pytest.raises(NoAnswer):
-            bench.read(Address((0xE9,), 1))
+            bench.read(register(0xE9))
         assert bench.wire.sent[-1][0] == before
     assert bench.asked[:5] == [0xE9, 0x29, 0x30, 0x0F, 0xE9]
 
@@ -371,7 +374,7 @@ def test_classic_a_stop_that_failed_is_given_again_before_anything_is_read(what:
     for _ in range(2):
         before = bench.wire.now
         with pytest.raises((NoAnswer, DamagedAnswer)):
-            bench.write(Address((0x2A,), 1), 0)
+            bench.write(register(0x2A), 0)
         assert bench.wire.sent[-1][0] == before
     assert bench.asked == [0x2A, 0x2A]
 
@@ -381,7 +384,7 @@ def test_classic_a_stop_is_sent_into_noise_that_does_not_end() -> None:
     babble(bench.wire, 0x7F, 0.001)
     before = bench.wire.now
     with pytest.raises(DamagedAnswer) as raised:
-        bench.write(Address((0x2A,), 1), 0)
+        bench.write(register(0x2A), 0)
     assert raised.value.maybe_done
     assert [at for at, _ in bench.wire.sent] == [before]
 
@@ -400,7 +403,7 @@ def test_classic_nobody_waits_longer_than_a_time_out(
     bench = ClassicBench(*fates)
     for number in numbers:
         try:
-            words = bench.read(Address((number,), 1)).words
+            told = bench.read(classic_id(number)).data
         except NotReady as refusal:
             assert bench.wire.now < refusal.until <= bench.wire.now + TIMEOUT + 1e-9
             bench.wire.now = refusal.until
@@ -408,4 +411,4 @@ def test_classic_nobody_waits_longer_than_a_time_out(
             pass
         else:
             index = len(bench.asked) - 1
-            assert words == (FarEnd.word(number, index),)
+            assert told == packed(FarEnd.word(number, index))

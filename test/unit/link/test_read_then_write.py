@@ -27,6 +27,8 @@ from link_bench import A
 from link_bench import B
 from link_bench import Bench
 import pytest
+from support.addresses import packed
+from support.addresses import register
 from test_classic_link import Bench as ClassicBench
 from test_echo import SameWords
 from virtual_wire import AsciiWire
@@ -38,11 +40,10 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link.ascii_link import AsciiLink
-from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
 
-ACK = Address((0x2A4,), 1)
-STOP = Address((0x3EC,), 1)
+ACK = register(0x2A4)
+STOP = register(0x3EC)
 #: Behind the last character of an answer, the master's own gap at the most, s.
 _SOON = 0.003
 
@@ -60,7 +61,7 @@ def modbus(request: pytest.FixtureRequest) -> Callable[..., Bench]:
 
 def acknowledge_and_stop(bench: Bench) -> Reply:
     with bench.wire.time():
-        return bench.link.read_then_write(UNIT, ACK, STOP, (0,))
+        return bench.link.read_then_write(UNIT, ACK, STOP, packed(0))
 
 
 def failing(bench: Bench) -> LinkError:
@@ -84,11 +85,11 @@ def failing(bench: Bench) -> LinkError:
 )
 def test_the_stop_is_the_very_next_frame(modbus: Callable[..., Bench], fate: Fate) -> None:
     bench = modbus([fate])
-    assert acknowledge_and_stop(bench).words == ()
+    assert acknowledge_and_stop(bench).data == b''
     assert bench.slave.requests == [(UNIT, 3, 0x2A4, 1), (UNIT, 6, 0x3EC, 1)]
     bench.wire.check_gaps()
     # and what is read then belongs to its question
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
 def test_nothing_is_listened_for_behind_an_answer_that_was_told_before(
@@ -120,9 +121,9 @@ def test_the_answer_that_did_not_come_stays_in_doubt(modbus: Callable[..., Bench
     bench = modbus([Fate(1.5), Fate(what='drop')])
     failing(bench)
     asked = len(bench.asked)
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1)
-    assert bench.asked[asked:] == [TWO.numbers[0], B.numbers[0]]
-    assert ONE.numbers[0] not in bench.asked
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
+    assert bench.asked[asked:] == [TWO.index, B.index]
+    assert ONE.index not in bench.asked
 
 
 @pytest.mark.parametrize(
@@ -160,13 +161,13 @@ def test_a_lost_port_ends_it(modbus: Callable[..., Bench]) -> None:
 
 # --- Classic --------------------------------------------------------------------------------------
 
-INV_ST = Address((0xE9,), 1)
-INV_ST_ACK = Address((0xE8,), 1)
-SCMD = Address((0x2A,), 1)
+INV_ST = register(0xE9)
+INV_ST_ACK = register(0xE8)
+SCMD = register(0x2A)
 
 
 def classic_acknowledge_and_stop(bench: ClassicBench) -> Reply:
-    return bench.do(lambda: bench.link.read_then_write(bench.unit, INV_ST_ACK, SCMD, (0,)))
+    return bench.do(lambda: bench.link.read_then_write(bench.unit, INV_ST_ACK, SCMD, packed(0)))
 
 
 @pytest.mark.parametrize('what', ['answer', 'drop', 'damage', 'double', 'late', 'lump'])
@@ -176,10 +177,10 @@ def test_classic_the_stop_is_the_very_next_frame(what: str) -> None:
         'lump': ClassicFate(what='double', lump=True),
     }
     bench = ClassicBench(fates.get(what, ClassicFate(what=what)))
-    assert classic_acknowledge_and_stop(bench).words == ()
+    assert classic_acknowledge_and_stop(bench).data == b''
     assert [request[1:3] for request in bench.drive.requests] == [(0xE8, None), (0x2A, 0)]
     # and what is read then belongs to its question
-    assert bench.read(INV_ST_ACK).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(INV_ST_ACK).data == bench.answer_of(len(bench.asked) - 1)
 
 
 @pytest.mark.parametrize('what', ['refuse', 'refuse twice'])
@@ -193,7 +194,7 @@ def test_classic_a_refused_acknowledgement_keeps_no_stop(what: str) -> None:
 
 def test_classic_no_probe_goes_first_on_a_line_in_doubt() -> None:
     bench = ClassicBench(*[ClassicFate(what='drop')] * 3)
-    for address in (INV_ST, Address((0x29,), 1), INV_ST_ACK):
+    for address in (INV_ST, register(0x29), INV_ST_ACK):
         with pytest.raises(NoAnswer):
             bench.read(address)
     began = bench.wire.now

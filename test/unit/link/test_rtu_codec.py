@@ -25,9 +25,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
+from support.addresses import words_of
 
 from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.interface import Words
 from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
@@ -36,45 +37,49 @@ from nfo_sinus_driver.link.rtu import RtuReader
 from nfo_sinus_driver.link.rtu import crc
 from nfo_sinus_driver.link.rtu import encode
 
+
+def contents(least: int, most: int) -> st.SearchStrategy[bytes]:
+    """What so many registers may hold."""
+    words = st.lists(st.integers(0, 0xFFFF), min_size=least, max_size=most)
+    return words.map(lambda held: packed(*held))
+
+
 UNIT = st.integers(1, 247)
-WORD = st.integers(0, 0xFFFF)
 REGISTER = st.integers(0, 0xFF00)
 READS = st.builds(Read, UNIT, REGISTER, st.integers(1, 125))
-WRITES = st.builds(
-    Write, UNIT, REGISTER, st.lists(WORD, min_size=1, max_size=123).map(tuple)
-)
+WRITES = st.builds(Write, UNIT, REGISTER, contents(1, 123))
 # what drives are asked: few units and registers, so that answers resemble each other
 FEW = st.sampled_from([1, 2])
 PARAMETERS = st.sampled_from([0x2A5, 0x258, 0x400])
 CLOSE = st.one_of(
     st.builds(Read, FEW, PARAMETERS, st.integers(1, 2)),
-    st.builds(Write, FEW, PARAMETERS, st.lists(WORD, min_size=1, max_size=2).map(tuple)),
+    st.builds(Write, FEW, PARAMETERS, contents(1, 2)),
 )
 
 
-def answer_to(request: Request, words: Words) -> bytes:
-    """The answer of a unit, as pymodbus encodes it; ``words`` for a read."""
+def answer_to(request: Request, held: bytes) -> bytes:
+    """The answer of a unit, as pymodbus encodes it; what the registers hold for a read."""
     if isinstance(request, Read):
-        return opinion.read_answer(request.unit, words)
-    return opinion.write_answer(request.unit, request.register, request.words)
+        return opinion.read_answer(request.unit, words_of(held))
+    return opinion.write_answer(request.unit, request.register, words_of(request.data))
 
 
-def wanted(request: Request, words: Words) -> Words:
+def wanted(request: Request, held: bytes) -> bytes:
     """What the reader has to return for that answer."""
-    return words if isinstance(request, Read) else ()
+    return held if isinstance(request, Read) else b''
 
 
-def words_for(request: Request) -> st.SearchStrategy[Words]:
-    """Any words that can be the answer to a read."""
+def contents_for(request: Request) -> st.SearchStrategy[bytes]:
+    """Anything that can be the answer to a read."""
     count = request.count if isinstance(request, Read) else 1
-    return st.lists(WORD, min_size=count, max_size=count).map(tuple)
+    return contents(count, count)
 
 
 @st.composite
-def exchanges(draw: st.DrawFn, requests: st.SearchStrategy[Request]) -> tuple[Request, Words]:
+def exchanges(draw: st.DrawFn, requests: st.SearchStrategy[Request]) -> tuple[Request, bytes]:
     """A request, and what is read."""
     request = draw(requests)
-    return request, draw(words_for(request))
+    return request, draw(contents_for(request))
 
 
 @st.composite
@@ -84,12 +89,12 @@ def pieces(draw: st.DrawFn, data: bytes) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
 
-def feed(reader: RtuReader, data: list[bytes]) -> Words | None:
+def feed(reader: RtuReader, data: list[bytes]) -> bytes | None:
     """Feed pieces until something is found."""
     for piece in data:
-        words = reader.feed(piece)
-        if words is not None:
-            return words
+        found = reader.feed(piece)
+        if found is not None:
+            return found
     return None
 
 
@@ -130,8 +135,8 @@ def test_check_sum_is_pymodbus_s(data: bytes) -> None:
     ('request_', 'frame'),
     [
         (Read(17, 0x6B, 3), '11 03 00 6B 00 03 76 87'),
-        (Write(17, 1, (3,)), '11 06 00 01 00 03 9A 9B'),
-        (Write(17, 1, (10, 0x0102)), '11 10 00 01 00 02 04 00 0A 01 02 C6 F0'),
+        (Write(17, 1, packed(3)), '11 06 00 01 00 03 9A 9B'),
+        (Write(17, 1, packed(10, 0x0102)), '11 10 00 01 00 02 04 00 0A 01 02 C6 F0'),
     ],
 )
 def test_golden_frames(request_: Request, frame: str) -> None:
@@ -151,28 +156,28 @@ def test_read_request_is_pymodbus_s(request: Read) -> None:
 @given(WRITES)
 def test_write_request_is_pymodbus_s(request: Write) -> None:
     frame = encode(request)
-    assert frame == opinion.write_request(request.unit, request.register, request.words)
-    function = 6 if len(request.words) == 1 else 16
-    count = len(request.words)
+    assert frame == opinion.write_request(request.unit, request.register, words_of(request.data))
+    function = 6 if len(request.data) == 2 else 16
+    count = len(request.data) // 2
     assert opinion.decoded(frame) == (
         request.unit,
         function,
         request.register,
         count,
-        request.words,
+        words_of(request.data),
     )
 
 
 @given(st.data(), exchanges(st.one_of(READS, WRITES)))
 def test_answer_of_pymodbus_in_any_pieces(
-    data: st.DataObject, exchange: tuple[Request, Words]
+    data: st.DataObject, exchange: tuple[Request, bytes]
 ) -> None:
-    request, words = exchange
-    frame = answer_to(request, words)
+    request, held = exchange
+    frame = answer_to(request, held)
     assert len(frame) == request.answer_length + CRC_LENGTH
     assert frame.startswith(request.answer_head)
     reader = RtuReader(request)
-    assert feed(reader, data.draw(pieces(frame))) == wanted(request, words)
+    assert feed(reader, data.draw(pieces(frame))) == wanted(request, held)
     assert reader.received == 0
 
 
@@ -195,21 +200,21 @@ def test_exception_of_pymodbus_in_any_pieces(
 
 @given(st.data(), exchanges(CLOSE), st.binary(max_size=20))
 def test_noise_before_a_good_answer(
-    data: st.DataObject, exchange: tuple[Request, Words], noise: bytes
+    data: st.DataObject, exchange: tuple[Request, bytes], noise: bytes
 ) -> None:
-    request, words = exchange
-    frame = answer_to(request, words)
+    request, held = exchange
+    frame = answer_to(request, held)
     assume(frames_in(request, noise + frame) == [frame])
     got = outcome(RtuReader(request), data.draw(pieces(noise + frame)))
-    assert got == wanted(request, words)
+    assert got == wanted(request, held)
 
 
 @given(exchanges(CLOSE), st.integers(0, 8 * 256))
-@example((Read(1, 0x2A5, 1), (37,)), 0)
-def test_damaged_answer_is_none(exchange: tuple[Request, Words], bit: int) -> None:
-    request, words = exchange
+@example((Read(1, 0x2A5, 1), packed(37)), 0)
+def test_damaged_answer_is_none(exchange: tuple[Request, bytes], bit: int) -> None:
+    request, held = exchange
     reader = RtuReader(request)
-    damaged = spoil(answer_to(request, words), bit)
+    damaged = spoil(answer_to(request, held), bit)
     assume(not frames_in(request, damaged))
     assert outcome(reader, [damaged]) is None
     assert reader.received == len(damaged)
@@ -217,21 +222,21 @@ def test_damaged_answer_is_none(exchange: tuple[Request, Words], bit: int) -> No
 
 @given(st.data(), exchanges(CLOSE), st.integers(0, 8 * 256))
 def test_damaged_answer_and_then_a_good_one(
-    data: st.DataObject, exchange: tuple[Request, Words], bit: int
+    data: st.DataObject, exchange: tuple[Request, bytes], bit: int
 ) -> None:
-    request, words = exchange
-    damaged = spoil(answer_to(request, data.draw(words_for(request))), bit)
-    stream = damaged + answer_to(request, words)
-    assume(frames_in(request, stream) == [answer_to(request, words)])
-    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, words)
+    request, held = exchange
+    damaged = spoil(answer_to(request, data.draw(contents_for(request))), bit)
+    stream = damaged + answer_to(request, held)
+    assume(frames_in(request, stream) == [answer_to(request, held)])
+    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, held)
 
 
 @given(st.data(), exchanges(CLOSE), CLOSE)
 def test_answer_to_something_else_is_passed_over(
-    data: st.DataObject, exchange: tuple[Request, Words], other: Request
+    data: st.DataObject, exchange: tuple[Request, bytes], other: Request
 ) -> None:
-    request, words = exchange
-    alien = answer_to(other, data.draw(words_for(other)))
+    request, held = exchange
+    alien = answer_to(other, data.draw(contents_for(other)))
     same = alien.startswith(request.answer_head)
     reader = RtuReader(request)
     got = outcome(reader, data.draw(pieces(alien)))
@@ -239,55 +244,55 @@ def test_answer_to_something_else_is_passed_over(
         # a read answer does not say what was read: the link above has to know
         assert got is not None
         return
-    frame = answer_to(request, words)
+    frame = answer_to(request, held)
     assume(frames_in(request, alien + frame) == [frame])
     assert got is None
-    assert outcome(reader, [frame]) == wanted(request, words)
+    assert outcome(reader, [frame]) == wanted(request, held)
 
 
 @given(st.data(), exchanges(CLOSE))
 def test_exception_to_somebody_else_is_passed_over(
-    data: st.DataObject, exchange: tuple[Request, Words]
+    data: st.DataObject, exchange: tuple[Request, bytes]
 ) -> None:
-    request, words = exchange
+    request, held = exchange
     function = {3: 6, 6: 16, 16: 3}[request.function]
     aliens = [
         opinion.exception(request.unit + 1, request.function, 2),
         opinion.exception(request.unit, function, 2),
     ]
-    frame = answer_to(request, words)
+    frame = answer_to(request, held)
     stream = b''.join([*aliens, frame])
     assume(frames_in(request, stream) == [frame])
-    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, words)
+    assert outcome(RtuReader(request), data.draw(pieces(stream))) == wanted(request, held)
 
 
 @given(exchanges(CLOSE), st.binary(min_size=1, max_size=10))
 def test_bytes_behind_the_answer_are_counted(
-    exchange: tuple[Request, Words], rest: bytes
+    exchange: tuple[Request, bytes], rest: bytes
 ) -> None:
-    request, words = exchange
+    request, held = exchange
     reader = RtuReader(request)
-    assert reader.feed(answer_to(request, words) + rest) == wanted(request, words)
+    assert reader.feed(answer_to(request, held) + rest) == wanted(request, held)
     assert reader.received == len(rest)
 
 
 @given(exchanges(CLOSE), st.integers(1, 255))
-def test_feeding_goes_on_after_a_refusal(exchange: tuple[Request, Words], code: int) -> None:
-    request, words = exchange
+def test_feeding_goes_on_after_a_refusal(exchange: tuple[Request, bytes], code: int) -> None:
+    request, held = exchange
     reader = RtuReader(request)
-    stream = opinion.exception(request.unit, request.function, code) + answer_to(request, words)
+    stream = opinion.exception(request.unit, request.function, code) + answer_to(request, held)
     with pytest.raises(Refused):
         reader.feed(stream)
-    assert reader.feed(b'') == wanted(request, words)
+    assert reader.feed(b'') == wanted(request, held)
 
 
 # --- any bytes at all -----------------------------------------------------------------------------
 
-Outcome = Words | str | None
+Outcome = bytes | str | None
 
 
 def outcome(reader: RtuReader, data: list[bytes]) -> Outcome:
-    """What comes of bytes: words, a refusal, or nothing; anything else raises."""
+    """What comes of bytes: contents, a refusal, or nothing; anything else raises."""
     try:
         return feed(reader, data)
     except Refused as refusal:
@@ -318,10 +323,9 @@ def everything(request: Request, stream: bytes) -> set[Outcome]:
         if frame[1] & 0x80:
             possible.add(f'refused {frame[2]}')
         elif isinstance(request, Read):
-            body = frame[3:-2]
-            possible.add(tuple(body[i] << 8 | body[i + 1] for i in range(0, len(body), 2)))
+            possible.add(frame[3:-2])
         else:
-            possible.add(())
+            possible.add(b'')
     return possible or {None}
 
 
@@ -330,8 +334,8 @@ def traffic(draw: st.DrawFn, request: Request) -> bytes:
     """Noise, answers whole, cut and damaged, to this request and to others, in any order."""
     other = draw(CLOSE)
     whole: list[Callable[[], bytes]] = [
-        lambda: answer_to(request, draw(words_for(request))),
-        lambda: answer_to(other, draw(words_for(other))),
+        lambda: answer_to(request, draw(contents_for(request))),
+        lambda: answer_to(other, draw(contents_for(other))),
         lambda: opinion.exception(request.unit, request.function, draw(st.integers(0, 255))),
         lambda: opinion.exception(other.unit, other.function, draw(st.integers(0, 255))),
         lambda: encode(other),

@@ -26,6 +26,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
+from support.addresses import register
+from support.addresses import words_of
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.errors import DamagedAnswer
@@ -122,9 +125,9 @@ def write_and_read_request(request: WriteAndRead) -> bytes:
         read_address=request.source,
         read_count=request.count,
         write_address=request.register,
-        write_count=len(request.words),
-        write_byte_count=2 * len(request.words),
-        write_registers=list(request.words),
+        write_count=len(request.data) // 2,
+        write_byte_count=len(request.data),
+        write_registers=list(words_of(request.data)),
     )
 
 
@@ -145,7 +148,7 @@ WRITES_AND_READS = st.builds(
     WriteAndRead,
     UNIT,
     REGISTER,
-    st.lists(WORD, min_size=1, max_size=121).map(tuple),
+    st.lists(WORD, min_size=1, max_size=121).map(lambda words: packed(*words)),
     REGISTER,
     st.integers(1, 125),
 )
@@ -155,7 +158,9 @@ FEW = st.sampled_from([1, 2])
 CLOSE = st.one_of(
     st.builds(ReadDevice, FEW, CODES, st.sampled_from([0, 5])),
     st.builds(ReportSlaveId, FEW),
-    st.builds(WriteAndRead, FEW, st.just(0x294), st.just((3,)), st.just(0x2A5), st.integers(1, 2)),
+    st.builds(
+        WriteAndRead, FEW, st.just(0x294), st.just(packed(3)), st.just(0x2A5), st.integers(1, 2)
+    ),
 )
 CONTENT = st.binary(max_size=20)
 
@@ -166,7 +171,7 @@ def answers(draw: st.DrawFn, request: Request[Any]) -> tuple[bytes, object]:
     unit = request.unit
     if isinstance(request, WriteAndRead):
         words = draw(st.lists(WORD, min_size=request.count, max_size=request.count).map(tuple))
-        return write_and_read_answer(unit, words), words
+        return write_and_read_answer(unit, words), packed(*words)
     if isinstance(request, ReportSlaveId):
         if draw(st.booleans()):
             report = draw(st.binary(max_size=251))
@@ -221,7 +226,7 @@ def spoil(frame: bytes, bit: int) -> bytes:
         (ReportSlaveId(1), '01 11 C0 2C'),
         # the standard's example of function 23
         (
-            WriteAndRead(17, 14, (255, 255, 255), 3, 6),
+            WriteAndRead(17, 14, packed(255, 255, 255), 3, 6),
             '11 17 0003 0006 000E 0003 06 00FF 00FF 00FF',
         ),
     ],
@@ -249,8 +254,8 @@ def test_request_is_pymodbus_s(request: Request[Any]) -> None:
         assert frame == write_and_read_request(request)
         assert (decoded.read_address, decoded.read_count) == (request.source, request.count)
         assert decoded.write_address == request.register
-        assert decoded.write_count == len(request.words)
-        assert tuple(decoded.write_registers) == request.words
+        assert decoded.write_count == len(request.data) // 2
+        assert packed(*decoded.write_registers) == request.data
 
 
 @given(st.data(), REQUESTS)
@@ -341,8 +346,7 @@ def meaning(request: Request[Any], frame: bytes) -> object:
         return frame[3:-2]
     assert isinstance(request, WriteAndRead)
     body = frame[3:-2]
-    words = tuple(body[i] << 8 | body[i + 1] for i in range(0, len(body) - 1, 2))
-    return words if len(body) == 2 * request.count else None
+    return body if len(body) == 2 * request.count else None
 
 
 def everything(request: Request[Any], stream: bytes) -> list[object]:
@@ -594,8 +598,8 @@ def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
 
 TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
-ONE = Address((0x2A5,), 1)
-TWO = Address((0x258,), 2)
+ONE = register(0x2A5)
+TWO = register(0x258, 2)
 
 
 class Unit:
@@ -633,9 +637,9 @@ class Unit:
         with self.wire.time():
             return asked_all(self.link.identify(1))
 
-    def read(self, address: Address = ONE) -> tuple[int, ...]:
+    def read(self, address: Address = ONE) -> bytes:
         with self.wire.time():
-            return self.link.read(1, address).words
+            return self.link.read(1, address).data
 
 
 def silent(frame: bytes) -> bytes:
@@ -652,7 +656,7 @@ def test_a_g2_tells_who_it_is(baud: int) -> None:
     assert unit.identify() == KNOWN
     assert unit.functions == [43, 17]
     unit.wire.check_gaps()
-    assert unit.read() == (3,), 'and there is no doubt'
+    assert unit.read() == packed(3), 'and there is no doubt'
 
 
 def test_nothing_is_sent_before_the_first_question() -> None:
@@ -669,7 +673,7 @@ def test_refusals_cost_no_time_out() -> None:
     assert unit.identify() == Identification()
     assert unit.functions == [43, 17]
     assert unit.wire.now - before < TIMEOUT / 2
-    assert unit.read() == (3,)
+    assert unit.read() == packed(3)
 
 
 def test_silence_costs_one_time_out_each() -> None:
@@ -679,7 +683,7 @@ def test_silence_costs_one_time_out_each() -> None:
     assert unit.identify() == Identification()
     assert unit.functions == [43, 17]
     assert 2 * TIMEOUT < unit.wire.now - before < 2.5 * TIMEOUT
-    assert unit.read() == (3,)
+    assert unit.read() == packed(3)
     assert unit.identify() == Identification()
     assert unit.functions == [43, 17, 3, 43, 17], 'the doubt was over'
     unit.wire.check_gaps()
@@ -692,7 +696,7 @@ def test_late_answer_is_not_taken_for_another(function: int) -> None:
     found = unit.identify()
     assert found.vendor == ('' if function == 43 else KNOWN.vendor)
     assert found.serial == ('' if function == 17 else KNOWN.serial)
-    assert unit.read() == (len(unit.functions),)
+    assert unit.read() == packed(len(unit.functions))
     assert unit.functions == [43, 17, 3]
 
 
@@ -701,7 +705,7 @@ def test_a_late_refusal_is_not_taken_for_another_one() -> None:
     unit.answers[43] = refuses
     unit.late[43] = 1.2
     assert unit.identify() == Identification(serial=KNOWN.serial)
-    assert unit.read() == (len(unit.functions),)
+    assert unit.read() == packed(len(unit.functions))
 
 
 @pytest.mark.parametrize('function', [43, 17])
@@ -711,7 +715,7 @@ def test_damaged_answer_leaves_it_empty(function: int) -> None:
     unit.answers[function] = lambda frame: spoil(good(frame), 90)
     found = unit.identify()
     assert (found.vendor == '', found.serial == '') == (function == 43, function == 17)
-    assert unit.read() == (len(unit.functions),)
+    assert unit.read() == packed(len(unit.functions))
 
 
 @pytest.mark.parametrize('cut', [2, 5, 8, 9, 30, 80])
@@ -742,7 +746,7 @@ def test_doubled_answer_is_noticed() -> None:
     unit = Unit()
     unit.answers[43] = lambda frame: 2 * device_answer(1, REGULAR, G2)
     assert unit.identify() == KNOWN
-    assert unit.read() == (len(unit.functions),)
+    assert unit.read() == packed(len(unit.functions))
 
 
 def test_a_unit_whose_reads_are_in_doubt_can_say_who_it_is() -> None:
@@ -761,10 +765,10 @@ def test_a_unit_whose_reads_are_in_doubt_can_say_who_it_is() -> None:
 def test_write_and_read() -> None:
     unit = Unit()
     with unit.wire.time():
-        reply = unit.link.write_and_read(1, TWO, (1, 2), ONE)
-    assert reply.words == (1,)
+        reply = unit.link.write_and_read(1, TWO, packed(1, 2), ONE)
+    assert reply.data == packed(1)
     assert reply.arrived == unit.wire.now
-    request = WriteAndRead(1, 0x258, (1, 2), 0x2A5, 1)
+    request = WriteAndRead(1, 0x258, packed(1, 2), 0x2A5, 1)
     assert unit.wire.sent[-1][1] == write_and_read_request(request)
 
 
@@ -772,12 +776,12 @@ def test_write_and_read_is_doubted_as_a_read_is() -> None:
     unit = Unit()
     unit.late[23] = 1.5
     with unit.wire.time(), pytest.raises(NoAnswer) as error:
-        unit.link.write_and_read(1, ONE, (7,), ONE)
+        unit.link.write_and_read(1, ONE, packed(7), ONE)
     assert error.value.maybe_done
     unit.late.clear()
     with unit.wire.time():
         # what is written is never held back: it goes alone, for its answer names it
-        assert unit.link.write_and_read(1, ONE, (7,), ONE).words == ()
+        assert unit.link.write_and_read(1, ONE, packed(7), ONE).data == b''
     assert unit.functions == [23, 6]
 
 
@@ -785,5 +789,5 @@ def test_write_and_read_refused() -> None:
     unit = Unit()
     unit.answers[23] = refuses
     with unit.wire.time(), pytest.raises(Refused) as refusal:
-        unit.link.write_and_read(1, ONE, (7,), ONE)
+        unit.link.write_and_read(1, ONE, packed(7), ONE)
     assert refusal.value.code == Refused.ILLEGAL_FUNCTION

@@ -36,6 +36,7 @@ from link_bench import C
 from link_bench import D
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
 from virtual_wire import Fate
 
 from nfo_sinus_driver.link.errors import DamagedAnswer
@@ -55,10 +56,10 @@ from nfo_sinus_driver.link.settings import LineSettings
 @pytest.mark.parametrize('lump', [False, True])
 def test_read_and_write(lump: bool) -> None:
     bench = Bench([Fate(lump=lump)] * 4)
-    assert bench.read(A).words == bench.answer_of(0)
-    assert bench.read(C).words == bench.answer_of(1)
-    assert bench.write(A, 5).words == ()
-    assert bench.write(C, 5, 6).words == ()
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.read(C).data == bench.answer_of(1)
+    assert bench.write(A, 5).data == b''
+    assert bench.write(C, 5, 6).data == b''
     assert [request[1:] for request in bench.slave.requests] == [
         (3, 0x400, 1),
         (3, 0x3EC, 2),
@@ -122,7 +123,7 @@ def test_answer_just_in_time_is_taken_whole() -> None:
     # the first byte counts: a long answer at 1200 bit/s takes longer than the time-out itself
     line = LineSettings(baud_rate=1200, response_timeout=0.02)
     bench = Bench([Fate(0.5)], line)
-    assert bench.read(C).words == bench.answer_of(0)
+    assert bench.read(C).data == bench.answer_of(0)
 
 
 def test_answer_with_a_pause_inside() -> None:
@@ -135,7 +136,7 @@ def test_answer_with_a_pause_inside() -> None:
         bench.wire.arrive(end + 0.02, frame[3:], lump=True)
 
     bench.wire.far_end = far_end
-    assert bench.read(A).words == (77,)
+    assert bench.read(A).data == packed(77)
 
 
 @pytest.mark.parametrize('cut', [1, 3, 6])
@@ -165,7 +166,7 @@ def test_refusal() -> None:
         assert error.code == bench.slave.code(number)
         assert not error.maybe_done
     # a refusal is an answer: there is nothing to doubt
-    assert bench.read(A).words == bench.answer_of(2)
+    assert bench.read(A).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 
 
@@ -176,7 +177,7 @@ def test_closing_forgets_all_doubts() -> None:
     assert not bench.wire.is_open
     with bench.wire.time():
         bench.link.open()
-    assert bench.read(A).words == bench.answer_of(1)
+    assert bench.read(A).data == bench.answer_of(1)
     assert bench.asked == [0x400, 0x400]
 
 
@@ -199,9 +200,9 @@ def test_late_answer_is_not_taken_for_the_next_one() -> None:
     bench = Bench([Fate(1.5)])
     bench.expect(NoAnswer, lambda: bench.read(A))
     # the answer to A, of the same shape as one to B, is still on its way
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(B).data == bench.answer_of(2)
     assert bench.asked == [0x400, 0x258, 0x264]
-    assert bench.read(B).words == bench.answer_of(3)
+    assert bench.read(B).data == bench.answer_of(3)
     assert len(bench.asked) == 4
 
 
@@ -209,8 +210,8 @@ def test_late_answer_is_not_taken_for_the_next_one() -> None:
 def test_probe_has_another_shape(first: Address, probe: Address, second: Address) -> None:
     bench = Bench([Fate(what='drop')])
     bench.expect(NoAnswer, lambda: bench.read(first))
-    assert bench.read(second).words == bench.answer_of(2)
-    assert bench.asked[1] == probe.numbers[0]
+    assert bench.read(second).data == bench.answer_of(2)
+    assert bench.asked[1] == probe.index
 
 
 def test_write_goes_out_at_once_even_in_doubt() -> None:
@@ -218,7 +219,7 @@ def test_write_goes_out_at_once_even_in_doubt() -> None:
     bench.expect(NoAnswer, lambda: bench.read(A))
     bench.expect(NoAnswer, lambda: bench.read(A))
     before = bench.wire.now
-    assert bench.write(A, 0).words == ()
+    assert bench.write(A, 0).data == b''
     assert bench.wire.sent[-1][0] - before <= SETTINGS.frame_gap + 1e-9
     assert bench.asked[2:] == [0x400]
 
@@ -226,9 +227,9 @@ def test_write_goes_out_at_once_even_in_doubt() -> None:
 def test_late_answer_before_a_write_is_passed_over() -> None:
     bench = Bench([Fate(1.2)])
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.write(B, 5).words == ()
+    assert bench.write(B, 5).data == b''
     # units answer in order, so the doubt is over
-    assert bench.read(A).words == bench.answer_of(2)
+    assert bench.read(A).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 
 
@@ -238,7 +239,7 @@ def test_late_answer_to_a_write_does_not_end_the_doubt() -> None:
     bench = Bench([Fate(2.9), Fate(2.5)])
     bench.expect(NoAnswer, lambda: bench.write(B, 5))
     bench.expect(NoAnswer, lambda: bench.read(C))
-    assert bench.write(B, 5).words == ()
+    assert bench.write(B, 5).data == b''
     assert read_or_none(bench, A) in (None, bench.answer_of(len(bench.asked) - 1))
 
 
@@ -246,7 +247,7 @@ def test_late_answer_while_the_next_request_still_leaves() -> None:
     # the silence between frames counts from the end of the request, not from what came before it
     bench = Bench([Fate(0.97, lump=True)])
     bench.expect(NoAnswer, lambda: bench.write(A, 5))
-    assert bench.write(A, 5).words == ()
+    assert bench.write(A, 5).data == b''
     start, frame = bench.wire.sent[-1]
     assert bench.wire.now < start + len(frame) * SETTINGS.char_time
     bench.read(A)
@@ -255,7 +256,7 @@ def test_late_answer_while_the_next_request_still_leaves() -> None:
 
 def read_or_none(bench: Bench, address: Address) -> tuple[int, ...] | None:
     try:
-        return bench.read(address).words
+        return bench.read(address).data
     except LinkError:
         return None
 
@@ -264,7 +265,7 @@ def test_refusal_is_not_taken_for_that_of_another_request() -> None:
     # the first write is refused late, within the time of the second
     bench = Bench([Fate(1.5, 'refuse'), Fate()])
     bench.expect(NoAnswer, lambda: bench.write(A, 5))
-    assert bench.write(B, 5).words == ()
+    assert bench.write(B, 5).data == b''
 
 
 def test_several_late_refusals_at_once() -> None:
@@ -272,13 +273,13 @@ def test_several_late_refusals_at_once() -> None:
     bench = Bench([Fate(what='drop'), Fate(what='drop')])
     bench.expect(NoAnswer, lambda: bench.write(A, 5))
     bench.expect(NoAnswer, lambda: bench.write(B, 5))
-    lump = opinion.exception(UNIT, 6, 3) * 2 + opinion.write_answer(UNIT, D.numbers[0], [5])
+    lump = opinion.exception(UNIT, 6, 3) * 2 + opinion.write_answer(UNIT, D.index, [5])
 
     def far_end(request: bytes, end: float) -> None:
         bench.wire.arrive(end, lump, lump=True)
 
     bench.wire.far_end = far_end
-    assert bench.write(D, 5).words == ()
+    assert bench.write(D, 5).data == b''
 
 
 def test_refusal_of_another_function_is_believed_in_doubt() -> None:
@@ -295,7 +296,7 @@ def test_refusals_that_nobody_can_tell_apart_keep_no_reads_out() -> None:
     bench.expect(NoAnswer, lambda: bench.write(B, 0))
     for _ in range(3):
         bench.expect(DamagedAnswer, lambda: bench.write(B, 0))
-    assert bench.read(A).words == bench.answer_of(len(bench.asked) - 1)
+    assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
     # and now that an answer has come, the next refusal is believed
     bench.slave.heal(Fate(what='refuse'))
     bench.expect(Refused, lambda: bench.write(B, 0))
@@ -305,15 +306,15 @@ def test_refused_probe_is_an_answer() -> None:
     # it says that the line can be believed, and nothing about the request behind it
     bench = Bench([Fate(what='drop'), Fate(what='refuse'), Fate()], probes=())
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(B).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 
 
 @pytest.mark.parametrize('lump', [False, True])
 def test_doubled_answer_is_noticed(lump: bool) -> None:
     bench = Bench([Fate(what='double', lump=lump)])
-    assert bench.read(A).words == bench.answer_of(0)
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.read(B).data == bench.answer_of(2)
     assert bench.asked == [0x400, 0x258, 0x264]
 
 
@@ -321,7 +322,7 @@ def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
     bench = Bench()
     bench.read(A)
     bench.wire.arrive(bench.wire.now, opinion.read_answer(UNIT, [99]))
-    assert bench.read(B).words == bench.answer_of(2)
+    assert bench.read(B).data == bench.answer_of(2)
     assert bench.asked == [0x400, 0x258, 0x264]
     bench.wire.check_gaps()
 
@@ -329,7 +330,7 @@ def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
 def test_bytes_before_the_first_request_are_nothing() -> None:
     bench = Bench()
     bench.wire.arrive(bench.wire.now, b'\xff\x00')
-    assert bench.read(A).words == bench.answer_of(0)
+    assert bench.read(A).data == bench.answer_of(0)
     bench.wire.check_gaps()
 
 
@@ -337,7 +338,7 @@ def test_doubt_of_one_unit_is_not_that_of_another() -> None:
     bench = Bench([Fate(1.5)])
     bench.link.use_probes(2, (ONE, TWO))
     bench.expect(NoAnswer, lambda: bench.read(A))
-    assert bench.read(B, unit=2).words == bench.answer_of(1)
+    assert bench.read(B, unit=2).data == bench.answer_of(1)
     assert [request[0] for request in bench.slave.requests] == [1, 2]
 
 
@@ -424,13 +425,13 @@ def test_every_answer_belongs_to_its_request(
         is_write = what.startswith('write')
         try:
             if is_write:
-                assert bench.write(address, *(7,) * address.words).words == ()
+                assert bench.write(address, *(7,) * (address.size // 2)).data == b''
             else:
-                words = bench.read(address).words
-                assert bench.asked[-1] == address.numbers[0]
-                assert words == bench.answer_of(len(sent) - 1)
+                told = bench.read(address).data
+                assert bench.asked[-1] == address.index
+                assert told == bench.answer_of(len(sent) - 1)
         except Refused as refusal:
-            assert bench.asked[-1] == address.numbers[0]
+            assert bench.asked[-1] == address.index
             assert refusal.code == bench.slave.code(len(sent) - 1)
         except NotReady as refusal:
             assert not is_write

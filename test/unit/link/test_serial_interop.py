@@ -22,16 +22,17 @@ import contextlib
 from pymodbus_server import REGISTERS
 from pymodbus_server import serial_server
 import pytest
+from support.addresses import packed
+from support.addresses import register
 
-from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.open import line_settings
 
-ONE = Address((0x2A5,), 1)
-TWO = Address((0x258,), 2)
+ONE = register(0x2A5)
+TWO = register(0x258, 2)
 
 
 @pytest.fixture(scope='module', params=['rtu', 'ascii'])
@@ -46,28 +47,28 @@ def link(request: pytest.FixtureRequest) -> Iterator[Link]:
 
 
 def test_read(link: Link) -> None:
-    assert link.read(1, ONE).words == (0x2A5,)
-    assert link.read(1, TWO).words == (0x258, 0x259)
-    assert link.read(2, TWO).words == (0x258, 0x259)
+    assert link.read(1, ONE).data == packed(0x2A5)
+    assert link.read(1, TWO).data == packed(0x258, 0x259)
+    assert link.read(2, TWO).data == packed(0x258, 0x259)
 
 
 def test_write_and_read_back(link: Link) -> None:
-    assert link.write(1, Address((0x400,), 1), (0xABCD,)).words == ()
-    assert link.write(1, Address((0x410,), 2), (0x3A0D, 0x0A3A)).words == ()
-    assert link.read(1, Address((0x400,), 1)).words == (0xABCD,)
-    assert link.read(1, Address((0x410,), 2)).words == (0x3A0D, 0x0A3A)
+    assert link.write(1, register(0x400), packed(0xABCD)).data == b''
+    assert link.write(1, register(0x410, 2), packed(0x3A0D, 0x0A3A)).data == b''
+    assert link.read(1, register(0x400)).data == packed(0xABCD)
+    assert link.read(1, register(0x410, 2)).data == packed(0x3A0D, 0x0A3A)
     # and one drive is not another
-    assert link.read(2, Address((0x400,), 1)).words == (0x400,)
+    assert link.read(2, register(0x400)).data == packed(0x400)
 
 
 def test_write_and_read_at_once(link: Link) -> None:
-    words = link.write_and_read(1, Address((0x420,), 1), (7,), Address((0x420,), 2)).words
-    assert words == (7, 0x421)
+    reply = link.write_and_read(1, register(0x420), packed(7), register(0x420, 2))
+    assert reply.data == packed(7, 0x421)
 
 
 def test_refusal(link: Link) -> None:
     with pytest.raises(Refused) as refusal:
-        link.read(1, Address((REGISTERS[-1] + 1,), 1))
+        link.read(1, register(REGISTERS[-1] + 1))
     assert refusal.value.code == Refused.ILLEGAL_ADDRESS
 
 

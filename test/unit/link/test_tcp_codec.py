@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pymodbus_opinion as opinion
 import pytest
+from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.modbus_pdu import Read
@@ -46,7 +47,7 @@ def pieces(draw: st.DrawFn, data: bytes) -> list[bytes]:
         # the example of the implementation guide's annex, and a status word of the G2
         (Read(0xFF, 4, 1), 0x1501, '15 01 00 00 00 06 FF 03 00 04 00 01'),
         (Read(1, 0x2A5, 1), 1, '00 01 00 00 00 06 01 03 02 A5 00 01'),
-        (Write(17, 1, (3,)), 0xFFFF, 'FF FF 00 00 00 06 11 06 00 01 00 03'),
+        (Write(17, 1, packed(3)), 0xFFFF, 'FF FF 00 00 00 06 11 06 00 01 00 03'),
     ],
 )
 def test_golden_frames(request_: Request[object], number: int, frame: str) -> None:

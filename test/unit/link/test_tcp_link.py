@@ -27,6 +27,9 @@ from pymodbus_server import PATIENCE
 from pymodbus_server import REGISTERS
 from pymodbus_server import tcp_server
 import pytest
+from support.addresses import packed
+from support.addresses import register
+from support.addresses import words_of
 
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
@@ -40,9 +43,9 @@ from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.tcp_link import TcpLink
 
-A = Address((0x400,), 1)
-B = Address((0x264,), 1)
-TWO = Address((0x258,), 2)
+A = register(0x400)
+B = register(0x264)
+TWO = register(0x258, 2)
 
 
 # --- pymodbus's server ----------------------------------------------------------------------------
@@ -59,19 +62,19 @@ def link() -> Iterator[TcpLink]:
 
 
 def test_read_and_write(link: TcpLink) -> None:
-    assert link.read(1, A).words == (0x400,)
-    assert link.read(2, TWO).words == (0x258, 0x259)
-    assert link.write(1, A, (5,)).words == ()
-    assert link.write(1, TWO, (6, 7)).words == ()
-    assert link.read(1, A).words == (5,)
-    assert link.read(1, TWO).words == (6, 7)
-    assert link.read(2, A).words == (0x400,)
-    assert link.write_and_read(2, A, (8,), A).words == (8,)
+    assert link.read(1, A).data == packed(0x400)
+    assert link.read(2, TWO).data == packed(0x258, 0x259)
+    assert link.write(1, A, packed(5)).data == b''
+    assert link.write(1, TWO, packed(6, 7)).data == b''
+    assert link.read(1, A).data == packed(5)
+    assert link.read(1, TWO).data == packed(6, 7)
+    assert link.read(2, A).data == packed(0x400)
+    assert link.write_and_read(2, A, packed(8), A).data == packed(8)
 
 
 def test_refusal(link: TcpLink) -> None:
     with pytest.raises(Refused) as refusal:
-        link.read(1, Address((REGISTERS[-1] + 1,), 1))
+        link.read(1, register(REGISTERS[-1] + 1))
     assert refusal.value.code == Refused.ILLEGAL_ADDRESS
 
 
@@ -192,10 +195,10 @@ def opened(gateway: Gateway, timeout: float) -> Iterator[TcpLink]:
 
 def read(link: TcpLink, address: Address, gateway: Gateway) -> None:
     """Read, and see that it is the answer to this very request."""
-    words = link.read(1, address).words
+    told = link.read(1, address).data
     number, message = gateway.requests[-1]
-    assert int.from_bytes(message[2:4], 'big') == address.numbers[0]
-    assert words == (address.numbers[0] + number,) * address.words
+    assert int.from_bytes(message[2:4], 'big') == address.index
+    assert words_of(told) == (address.index + number,) * (address.size // 2)
 
 
 def nothing(frame: Frame) -> bytes:
@@ -218,7 +221,7 @@ def test_whatever_becomes_of_the_read_the_write_is_the_next_frame(
     gateway.then(reply, answer)
     # a busy machine may miss the answer to the write
     with contextlib.suppress(GatewaySilent):
-        assert hasty.read_then_write(1, A, B, (0,)).words == ()
+        assert hasty.read_then_write(1, A, B, packed(0)).data == b''
     deadline = time.monotonic() + PATIENCE
     while len(gateway.requests) < 2 and time.monotonic() < deadline:
         time.sleep(0.001)
@@ -228,11 +231,11 @@ def test_whatever_becomes_of_the_read_the_write_is_the_next_frame(
 def test_once_the_read_was_sent_it_may_have_been_done(gateway: Gateway, patient: TcpLink) -> None:
     gateway.then(answer, lambda frame: refusal(frame, Refused.DEVICE_FAILURE))
     with pytest.raises(Refused) as refused:
-        patient.read_then_write(1, A, B, (0,))
+        patient.read_then_write(1, A, B, packed(0))
     assert refused.value.maybe_done
     gateway.then(lambda frame: None)
     with pytest.raises(PortError):
-        patient.read_then_write(1, A, B, (0,))
+        patient.read_then_write(1, A, B, packed(0))
     assert len(gateway.requests) == 3
 
 
@@ -302,7 +305,7 @@ def test_silent_drive_leaves_the_others_alone(gateway: Gateway, hasty: TcpLink) 
 def test_drive_that_is_silent_to_the_gateway(gateway: Gateway, patient: TcpLink) -> None:
     gateway.then(lambda frame: refusal(frame, 11))
     with pytest.raises(NoAnswer, match='unit 1 did not answer the gateway') as silence:
-        patient.write(1, A, (5,))
+        patient.write(1, A, packed(5))
     assert type(silence.value) is NoAnswer
     assert silence.value.maybe_done
     read(patient, A, gateway)
@@ -391,7 +394,7 @@ def test_gateway_that_never_stops_talking(gateway: Gateway, hasty: TcpLink) -> N
 def test_numbers_go_round(gateway: Gateway, patient: TcpLink) -> None:
     patient._number = 0xFFFE
     for _ in range(3):
-        patient.write(1, A, (5,))
+        patient.write(1, A, packed(5))
     assert [number for number, _ in gateway.requests] == [0xFFFF, 1, 2]
 
 

@@ -45,7 +45,7 @@ def test_same_words_cost_no_request_and_hardly_any_time() -> None:
     first = bench.wire.now - began
     began = bench.wire.now
     bench.read(A)
-    assert bench.asked == [A.numbers[0], B.numbers[0], A.numbers[0]]
+    assert bench.asked == [A.index, B.index, A.index]
     assert bench.wire.now - began == pytest.approx(first, rel=0.1)
 
 
@@ -54,11 +54,11 @@ def test_answer_told_twice_is_not_taken_for_the_next(again: float) -> None:
     # the unit takes as long as it does, and the second copy comes within that
     bench = trusting([Fate(delay=0.2), Fate(0.2, 'double', again=again), Fate(delay=0.2)])
     bench.read(D)
-    first = bench.read(A).words
+    first = bench.read(A).data
     error = bench.expect(DamagedAnswer, lambda: bench.read(B))
     assert 'came twice' in str(error)
     # from now on nothing is believed that could be told twice
-    assert bench.read(B).words == bench.answer_of(len(bench.asked) - 1) != first
+    assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1) != first
 
 
 def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
@@ -69,11 +69,11 @@ def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
     bench.slave = SameWords(bench.wire)
     bench.read(A)
     bench.read(B)
-    assert bench.asked[-1] not in (A.numbers[0], B.numbers[0]), 'nothing confirmed it'
+    assert bench.asked[-1] not in (A.index, B.index), 'nothing confirmed it'
     bench.wire.now += serial_link.DISTRUST + 1.0
     bench.read(A)
     bench.read(B)
-    assert bench.asked[-2:] == [A.numbers[0], B.numbers[0]]
+    assert bench.asked[-2:] == [A.index, B.index]
 
 
 def test_one_slow_answer_does_not_slow_the_others_for_ever() -> None:

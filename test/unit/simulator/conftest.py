@@ -22,6 +22,8 @@ import time
 import tty
 
 import pytest
+from support.addresses import packed
+from support.addresses import words_of
 
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.family import simulated_drive
@@ -37,13 +39,14 @@ class Bench:
 
     def write(self, key, value):
         parameter = self.drive.model[key]
-        words = parameter.encode(value)
+        words = words_of(parameter.encode(value))
         server(self.drive).write(parameter.at('modbus').index, words)
 
     def read(self, key):
         parameter = self.drive.model[key]
         place = parameter.at('modbus')
-        return parameter.decode(server(self.drive).read(place.index, place.words))
+        words = server(self.drive).read(place.index, place.codec.size // 2)
+        return parameter.decode(packed(*words))
 
     def mode(self, code):
         self.write('fieldbus.mode', code)

@@ -12,35 +12,40 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Reading a value of two words where each is a transaction of its own, as over Classic."""
+"""Reading a value of two parts where each is a transaction of its own, as over Classic."""
 
 from __future__ import annotations
 
 from collections.abc import Generator
+from collections.abc import Sequence
 
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
 
-#: How often the words of a value that changes meanwhile are read again.
+#: How often the parts of a value that changes meanwhile are read again.
 _TRIES = 5
 
 
-def in_steps(unit: int, address: Address) -> Generator[Address, Reply, Reply]:
+def consistent_read(
+    unit: int, parts: Sequence[Address]
+) -> Generator[Address, Reply, Reply]:
     """
-    Yield the words to read, one by one, and take what each was answered; return the whole.
+    Yield the parts to read, one by one, and take what each was answered; return the whole.
 
-    The high word, the low one, and the high one again until it stands still: others may talk
+    The high part, the low one, and the high one again until it stands still: others may talk
     between, and the value may change, but what is returned has been the value at one moment.
+
+    :param parts: the low one, then the high one.
 
     :raises DamagedAnswer: it never stood still.
     """
-    low_word, high_word = (Address((number,), 1) for number in address.numbers)
-    reply = yield high_word
+    low_part, high_part = parts
+    reply = yield high_part
     for _ in range(_TRIES):
-        high = reply.words
-        low = (yield low_word).words
-        reply = yield high_word
-        if reply.words == high:
+        high = reply.data
+        low = (yield low_part).data
+        reply = yield high_part
+        if reply.data == high:
             return Reply(low + high, reply.arrived)
-    raise DamagedAnswer(f'unit {unit}: E{address.numbers[-1]:04X} never stood still')
+    raise DamagedAnswer(f'unit {unit}: E{high_part.index:04X} never stood still')

@@ -12,19 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Taking the run command back, until the drive says that it stops."""
+"""Removes the run command of a drive, until the drive says that it stops."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
 import enum
 import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.drive.control_method import ControlMethod
-from nfo_sinus_driver.drive.control_method import Removal
+from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -33,10 +37,6 @@ from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
-#: How long a drive may take to do what it was told, its start delay not counted, s.
-PATIENCE = 2.0
-#: How often the status is looked at while something is awaited, s.
-LOOK_PERIOD = 0.02
 #: How often a stop is written again that was heard and is not confirmed, s.
 _RETRY_PERIOD = 0.2
 #: How often one is that a lost drive does not hear, for its neighbours' sake, s.
@@ -66,26 +66,29 @@ class _Busy(Exception):
     """The drive was too busy for the stop."""
 
 
-class Withdrawal:
+class StopSequence:
     """
-    Takes the run command of one drive back; there is one for a drive, shared by all who ask.
+    Removes the run command of one drive; there is one for a drive, shared by all who ask.
 
-    :param done: called when the drive has confirmed that it stops.
+    :param report: called with ``STOPPED`` when it is over, and after each attempt before with
+        ``FAULT_BLOCKS`` or ``FAULT_OVER``.
     """
 
     def __init__(
         self,
         bus: Bus,
         inverter: Inverter,
-        method: ControlMethod,
-        done: Callable[[], None],
+        method: Commands,
+        report: Callable[[ControlEvent], None],
     ) -> None:
         self._bus = bus
         self._inverter = inverter
         self._method = method
-        self._done = done
-        #: What takes the run command back, while there may be one that nobody wants any more.
+        self._report = report
+        #: What removes the run command, while there may be one that nobody wants any more.
         self._task: Task | None = None
+        #: How many stops are on their way that come with something else.
+        self._held = 0
         #: What became of the last attempt, and when; ``None`` before the first has ended.
         self._outcome: _Outcome | None = None
         self._tried_at = 0.0
@@ -98,60 +101,65 @@ class Withdrawal:
     @property
     def overdue(self) -> bool:
         """A stop is not confirmed although there was time; no fault keeps the motor still."""
-        waiting = self.going_on and not self.held_by_fault
+        waiting = self._task is not None and not self.blocked_by_fault
         return waiting and time.monotonic() >= self._due
 
     @property
-    def held_by_fault(self) -> bool:
+    def blocked_by_fault(self) -> bool:
         """The drive stands by a fault, and refuses the stop until it is acknowledged."""
-        return self.going_on and self._outcome is _Outcome.BLOCKED_BY_FAULT
+        return self._task is not None and self._outcome is _Outcome.BLOCKED_BY_FAULT
 
     @property
-    def by_fault(self) -> str:
-        """What is said of a motor that a fault has stopped."""
-        fault = self._inverter.describe()
-        return f'stopped by fault {fault}; what the drive refuses now is done when it is over'
-
-    @property
-    def going_on(self) -> bool:
+    def active(self) -> bool:
         """A stop is not confirmed yet."""
-        return self._task is not None
+        return self._task is not None or self._held > 0
 
-    def begin(self) -> None:
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Count as active while something goes on that stops the motor in its own way."""
+        self._held += 1
+        try:
+            yield
+        finally:
+            self._held -= 1
+            self._report_outcome()
+
+    def request(self) -> None:
         """
-        Take the run command back, again and again until the drive says that it stops.
+        Remove the run command, again and again until the drive says that it stops.
 
         Where that is going on already nothing has to be added: nobody is let start the motor
         meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
         """
-        if self.held_by_fault and time.monotonic() > self._tried_at + _RETRY_PERIOD:
-            self.begin_anew()
+        if self.blocked_by_fault and time.monotonic() > self._tried_at + _RETRY_PERIOD:
+            self.request_anew()
         if self._task is None:
             self._outcome = None
             self._unconfirmed = _NOT_ANSWERED
-            self._due = time.monotonic() + PATIENCE
+            self._due = time.monotonic() + confirmation.TIMEOUT
             self._task = self._bus.spawn(self._keep_trying())
 
-    def begin_anew(self) -> None:
-        """Begin, or try again at once: what attempts show that have begun counts no more."""
+    def request_anew(self) -> None:
+        """Request it, or try again at once: what attempts show that have begun counts no more."""
         if self._task is None:
-            self.begin()
+            self.request()
         else:
             self._outcome = None
             self._reasons += 1
+            self._report_outcome()
             self._bus.wake(self._task)
 
-    async def finish(self, patience: float | None = None) -> None:
+    async def wait_confirmed(self, patience: float | None = None) -> None:
         """
         Wait until the drive has confirmed that it stops, or stands because of a fault.
 
         :param patience: how long to wait, s; by default not for a drive that is lost.
-        :raises DriveError: it does not in time; the withdrawal goes on.
+        :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
-        deadline = time.monotonic() + (PATIENCE if patience is None else patience)
-        while task is not None and not await self._bus.join(task, LOOK_PERIOD):
-            if self.held_by_fault:
+        deadline = time.monotonic() + (confirmation.TIMEOUT if patience is None else patience)
+        while task is not None and not await self._bus.join(task, confirmation.LOOK_PERIOD):
+            if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
             lost = patience is None and not self._inverter.connected and self._outcome is not None
@@ -166,9 +174,9 @@ class Withdrawal:
         complain_at = self._due
         pause = 0.0
         while await self._attempt() is not _Outcome.CONFIRMED:
-            if self.held_by_fault:
+            if self.blocked_by_fault:
                 await self._fault_gone()
-                self._due = complain_at = time.monotonic() + PATIENCE
+                self._due = complain_at = time.monotonic() + confirmation.TIMEOUT
                 continue
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
@@ -180,14 +188,14 @@ class Withdrawal:
                 )
             await self._rest()
         self._task = None
-        self._done()
+        self._report_outcome()
         if pause:
             text = f'the stop is confirmed now: {self._inverter.describe()}'
             self._inverter.tell(Severity.INFO, text)
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
-        while self.held_by_fault:
+        while self.blocked_by_fault:
             await self._bus.sleep(_RETRY_PERIOD)
             seen = self._inverter.seen
             if not self._inverter.connected:
@@ -211,7 +219,7 @@ class Withdrawal:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif self._outcome is _Outcome.BUSY:
-            await self._bus.sleep(LOOK_PERIOD)
+            await self._bus.sleep(confirmation.LOOK_PERIOD)
         elif self._outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 
@@ -236,7 +244,16 @@ class Withdrawal:
         if self._reasons > reasons:
             self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NOT_ANSWERED
         self._tried_at = time.monotonic()
+        self._report_outcome()
         return self._outcome
+
+    def _report_outcome(self) -> None:
+        if not self.active:
+            self._report(ControlEvent.STOPPED)
+        elif self.blocked_by_fault:
+            self._report(ControlEvent.FAULT_BLOCKS)
+        else:
+            self._report(ControlEvent.FAULT_OVER)
 
     async def _try_once(self) -> _Outcome:
         """

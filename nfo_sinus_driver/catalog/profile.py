@@ -1,0 +1,384 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What the profile of a family is made of: data, and sequences of steps that others carry out.
+
+A sequence is a generator. It yields a step, is given what the step has brought, and yields the next
+one; so it says what to write and nothing of when, by which bus and how urgent, and is tried without
+any. A step that the drive refuses raises :class:`Refusal` where it was yielded; whatever else goes
+wrong with it ends the sequence.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable
+from collections.abc import Generator
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field
+import enum
+from typing import Any
+from typing import ClassVar
+from typing import Protocol
+from typing import TypeVar
+
+from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+
+_T = TypeVar('_T')
+
+
+class Refusal(Exception):
+    """The drive has refused a step; what it answered is the cause."""
+
+
+class NotPossible(Exception):
+    """A sequence cannot be carried out; the message says why and what to do."""
+
+
+class Status(Protocol):
+    """What a sequence may ask of the status that the drive tells."""
+
+    @property
+    def word(self) -> int | None:
+        """The status word; ``None`` if the drive has none."""
+
+    @property
+    def state(self) -> State:
+        """The state of the generic state machine."""
+
+    @property
+    def from_bus(self) -> bool:
+        """The bus has control."""
+
+
+# --- steps ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Read:
+    """
+    Read a parameter; brings its value.
+
+    :ivar once: do not repeat the request when nobody answers.
+    """
+
+    key: str
+    once: bool = False
+
+
+@dataclass(frozen=True)
+class Write:
+    """
+    Write a parameter.
+
+    :ivar value: a float is rounded to the drive's step; anything else is written as it is or not.
+    :ivar at: the parameter in whose place it is written where the line reaches that one; ``key``
+        still says how.
+    :ivar once: do not repeat the request when nobody answers.
+    :ivar head: at the head of the bus, as the very next frame.
+    """
+
+    key: str
+    value: Value
+    at: str = ''
+    once: bool = False
+    head: bool = False
+
+
+@dataclass(frozen=True)
+class Acknowledge:
+    """Read a parameter whose reading acknowledges, once; brings its value."""
+
+    key: str
+
+
+@dataclass(frozen=True)
+class AcknowledgeThenWrite:
+    """
+    Read a parameter whose reading acknowledges, and write another as the very next frame.
+
+    What became of the reading is not told.
+    """
+
+    key: str
+    write: Write
+
+
+@dataclass(frozen=True)
+class Until:
+    """
+    Wait until the drive's status fulfils a condition; if it does not, the sequence ends.
+
+    Only when control is taken and when the motor is started.
+    """
+
+    condition: Callable[[Status], bool]
+
+
+Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until
+Steps = Generator[Step, Any, _T]
+
+
+def one(step: Step) -> Steps[Any]:
+    """Return a sequence of one step."""
+    return (yield step)
+
+
+def taken(steps: Steps[None]) -> Steps[bool]:
+    """Tell whether the drive takes a sequence, and keeps what is looked at."""
+    try:
+        yield from steps
+    except (Refusal, NotPossible):
+        return False
+    return True
+
+
+# --- set-points -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SetpointTarget:
+    """
+    Where the set-points of one control mode go; here one parameter that takes them as they are.
+
+    :ivar key: that parameter.
+    :ivar most: the greatest set-point in either direction, in the unit of the control mode.
+    :ivar at: the parameter in whose place it is written, as for :class:`Write`.
+    """
+
+    key: str
+    most: float
+    at: str = ''
+
+    def writes(self, value: float) -> Sequence[Write]:
+        """Return what is to be written for a set-point, in this order: always the same keys."""
+        return (Write(self.key, value, at=self.at),)
+
+    def value(self, values: Sequence[Value]) -> float:
+        """Return the set-point that the values of :meth:`writes` mean to the drive."""
+        return float(values[0])
+
+    def zero(self, *, once: bool) -> Steps[None]:
+        """Write set-point 0; ``once``: do not repeat a request that nobody answers."""
+        for write in self.writes(0.0):
+            yield Write(write.key, write.value, at=write.at, once=once)
+
+    def set_to_zero(self) -> Steps[None]:
+        """
+        Write set-point 0, and read it back.
+
+        :raises NotPossible: the drive keeps another value.
+        """
+        yield from self.zero(once=False)
+        values: list[Value] = []
+        for write in self.writes(0.0):
+            values.append((yield Read(write.key)))
+        kept = self.value(values)
+        if kept != 0:
+            raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
+
+
+# --- control --------------------------------------------------------------------------------------
+
+
+class Holder(enum.Enum):
+    """Who has control of a drive."""
+
+    NOBODY = enum.auto()
+    BUS = enum.auto()
+    #: Keypad or terminals.
+    LOCAL = enum.auto()
+    #: Nobody can take it now.
+    INHIBITED = enum.auto()
+    #: The drive says what its manual does not.
+    UNKNOWN = enum.auto()
+
+
+class Removal(enum.Enum):
+    """What a drive with a fault has let go of, so that it does not turn the motor afterwards."""
+
+    #: It has refused everything: a run command may stand, and a set-point.
+    NOTHING = enum.auto()
+    #: The set-point is 0; a run command may stand.
+    SETPOINT = enum.auto()
+    #: No run command stands.
+    COMMAND = enum.auto()
+
+
+class Procedure(enum.Enum):
+    """What can be tuned, by name; the order is that of the action Tune."""
+
+    FULL = 'full tuning'
+    BASIC = 'basic tuning'
+    STATOR_RESISTANCE = 'stator resistance measurement'
+    CALCULATE = 'parameter calculation'
+
+
+class Reset(enum.Enum):
+    """What else a drive does by itself on a command while its motor stands, by name."""
+
+    ERROR_LOG = 'erasing the error log'
+    ENERGY = 'resetting the kWh counter'
+
+
+class ControlMethod(abc.ABC):
+    """
+    One way to command a drive: what to write, so that it does something.
+
+    :param reference: where a running drive takes its reference from, one of :attr:`references`.
+    :param reaches: tells whether a parameter can be reached over the line.
+    :cvar means: what takes its commands.
+    :cvar references: those that there are.
+    :cvar coasts: it can release the motor at once.
+    :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
+    :cvar procedures: what begins each procedure that it has.
+    """
+
+    means: ClassVar[str]
+    references: ClassVar[Sequence[str]]
+    coasts: ClassVar[bool] = False
+    older: ClassVar[bool] = True
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
+
+    def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
+        self._reference = reference
+        self._reaches = reaches
+
+    @abc.abstractmethod
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+
+    @abc.abstractmethod
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control of the drive."""
+
+    @abc.abstractmethod
+    def take_control(self) -> Steps[None]:
+        """
+        Put the drive under bus control with no run command standing.
+
+        :raises NotPossible: it lets nobody.
+        """
+
+    @abc.abstractmethod
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """
+        Write set-point 0 in the unit of a control mode, and read it back.
+
+        :raises NotPossible: the drive keeps another value, or takes none in this control mode.
+        """
+
+    @abc.abstractmethod
+    def run(self) -> Steps[None]:
+        """Give the run command; once, for nobody knows what has happened before a second one."""
+
+    @abc.abstractmethod
+    def stop(self, control_mode: str) -> Steps[None]:
+        """
+        Take the run command back and write set-point 0.
+
+        Does nothing to a drive that is not under bus control; refused if it is and does not obey.
+        """
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Release the motor at once; control may be given back by it. Else stop as usual."""
+        return self.stop(control_mode)
+
+    @abc.abstractmethod
+    def release(self) -> Steps[None]:
+        """Give control back; never by a MODE that can start the motor [C43], [C51]."""
+
+    @abc.abstractmethod
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """
+        Remove run command and set-point while a fault is active, each by itself [C98].
+
+        A drive may refuse any of it then, and may go on by what is left once the fault is over.
+        """
+
+    @abc.abstractmethod
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """
+        Acknowledge a fault, run command and set-point first where the bus has control.
+
+        From a drive that refuses to let go of them the stop is the very next frame [C98].
+
+        :param shown: the inverter status that is shown.
+        :returns: what more the drive said of it; ``''`` if nothing.
+        :raises NotPossible: it cannot be, without taking control from keypad or terminals.
+        """
+
+
+@dataclass(frozen=True)
+class OlderDialect:
+    """
+    Firmware that lacks parameters of the family, on a protocol where asking for one does harm.
+
+    :ivar protocol: that protocol.
+    :ivar name: the dialect, as a person chooses it.
+    :ivar before: the first firmware that is not of it.
+    :ivar harmless: while one of these has control, asking for what it does not know does no harm.
+    """
+
+    protocol: str
+    name: str
+    before: float
+    harmless: frozenset[Holder]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """
+    What is to be known of a family beside its tables.
+
+    :ivar title: what its maker calls it.
+    :ivar status_word: what its status word means.
+    :ivar holders: who has control, by the code of the control source.
+    :ivar methods: the ways to command it, by name; the first one is the usual one.
+    :ivar setpoints: where set-points go, by control mode.
+    :ivar in_charge: finds out by which control method the bus has control of a drive, from whom was
+        here before; given the status that was seen last, or ``None``.
+    :ivar broadcast_stop: releases the motors of all drives of a line that has a broadcast.
+    :ivar names_itself: it tells who it is by Modbus functions 43 and 17.
+    :ivar told_by: a parameter that no other family has there; ``''``: there is none.
+    :ivar writes_and_reads: it has Modbus function 23.
+    :ivar releases: what its stop mode is where an ordinary stop releases the motor.
+    :ivar older: its firmware that lacks parameters.
+    :ivar uncertain: what codes mean differs in firmware before this, by parameter.
+    """
+
+    title: str
+    status_word: StatusWord
+    holders: Mapping[int, Holder]
+    methods: Mapping[str, type[ControlMethod]]
+    setpoints: Mapping[str, SetpointTarget]
+    in_charge: Callable[[Status | None], Steps[str]]
+    broadcast_stop: Write | None = None
+    names_itself: bool = False
+    told_by: str = ''
+    writes_and_reads: bool = False
+    releases: Value = ''
+    older: OlderDialect | None = None
+    uncertain: Mapping[str, float] = field(default_factory=dict)
+
+    def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
+        """Return the control methods that have a procedure."""
+        return [name for name, method in self.methods.items() if procedure in method.procedures]

@@ -1,0 +1,195 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Runs on the bus what the profile of a family says.
+
+A control method says what to write, and nothing of when; `controller` decides that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+from collections.abc import Callable
+from typing import Any
+from typing import TypeVar
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import NotPossible
+from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Refusal
+from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.catalog import Reset
+from nfo_sinus_driver.catalog import profile
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.link import Refused
+
+_T = TypeVar('_T')
+
+#: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
+Reached = Callable[[Callable[[InverterStatus], bool]], Awaitable[None]]
+
+
+async def _not_reached(condition: Callable[[InverterStatus], bool]) -> None:
+    raise AssertionError('nothing is awaited here')
+
+
+async def carry_out(
+    steps: profile.Steps[_T],
+    registers: Registers,
+    priority: Priority,
+    reached: Reached = _not_reached,
+) -> _T:
+    """
+    Carry out a sequence of a profile on the bus.
+
+    :param reached: for a sequence that waits for the drive's status between two steps.
+    :raises DriveError: it cannot be carried out.
+    :raises LinkError: the drive does not answer; or it refuses, and the sequence ends by that.
+    """
+    brought: Any = None
+    refusal: Refusal | None = None
+    while True:
+        try:
+            step = steps.send(brought) if refusal is None else steps.throw(refusal)
+        except StopIteration as end:
+            result: _T = end.value
+            return result
+        except Refusal as refused:
+            assert isinstance(refused.__cause__, Refused)
+            raise refused.__cause__ from None
+        except NotPossible as error:
+            raise DriveError(str(error)) from error
+        brought = refusal = None
+        try:
+            if isinstance(step, profile.Read):
+                brought = await registers.read(step.key, priority, once=step.once)
+            elif isinstance(step, profile.Write):
+                await registers.write(step, priority)
+            elif isinstance(step, profile.Acknowledge):
+                brought = await registers.acknowledge(step.key, priority)
+            elif isinstance(step, profile.AcknowledgeThenWrite):
+                await registers.acknowledge_and_write(step.key, step.write)
+            else:
+                await reached(step.condition)
+        except Refused as error:
+            refusal = Refusal(str(error))
+            refusal.__cause__ = error
+
+
+class Commands:
+    """The commands of one drive, by the control method that its settings choose; for the bus."""
+
+    def __init__(self, settings: DriveSettings, registers: Registers) -> None:
+        method = registers.model.profile.methods[settings.control_method]
+        self._method = method(settings.reference, registers.reaches)
+        self._registers = registers
+
+    @property
+    def coasts(self) -> bool:
+        """It can release the motor at once."""
+        return self._method.coasts
+
+    async def in_control(self, priority: Priority) -> bool:
+        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        return await carry_out(self._method.in_control(), self._registers, priority)
+
+    async def holder(self, priority: Priority) -> Holder:
+        """Tell who has control of the drive."""
+        return await carry_out(self._method.holder(), self._registers, priority)
+
+    async def take_control(self, reached: Reached) -> None:
+        """
+        Put the drive under bus control with no run command standing.
+
+        :param reached: for a drive that refuses what comes before its status says who has control.
+        :raises DriveError: it lets nobody.
+        """
+        steps = self._method.take_control()
+        await carry_out(steps, self._registers, Priority.SERVICE, reached)
+
+    async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
+        """
+        Write set-point 0 in the unit of a control mode, and read it back.
+
+        :raises DriveError: the drive keeps another value, or takes none in this control mode.
+        """
+        await carry_out(self._method.zero_setpoint(control_mode), self._registers, priority)
+
+    async def run(self, reached: Reached) -> None:
+        """
+        Give the run command; once, for nobody knows what has happened before a second one.
+
+        :param reached: for what takes several steps, each confirmed by the drive's status.
+        :raises DriveError: a step is not confirmed.
+        """
+        await carry_out(self._method.run(), self._registers, Priority.SERVICE, reached)
+
+    async def stop(self, control_mode: str) -> None:
+        """
+        Take the run command back and write set-point 0, at the head of the bus.
+
+        Does nothing to a drive that is not under bus control.
+
+        :raises LinkError: the drive does not answer, or refuses although the bus has control.
+        """
+        await carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)
+
+    async def quick_stop(self, control_mode: str) -> None:
+        """Release the motor at once, if the drive has a way; control may be given back by it."""
+        await carry_out(self._method.quick_stop(control_mode), self._registers, Priority.STOP)
+
+    async def release(self) -> None:
+        """Give control back; never by a MODE that can start the motor [C43], [C51]."""
+        await carry_out(self._method.release(), self._registers, Priority.SERVICE)
+
+    async def remove(self, control_mode: str) -> Removal:
+        """
+        Remove run command and set-point while a fault is active, each by itself [C98].
+
+        :raises LinkError: the drive does not answer, so that nobody knows.
+        """
+        steps = self._method.remove(control_mode)
+        return await carry_out(steps, self._registers, Priority.SERVICE)
+
+    async def acknowledge(self, code: int, control_mode: str) -> str:
+        """
+        Acknowledge a fault, run command and set-point first where the bus has control.
+
+        :param code: the inverter status code that is shown.
+        :returns: what more the drive said of it; ``''`` if nothing.
+        :raises DriveError: it cannot be, without taking control from keypad or terminals.
+        :raises LinkError: the drive does not answer; what it did is not known.
+        """
+        shown = self._registers.model.status_code(code)
+        # with what it takes the motor might go on: it is no stop
+        steps = self._method.acknowledge(shown, control_mode)
+        return await carry_out(steps, self._registers, Priority.SERVICE)
+
+    async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
+        """
+        Have the drive begin a procedure; once, for nobody knows what happened before a second time.
+
+        It waits for its turn with the stops, so that one which comes later does not overtake it.
+
+        :param require_wanted: called when its turn has come; if it raises, nothing is written.
+        :raises LinkError: the drive does not answer, or refuses.
+        """
+        write = self._method.procedures[procedure]
+        await self._registers.write(write, Priority.STOP, require_wanted)

@@ -1,0 +1,576 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Who may make the motor turn, and how it is made to stop.
+
+The controller of a drive turns the table of :mod:`.control_state`: every command, everything that
+the status tells and every loss is an event in it. The motor follows set-points only while the state
+is ENABLED, to which a person's :meth:`Controller.enable` alone leads. All of this runs on the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+import math
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import control_state
+from nfo_sinus_driver.drive.advice import explain_fault
+from nfo_sinus_driver.drive.advice import explain_loss
+from nfo_sinus_driver.drive.advice import explain_stop
+from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.confirmation import Confirmation
+from nfo_sinus_driver.drive.control_state import COMMANDED
+from nfo_sinus_driver.drive.control_state import ControlEvent
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.start_sequence import StartSequence
+from nfo_sinus_driver.drive.stop_sequence import StopSequence
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+_STOP_PENDING = 'a stop is on its way and not confirmed yet: wait for it, then enable'
+
+
+class ExclusiveAccess:
+    """
+    The drive in the hands of a procedure, such as a tuning.
+
+    :param what: what for, in words.
+    """
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self._aborted = False
+
+    @property
+    def aborted(self) -> bool:
+        """The procedure shall stop what it does, or not begin it."""
+        return self._aborted
+
+    def abort(self) -> None:
+        """Have the procedure stop."""
+        self._aborted = True
+
+    def require_wanted(self) -> None:
+        """
+        See to it that nobody has stopped the procedure meanwhile.
+
+        :raises DriveError: somebody has.
+        """
+        if self._aborted:
+            raise DriveError(f'{self.what} was stopped before it began')
+
+
+class Controller:
+    """Enables, stops and judges one drive."""
+
+    def __init__(
+        self, bus: Bus, inverter: Inverter, method: Commands, setpoint: Setpoint
+    ) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._method = method
+        self._setpoint = setpoint
+        self._state = ControlState.OFFLINE
+        #: When something happened last: what was read before says nothing of it.
+        self._since = 0.0
+        #: What enables, and who has the drive, while there is one.
+        self._enabling: Task | None = None
+        self._access: ExclusiveAccess | None = None
+        self._confirmation = Confirmation(bus, inverter)
+        self._starting = StartSequence(bus, inverter, method)
+        self._sequence = StopSequence(bus, inverter, method, self._happened)
+        #: A set-point that the drive did not take: when, and what it answered.
+        self._refusal: tuple[float, str] | None = None
+        #: It was lost while it may have followed us.
+        self._lost_in_use = False
+
+    # --- where it stands ----------------------------------------------------------------------
+
+    @property
+    def state(self) -> ControlState:
+        """What the driver is doing with the drive."""
+        return self._state
+
+    @property
+    def stopping(self) -> bool:
+        """A stop is not confirmed yet."""
+        return self._sequence.active
+
+    @property
+    def blocked_by_fault(self) -> bool:
+        """The motor stands by a fault, and the drive refuses the stop until it is acknowledged."""
+        return self._sequence.blocked_by_fault
+
+    @property
+    def stop_overdue(self) -> bool:
+        """A stop is not confirmed although there was time; no fault keeps the motor still."""
+        return self._sequence.overdue
+
+    @property
+    def method(self) -> Commands:
+        """How the drive is commanded, for a procedure."""
+        return self._method
+
+    @property
+    def commanded(self) -> bool:
+        """Something that the driver has begun may drive the motor."""
+        return self._state in COMMANDED
+
+    @property
+    def changing(self) -> bool:
+        """The driver is waiting for the drive to say something else than before."""
+        return self.stopping or (self.commanded and self._state is not ControlState.ENABLED)
+
+    @property
+    def may_run(self) -> bool:
+        """The motor runs by us, or may do so, or at least the bus has control of it."""
+        seen = self._inverter.seen
+        commanded = self.commanded or self.stopping
+        return commanded or seen is None or seen.from_bus or seen.tuning
+
+    # --- the table ----------------------------------------------------------------------------
+
+    def _happened(self, event: ControlEvent) -> None:
+        """Turn the table by one event, and do what leaving a state means."""
+        before = self._state
+        self._state = control_state.TRANSITIONS.get((before, event), before)
+        self._since = time.monotonic()
+        if self._state is before:
+            return
+        if before is ControlState.ENABLED:
+            self._setpoint.disarm()
+        gone = before is ControlState.ENABLING and self._state is not ControlState.ENABLED
+        if gone and self._enabling not in (None, self._bus.current_or_none):
+            self._bus.cancel(self._enabling)
+        if self._access is not None and self._state is not ControlState.PROCEDURE:
+            self._access.abort()
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        """See to it that IDLE is what is left: a stop may be pending, or the drive be lost."""
+        if self._state is not ControlState.IDLE:
+            return
+        if self.blocked_by_fault:
+            self._happened(ControlEvent.STOP)
+            self._happened(ControlEvent.FAULT_BLOCKS)
+        elif self.stopping:
+            self._happened(ControlEvent.STOP)
+        elif not self._inverter.connected:
+            self._happened(ControlEvent.LOST)
+
+    def _stop(self, *, anew: bool = False) -> None:
+        """
+        End whatever drives the motor, and remove the run command until that is confirmed.
+
+        :param anew: what attempts show that have begun counts no more.
+        """
+        self._happened(ControlEvent.STOP)
+        if anew:
+            self._sequence.request_anew()
+        else:
+            self._sequence.request()
+
+    @contextlib.contextmanager
+    def _stopped_by_itself(self) -> Iterator[None]:
+        """Be stopping while something goes on that stops the motor in its own way."""
+        with self._sequence.held():
+            self._happened(ControlEvent.STOP)
+            yield
+
+    @contextlib.contextmanager
+    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
+        """
+        Have the drive for a procedure: whoever stops it ends the procedure, and its preparations.
+
+        :param what: what for, in words that begin a message.
+        :raises DriveError: somebody has the drive.
+        """
+        self.require_idle(what)
+        self._access = access = ExclusiveAccess(what)
+        self._happened(ControlEvent.BEGIN)
+        try:
+            yield access
+        finally:
+            self._access = None
+            self._happened(ControlEvent.END)
+
+    def require_idle(self, what: str) -> None:
+        """
+        See to it that a procedure may begin.
+
+        :raises DriveError: it may not, and why.
+        """
+        if (self._state, ControlEvent.BEGIN) in control_state.TRANSITIONS:
+            return
+        if self._access is not None:
+            raise DriveError(f'{what}: {self._access.what} is going on already')
+        if self.commanded:
+            raise DriveError(f'{what}: the motor is enabled: stop it first')
+        if self._state is ControlState.CLOSED:
+            raise DriveError('the driver is ending')
+        if self.blocked_by_fault and self._inverter.seen is not None:
+            require_no_fault(self._inverter, self._inverter.seen)
+        raise DriveError(f'{what}: a stop is not confirmed yet')
+
+    async def _require_enable(self) -> None:
+        """
+        See to it that an enable may begin.
+
+        :raises DriveError: it may not, and why; a stop that nobody has confirmed is one that who
+            enables may not know of.
+        """
+        if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
+            return
+        if self._enabling is not None:
+            raise DriveError('it is being enabled already')
+        if self._access is not None:
+            raise DriveError(f'{self._access.what} is going on: wait for its end, or stop it')
+        if self._state is ControlState.CLOSED:
+            raise DriveError('the drive is not active')
+        if self.blocked_by_fault:
+            seen = await self._inverter.look(Priority.SERVICE)
+            self._explain_refusal(seen)
+            require_no_fault(self._inverter, seen)
+        raise DriveError(_STOP_PENDING)
+
+    # --- what a person asks for ---------------------------------------------------------------
+
+    async def enable(self, prepare: Callable[[], Awaitable[None]]) -> str:
+        """
+        Take control and run at set-point 0, then follow set-points that arrive from now on.
+
+        :param prepare: does what has to be done before a run command, once the bus has control.
+        :returns: what was done.
+        :raises DriveError: it was not done, and why; the run command is removed then.
+        """
+        if self._state is ControlState.ENABLED:
+            return 'is enabled already'
+        await self._require_enable()
+        self._enabling = self._bus.current
+        self._happened(ControlEvent.ENABLE)
+        try:
+            if self._refusal is not None:
+                self._explain_refusal(await self._inverter.look(Priority.SERVICE))
+            control_mode = await self._starting.start(prepare)
+            self._happened(ControlEvent.RUNNING)
+            self._setpoint.arm(control_mode)
+        except Cancelled:
+            raise DriveError('it was stopped while it was being enabled') from None
+        except Exception as error:
+            # whatever went wrong, a run command may stand by now
+            self._stop()
+            await self._settle()
+            raise DriveError(str(error) or repr(error)) from error
+        finally:
+            self._enabling = None
+        if self._inverter.settings.follows_setpoints:
+            return 'enabled; it follows set-points that arrive from now on'
+        return f'enabled; it follows its own reference ({self._inverter.settings.reference})'
+
+    async def stop(self, patience: float | None = None) -> str:
+        """
+        Stop as the drive's StMode says; control is kept.
+
+        :param patience: how long the drive may take to confirm it, s.
+        :returns: whether it ramps or coasts [C97].
+        :raises DriveError: the drive does not confirm the stop; it is retried until it does.
+        """
+        self._stop()
+        await self._sequence.wait_confirmed(patience or None)
+        seen = self._inverter.seen
+        if self.blocked_by_fault:
+            return self._stopped_by_fault
+        if seen is not None and seen.faulted and not seen.driven:
+            return f'stopped by fault {self._inverter.describe()}'
+        if seen is None or not seen.from_bus:
+            return self._no_control(seen)
+        if not seen.driven:
+            return f'stopped ({self._inverter.describe()})'
+        try:
+            coasts = await self._inverter.coasts_to_stop()
+        except LinkError:
+            # the stop is confirmed all the same
+            return f'stopping ({self._inverter.describe()})'
+        return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
+
+    async def take_control(self, control_mode: str) -> None:
+        """
+        Put the drive under bus control for a procedure, with no run command standing.
+
+        :raises DriveError: it lets nobody take control.
+        """
+        await self._starting.take_control(control_mode)
+
+    async def withdraw_run_command(self) -> None:
+        """
+        Remove what a procedure has commanded; control is kept.
+
+        :raises DriveError: the drive does not confirm that it stops; it is retried until it does.
+        """
+        self._sequence.request()
+        await self._sequence.wait_confirmed()
+
+    async def quick_stop(self) -> str:
+        """
+        Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
+
+        Where the drive has no way to do that, stop as usual [C96].
+
+        :raises DriveError: the drive does not confirm it; the stop is retried until it does.
+        """
+        if not self._method.coasts:
+            return f'{await self.stop()} (this drive has no quick stop)'
+        may_run = self.may_run
+        with self._stopped_by_itself():
+            try:
+                may_run = may_run or await self._method.in_control(Priority.STOP)
+                may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
+                if may_run:
+                    await self._method.quick_stop(self._inverter.control_mode)
+                    await self._confirmation.wait(
+                        lambda seen: not seen.driven,
+                        Priority.STOP,
+                        confirmation.TIMEOUT,
+                    )
+            except (DriveError, LinkError) as error:
+                self._sequence.request()
+                with contextlib.suppress(LinkError):
+                    await self._inverter.look(Priority.STOP)
+                seen = self._inverter.seen
+                by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
+                if isinstance(error, Refused) and by_fault:
+                    return self._stopped_by_fault
+                raise DriveError(
+                    f'the quick stop is NOT confirmed: {error} ({self._inverter.describe()}); '
+                    'trying a stop'
+                ) from error
+            if not may_run:
+                return self._no_control(self._inverter.seen)
+            self._sequence.request()
+            await self._settle()
+            return 'released: the motor coasts'
+
+    async def acknowledge(self) -> str:
+        """
+        Acknowledge a fault; run command and set-point are removed before, where the drive lets us.
+
+        :returns: what was acknowledged.
+        :raises DriveError: the fault is still active.
+        """
+        inverter = self._inverter
+        seen = await inverter.look(Priority.SERVICE)
+        fault = seen.listed
+        if not seen.faulted and fault.kind is Kind.STATUS:
+            return f'nothing to acknowledge ({inverter.describe()})'
+        may_run = self.may_run or await self._method.in_control(Priority.SERVICE)
+        with self._stopped_by_itself():
+            return await self._acknowledge(seen, may_run=may_run)
+
+    async def _acknowledge(self, seen: InverterStatus, *, may_run: bool) -> str:
+        inverter = self._inverter
+        name = inverter.describe()
+        if seen.state is State.FAULT_REACTION_ACTIVE:
+            # what comes before FAULTED acknowledges nothing [M0 table 16]
+            with contextlib.suppress(DriveError):
+                await self._confirmation.wait(
+                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE,
+                    Priority.SERVICE,
+                    confirmation.TIMEOUT,
+                )
+        try:
+            why = await self._method.acknowledge(seen.code, inverter.control_mode)
+        finally:
+            # even if no answer came, the drive may be free to run now
+            if may_run:
+                self._sequence.request_anew()
+        try:
+            await self._confirmation.wait(
+                lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
+            )
+            await self._settle()
+        except DriveError:
+            now = inverter.seen or seen
+            stands = now.listed
+            first = f'acknowledged {name}, but ' if now.code != seen.code else ''
+            raise DriveError(
+                f'{first}{inverter.describe()} still stands: {stands.description}. {stands.remedy}'
+            ) from None
+        return f'acknowledged {name} ({why})' if why else f'acknowledged {name}'
+
+    async def release(self, timeout: float) -> str:
+        """
+        Give control back once the motor stands.
+
+        A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
+        time-out of its own it is released, for else that would end the ramp with a fault.
+
+        :raises DriveError: the drive does not confirm that it stops.
+        """
+        # a run command may be on its way, whoever has control at this moment; and where the bus has
+        # it, one may stand that an acknowledgement has not come to remove yet
+        seen = self._inverter.seen
+        may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
+        stopped = await self.stop() if may_run else ''
+        if not await self._method.in_control(Priority.SERVICE):
+            return stopped or 'control is not ours'
+        stopped = stopped or await self.stop()
+        if self.blocked_by_fault:
+            raise DriveError(
+                f'fault {self._inverter.describe()} stands and the drive takes no command: '
+                'a run command may still stand in it when the fault is acknowledged'
+            )
+        try:
+            await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+        except DriveError:
+            await self._inverter.read_timeout()
+            if not self._inverter.sio_tot:
+                return f'{stopped}; it was left to its ramp, under bus control'
+            stopped = 'released to coast, for the time-out of the drive would end the ramp'
+        await self._method.release()
+        return f'{stopped}; control given back'
+
+    def close(self) -> None:
+        """Stop the motor if it may run, and let nothing start it any more."""
+        may_run = self.may_run
+        self._happened(ControlEvent.CLOSE)
+        if may_run:
+            self._sequence.request()
+
+    # --- what happens by itself ---------------------------------------------------------------
+
+    async def secure_found(self) -> None:
+        """Make sure that nothing runs under bus control that nobody has enabled since."""
+        seen = self._inverter.seen
+        if await self._method.in_control(Priority.SERVICE):
+            if seen is not None and seen.runs_by_bus and not self.stopping:
+                self._tell(
+                    Severity.WARNING,
+                    f'the motor runs under bus control from before '
+                    f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
+                )
+            self._stop(anew=True)
+        elif self._lost_in_use and seen is not None and not seen.faulted:
+            self._tell(Severity.WARNING, explain_loss(self._inverter))
+        self._lost_in_use = False
+
+    def connected(self) -> None:
+        """Take note that the drive is connected."""
+        self._happened(ControlEvent.CONNECTED)
+
+    def disconnected(self) -> None:
+        """Take note that the drive is left alone."""
+        self._happened(ControlEvent.LOST)
+
+    def lost(self) -> bool:
+        """Take note that the drive does not answer any more; true if it may have followed us."""
+        self._lost_in_use = self.commanded or self._refusal is not None
+        if self._refusal is not None:
+            # no status will come that could tell a better reason
+            (_, reason), self._refusal = self._refusal, None
+            self._tell(Severity.WARNING, f'stopping: {reason}')
+        self._happened(ControlEvent.LOST)
+        if self._lost_in_use:
+            self._sequence.request()
+        return self._lost_in_use
+
+    def alarmed_by(self, seen: InverterStatus) -> bool:
+        """Tell whether a status is a reason to stop."""
+        follows = self._state is ControlState.ENABLED and seen.at >= self._since
+        return follows and bool(self._why_stopped(seen))
+
+    def judge(self, seen: InverterStatus) -> bool:
+        """Judge what the drive says about itself; true if a person was told of it."""
+        self._setpoint.answered()
+        if self.blocked_by_fault and not seen.faulted:
+            self._sequence.request_anew()
+        if self._explain_refusal(seen):
+            return True
+        if seen.at < self._since:
+            return False
+        reason = ''
+        if self._state is ControlState.ENABLED:
+            reason = self._why_stopped(seen)
+        elif not (self.commanded or self.stopping) and seen.keeps_running:
+            reason = (
+                'it runs under bus control although nobody enabled it: find out whether another '
+                'master commands it'
+            )
+        if reason:
+            self._stop()
+            self._tell_stopped(reason)
+        return bool(reason)
+
+    def refused(self, reason: str) -> None:
+        """Stop because of a set-point; the next status may tell a better reason."""
+        self._stop()
+        self._refusal = (time.monotonic(), reason)
+
+    def _explain_refusal(self, seen: InverterStatus) -> bool:
+        refused_at, reason = self._refusal or (math.inf, '')
+        if seen.at <= refused_at:
+            return False
+        # it was told to stop when it refused; a drive with a fault refuses everything
+        self._refusal = None
+        self._tell_stopped(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        return True
+
+    def _tell_stopped(self, reason: str) -> None:
+        seen = self._inverter.seen
+        if seen is not None and seen.faulted:
+            remedy = 'then call ~/fault_ack and ~/enable to go on'
+            self._tell(Severity.ERROR, f'stopped: {reason}; {remedy}')
+        else:
+            self._tell(Severity.WARNING, f'stopped: {reason}; then call ~/enable to go on')
+
+    # --- how --------------------------------------------------------------------------------
+
+    async def _settle(self) -> None:
+        """Let a stop that comes with something else be confirmed, so that enable can follow."""
+        with contextlib.suppress(DriveError):
+            await self._sequence.wait_confirmed()
+
+    def _why_stopped(self, seen: InverterStatus) -> str:
+        return explain_stop(self._inverter, seen, self._setpoint.control_mode)
+
+    @property
+    def _stopped_by_fault(self) -> str:
+        """What is said of a motor that a fault has stopped."""
+        fault = self._inverter.describe()
+        return f'stopped by fault {fault}; what the drive refuses now is done when it is over'
+
+    def _no_control(self, seen: InverterStatus | None) -> str:
+        text = f'the bus has no control of this drive ({self._inverter.describe()})'
+        if seen is not None and seen.driven:
+            raise DriveError(f'{text}: stop it where it is controlled, by keypad or RUN input')
+        return f'{text}, and it does not run'
+
+    def _tell(self, severity: Severity, text: str) -> None:
+        self._inverter.tell(severity, text)

@@ -1,0 +1,216 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a drive does on a command while its motor stands: tune, erase, reset [M0 table 18]."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from collections.abc import Iterator
+import contextlib
+import time
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Reset
+from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive.advice import require_no_fault
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+
+#: How often a busy drive is told again, and for how long, s.
+_BUSY_PERIOD = 0.05
+_LONGEST_BUSY = 0.5
+
+
+def require_known(procedure: Procedure | Reset, model: Family) -> None:
+    """
+    See to it that a model has a procedure.
+
+    :raises DriveError: it has no command for it.
+    """
+    if not model.profile.methods_with(procedure):
+        raise DriveError(
+            f'{procedure.value} is not known of this model ({model.name}): its manual lists no '
+            'command for it; do it at the keypad'
+        )
+
+
+class Procedures:
+    """
+    Has one drive carry out procedures; used on the bus alone.
+
+    :param controller: who commands the drive else; ``None`` if this driver only reads.
+    """
+
+    def __init__(self, bus: Bus, inverter: Inverter, controller: Controller | None) -> None:
+        self._bus = bus
+        self._inverter = inverter
+        self._controller = controller
+
+    @property
+    def _commands(self) -> Controller:
+        if self._controller is None:
+            raise DriveError(MONITOR_REFUSAL)
+        return self._controller
+
+    def require(self, procedure: Procedure | Reset) -> None:
+        """
+        See to it that a procedure may begin.
+
+        :raises DriveError: the drive has no such procedure, or its control method is another; or
+            somebody has the drive.
+        """
+        controller, inverter = self._commands, self._inverter
+        if not inverter.connected:
+            raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
+        require_known(procedure, inverter.model)
+        profile = inverter.model.profile
+        have = profile.methods_with(procedure)
+        if inverter.settings.control_method not in have:
+            raise DriveError(
+                f'{procedure.value} needs {profile.methods[have[0]].means}, and one session does '
+                f'not mix control methods: clean up, set control_method to {have[0]} and configure '
+                'again'
+            )
+        controller.require_idle(procedure.value)
+
+    @contextlib.contextmanager
+    def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
+        """
+        Have the drive for a procedure, from its first preparations on.
+
+        :raises DriveError: it cannot be had, and why.
+        """
+        self.require(procedure)
+        with self.exclusive(procedure.value) as access:
+            yield access
+
+    @contextlib.contextmanager
+    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
+        """
+        Have the drive for what every control method may do, also while connecting.
+
+        :raises DriveError: somebody has the drive.
+        """
+        with self._commands.exclusive(what) as access:
+            yield access
+
+    async def in_control(self, priority: Priority) -> bool:
+        """
+        Tell whether the bus has control of the drive.
+
+        :raises DriveError: this driver only reads.
+        """
+        return await self._commands.method.in_control(priority)
+
+    @contextlib.asynccontextmanager
+    async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
+        """
+        Take control of a drive whose motor stands, and give it back as it was found.
+
+        A drive that its keypad or terminals control is not taken: giving it back to them could
+        start the motor [C43].
+
+        :raises DriveError: it cannot be had, and why.
+        """
+        found = await self._take(access)
+        try:
+            yield
+        except Exception:
+            # who asked is told what went wrong first; what comes of it is logged
+            with contextlib.suppress(DriveError, LinkError):
+                await self._give_back(found)
+            raise
+        await self._give_back(found)
+
+    async def abort(self) -> str:
+        """
+        End the procedure that has the drive; anything else goes on.
+
+        :raises DriveError: the drive does not confirm it; it is retried until it does.
+        """
+        controller = self._controller
+        procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
+        if controller is None or controller.state not in procedure:
+            return ''
+        return await controller.stop()
+
+    async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
+        """
+        Have the drive begin; once, for nobody knows what has happened before a second time.
+
+        It waits for its turn with the stops, so that one which comes later does not overtake it,
+        and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
+        told again for a while, for it has done nothing.
+
+        :raises DriveError: it was stopped meanwhile.
+        """
+        deadline = time.monotonic() + _LONGEST_BUSY
+        while True:
+            try:
+                await self._commands.method.begin(procedure, access.require_wanted)
+                return
+            except Refused as error:
+                if error.code != Refused.BUSY or time.monotonic() >= deadline:
+                    raise
+            await self._bus.sleep(_BUSY_PERIOD)
+
+    async def _take(self, access: ExclusiveAccess) -> Holder:
+        controller, inverter, what = self._commands, self._inverter, access.what
+        seen = await inverter.look(Priority.SERVICE)
+        require_no_fault(inverter, seen)
+        found = await controller.method.holder(Priority.SERVICE)
+        if found is Holder.INHIBITED:
+            raise DriveError(
+                f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
+                'Inhibit)'
+            )
+        if seen.driven:
+            raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')
+        if found not in (Holder.NOBODY, Holder.BUS):
+            raise DriveError(
+                f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
+                'back to them could start the motor: press STOP at the drive first'
+            )
+        access.require_wanted()
+        control_mode = inverter.control_mode or await inverter.read_control_mode()
+        await controller.take_control(control_mode)
+        deadline = time.monotonic() + confirmation.TIMEOUT
+        while not (await inverter.look(Priority.SERVICE)).standby:
+            if time.monotonic() > deadline:
+                with contextlib.suppress(DriveError, LinkError):
+                    await self._give_back(found)
+                raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
+            # no manual says that a drive has forgotten what it was told before
+            await controller.method.stop(control_mode)
+            await self._bus.sleep(confirmation.LOOK_PERIOD)
+        return found
+
+    async def _give_back(self, found: Holder) -> None:
+        """Remove the command, and give control back where nobody had it; not while faulted."""
+        controller = self._commands
+        await controller.withdraw_run_command()
+        if found is Holder.NOBODY and not controller.blocked_by_fault:
+            await controller.method.release()

@@ -1,0 +1,468 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+How a Sinus G2 is commanded: by MODE and SCMD [M0 §7.2 tables 17 and 18], or by the control word of
+the generic state machine [M0 §7.1 tables 14 to 16].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from collections.abc import Sequence
+import contextlib
+from typing import ClassVar
+
+from nfo_sinus_driver.catalog.profile import Acknowledge
+from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import NotPossible
+from nfo_sinus_driver.catalog.profile import OlderDialect
+from nfo_sinus_driver.catalog.profile import Procedure
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Refusal
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
+from nfo_sinus_driver.catalog.profile import SetpointTarget
+from nfo_sinus_driver.catalog.profile import Status
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.profile import one
+from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.families.sinus_g2 import words
+from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
+
+MODE = 'fieldbus.mode'
+CONTROL_WORD = 'fieldbus.drive_control'
+STATUS_WORD = 'fieldbus.drive_status'
+INV_ST = 'fieldbus.inv_st'
+INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
+_MASK = 'fieldbus.drv_ctrl_write_mask'
+_SIO_ERR = 'fieldbus.sio_err'
+
+_HOLDERS: Mapping[int, Holder] = {
+    Mode.INHIBIT: Holder.INHIBITED,
+    Mode.STOP: Holder.NOBODY,
+    Mode.EXT: Holder.LOCAL,
+    Mode.BUS: Holder.BUS,
+}
+#: Over Classic all are written there, in the unit of the control mode ([C11], [C12]).
+_COMMON = 'fieldbus.setpoint'
+#: The greatest ones are those over a bus [M2 table 2].
+_SETPOINTS = {
+    'Freque': SetpointTarget('status.frq_set', 150.0, at=_COMMON),
+    'PI-Reg': SetpointTarget('status.reg_set', 150.0, at=_COMMON),
+    'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON),
+    'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON),
+}
+#: The run command that each reference has; the fixed ones are made of their number.
+_COMMANDS = {
+    'fieldbus': Scmd.FIELDBUS,
+    'terminal': Scmd.TERMINAL,
+    'op_mode': Scmd.OP_MODE,
+    'analog': Scmd.ANALOG_F,
+    'analog_reverse': Scmd.ANALOG_R,
+    **{
+        f'fix{number}{way}': Scmd[f'FIX_{number}_{letter}']
+        for number in range(1, 8)
+        for way, letter in (('', 'F'), ('_reverse', 'R'))
+    },
+}
+#: Power and ramps; with it the G2 waits in READY_TO_SWITCH_ON.
+_READY = (
+    Control.NET_CTRL
+    | Control.ENABLE_VOLTAGE
+    | Control.DISABLE_QUICK_STOP
+    | Control.ENABLE_RFG
+    | Control.UNLOCK_RFG
+    | Control.USE_REF_FOR_RFG
+)
+_RUN = Control.SWITCH_ON | Control.ENABLE_OP | Control.ENABLE_REV_OP
+
+#: SioErr, bit by bit [M2 table 4], but for the first, that a fault kept a message from being
+#: carried out: that a stop was refused since then is no reason of the fault.
+_LINE_FAULTS = {
+    1: 'wrong parity',
+    2: 'wrong check sum',
+    3: 'wrong message structure',
+    4: 'time-out of the serial communication',
+    5: 'wrong parameter prefix',
+    6: 'not permitted in the current mode',
+    7: 'unknown parameter',
+    8: 'the parameter cannot be read',
+    9: 'the parameter cannot be written',
+    10: 'the value is out of range',
+    14: 'receive buffer overrun',
+}
+_NOT_NOW = 'the drive lets nobody take control now (MODE is Inhibit: tuning?)'
+#: Why a serial fault is left that MODE = Stop would end.
+_CONTROLLED_ELSEWHERE = (
+    'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
+    'command that ends it, would take from them; press STOP at the drive, then acknowledge again'
+)
+
+
+class _G2(ControlMethod):
+    """What both control methods share."""
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control of the drive."""
+        return _HOLDERS.get((yield Read(MODE)), Holder.UNKNOWN)
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """
+        Write set-point 0 in the unit of a control mode, and read it back.
+
+        :raises NotPossible: the drive keeps another value, or takes none in this control mode.
+        """
+        if control_mode not in _SETPOINTS:
+            raise NotPossible(
+                f'the drive takes no set-point over the bus in control mode {control_mode or "?"}'
+            )
+        yield from _SETPOINTS[control_mode].set_to_zero()
+
+    def _targets(self, control_mode: str) -> Sequence[SetpointTarget]:
+        """Return where a set-point may stand that the motor would follow."""
+        return [target for mode, target in _SETPOINTS.items() if mode == control_mode]
+
+    def _clear_line_faults(self) -> Steps[str]:
+        """Clear SioErr, which only Classic has; return why there was a serial fault, in words."""
+        if not self._reaches(_SIO_ERR):
+            return ''
+        flags = int((yield Acknowledge(_SIO_ERR)))
+        bits = [bit for bit in range(1, 16) if flags >> bit & 1]
+        return ', '.join(_LINE_FAULTS.get(bit, f'flag {bit}') for bit in bits)
+
+
+class ModeScmd(_G2):
+    """Control through MODE and SCMD; the run command says where the reference comes from."""
+
+    means = 'SCMD'
+    references = tuple(_COMMANDS)
+    coasts = True
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {
+        procedure: Write('fieldbus.scmd', command, once=True, head=True)
+        for procedure, command in (
+            (Procedure.FULL, Scmd.FULL_TUNING),
+            (Procedure.BASIC, Scmd.BASIC_TUNING),
+            (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
+            (Procedure.CALCULATE, Scmd.PAR_CALC),
+            (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
+            (Reset.ENERGY, Scmd.RESET_E_OUT),
+        )
+    }
+    #: The parameter that takes the run command.
+    _command: ClassVar[str] = 'fieldbus.scmd'
+    #: What releases the motor soonest; SCMD = Stop would let it ramp down.
+    _soonest: ClassVar[Write] = Write(MODE, Mode.STOP)
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        mode: int = yield Read(MODE)
+        return mode == Mode.BUS
+
+    def take_control(self) -> Steps[None]:
+        """
+        Put the drive under bus control with no run command standing.
+
+        No manual says that a drive forgets the run command of an earlier session when control is
+        taken, so the stop is the very next frame.
+
+        :raises NotPossible: it is tuning.
+        """
+        mode = yield Read(MODE)
+        if mode == Mode.INHIBIT:
+            raise NotPossible(_NOT_NOW)
+        stop = Write(self._command, Scmd.STOP, head=True)
+        if mode != Mode.BUS:
+            yield Write(MODE, Mode.BUS)
+            try:
+                yield stop
+                return
+            except Refusal:
+                # too soon for it, as it seems
+                yield Until(lambda status: status.from_bus)
+        yield stop
+
+    def run(self) -> Steps[None]:
+        """Give the run command; once, for nobody knows what has happened before a second one."""
+        yield Write(self._command, _COMMANDS[self._reference], once=True)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """
+        Take the run command back and write set-point 0.
+
+        Does nothing to a drive that is under the control of its keypad or terminals. Refused
+        although the bus has control or, under Inhibit, nobody can say who has: it may be tuning
+        [C101].
+        """
+        try:
+            yield Write(self._command, Scmd.STOP, once=True)
+            for target in self._targets(control_mode):
+                yield from target.zero(once=True)
+        except Refusal:
+            mode = yield Read(MODE)
+            if mode in (Mode.INHIBIT, Mode.BUS):
+                raise
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Release the motor at once, as <Stop> on the keypad does; control is given back."""
+        yield Write(MODE, Mode.STOP)
+        for target in self._targets(control_mode):
+            # a drive may well refuse a set-point while the bus has no control
+            with contextlib.suppress(Refusal):
+                yield from target.zero(once=False)
+
+    def release(self) -> Steps[None]:
+        """Give control back; never by MODE = Ext, which can start the motor [C43]."""
+        if (yield from self.in_control()):
+            yield Write(MODE, Mode.STOP)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Write SCMD = Stop, set-point 0 and MODE = Stop, and read back what can be read."""
+        command = yield from taken(one(Write(self._command, Scmd.STOP)))
+        setpoint = yield from self._remove_setpoint(control_mode)
+        command |= yield from self._remove_control()
+        if command:
+            return Removal.COMMAND
+        return Removal.SETPOINT if setpoint else Removal.NOTHING
+
+    def _remove_setpoint(self, control_mode: str) -> Steps[bool]:
+        """Write set-point 0 wherever the motor would follow one; tell whether it is."""
+        zeroes: list[bool] = []
+        for target in self._targets(control_mode):
+            zeroes.append((yield from taken(target.set_to_zero())))
+        return bool(zeroes) and all(zeroes)
+
+    def _remove_control(self) -> Steps[bool]:
+        """Write MODE = Stop, with which no run command stands; tell whether it is."""
+        obeyed = yield from taken(one(Write(MODE, Mode.STOP)))
+        return obeyed and not (yield from self.in_control())
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """
+        Acknowledge a fault: a serial one by MODE = Stop, else by reading SioErr ([C42], [C99]).
+
+        Any other by reading the status that acknowledges, once nothing is left that could turn the
+        motor. If the drive lets go of nothing, what releases it soonest is the very next frame.
+
+        :raises NotPossible: a serial fault is left, for keypad or terminals keep the control that
+            MODE = Stop would take from them.
+        """
+        if Meaning.SERIAL_FAILURE not in shown.meanings:
+            yield from self._acknowledge_by_reading(control_mode)
+            return ''
+        elsewhere = yield from self._controlled_elsewhere()
+        if not elsewhere:
+            yield from self._remove_control()
+        why = ''
+        if (yield Read(INV_ST)) == shown.code:
+            # older firmware obeys no MODE that is for it alone while the fault is active [C9]
+            why = yield from self._clear_line_faults()
+        if (yield Read(INV_ST)) == shown.code:
+            yield from self._acknowledge_by_reading(control_mode)
+            if elsewhere and (yield Read(INV_ST)) == shown.code:
+                raise NotPossible(_CONTROLLED_ELSEWHERE)
+        return why
+
+    def _controlled_elsewhere(self) -> Steps[bool]:
+        """Tell whether keypad or terminals have control, which MODE = Stop would take from them."""
+        mode: int = yield Read(MODE)
+        return mode == Mode.EXT
+
+    def _acknowledge_by_reading(self, control_mode: str) -> Steps[None]:
+        ours = yield from self.in_control()
+        if ours and (yield from self.remove(control_mode)) is not Removal.COMMAND:
+            # refused while the cause of the fault lasts: the status will tell
+            with contextlib.suppress(Refusal):
+                yield AcknowledgeThenWrite(INV_ST_WITH_ACK, self._soonest)
+        else:
+            yield Acknowledge(INV_ST_WITH_ACK)
+
+
+class DriveControl(_G2):
+    """
+    Control through DriveControl and DriveStatus.
+
+    The G2 is switched on and then enabled, the Optimal enabled and then switched on [C54].
+    """
+
+    means = 'control word'
+    references = ('fieldbus', 'terminal')
+    coasts = True
+    older = False
+
+    def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
+        super().__init__(reference, reaches)
+        # without NetRef the reference is the drive's own, not the one from the bus
+        self._ready = _READY | Control.NET_REF if reference == 'fieldbus' else _READY
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the network has control, by us or by whom was here before."""
+        return bool(int((yield Read(STATUS_WORD))) & words.Status.CTRL_FROM_NET)
+
+    def take_control(self) -> Steps[None]:
+        """
+        Request control with bit 0 low, so that a run command is an edge later [C35].
+
+        :raises NotPossible: it is tuning.
+        """
+        if (yield Read(MODE)) == Mode.INHIBIT:
+            raise NotPossible(_NOT_NOW)
+        yield Write(CONTROL_WORD, self._ready)
+
+    def run(self) -> Steps[None]:
+        """
+        Switch on, then give the direction, each when the drive shows a state before it.
+
+        From a motor that is still on its way to a stop bit 0 leads back to OPERATION_ENABLED, and
+        without a direction from there to DISABLE, which shows as SHUTDOWN does ([M0 table 16],
+        [C37]).
+        """
+        yield Until(lambda status: status.state in (State.READY_TO_SWITCH_ON, State.STOPPING))
+        switched_on = self._ready | Control.SWITCH_ON
+        yield Write(CONTROL_WORD, switched_on, once=True)
+        yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
+        # reverse is the sign of the set-point; both direction bits at once mean no change [C36]
+        yield Write(CONTROL_WORD, switched_on | Control.ENABLE_OP, once=True)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """
+        Take the run command back, so that the drive goes to SHUTDOWN, and write set-point 0.
+
+        Does nothing to a drive that is not under bus control: who has control stays as it is.
+        """
+        try:
+            yield from self._change(~_RUN, Control(0))
+            for target in self._targets(control_mode):
+                yield from target.zero(once=True)
+        except Refusal:
+            if (yield from self.in_control()):
+                raise
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Go to QUICK_STOP, which coasts [C96]; control is kept."""
+        coast = ~(_RUN | Control.DISABLE_QUICK_STOP)
+        yield from self._change(coast, Control.OVERRIDE_COAST, once=False)
+        for target in self._targets(control_mode):
+            with contextlib.suppress(Refusal):
+                yield from target.zero(once=False)
+
+    def release(self) -> Steps[None]:
+        """
+        Give control back by MODE = Stop, once the motor stands.
+
+        Resetting NetCtrl would hand control to whatever is local, which may be a RUN input that is
+        active.
+        """
+        if (yield from self.in_control()):
+            yield Write(MODE, Mode.STOP)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
+        if (yield from taken(self._change(~_RUN, Control(0), once=False))):
+            return Removal.COMMAND
+        try:
+            yield Write(MODE, Mode.STOP)
+            if not (yield from self.in_control()):
+                return Removal.COMMAND
+        except Refusal:
+            pass
+        if (yield from taken(self.zero_setpoint(control_mode))):
+            return Removal.SETPOINT
+        return Removal.NOTHING
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """
+        Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16].
+
+        A serial fault by MODE = Stop alone first, else by reading SioErr [C99]. Over Classic
+        nothing can be written while any fault is active, so that reading has to do [M0 §6.1.5]; the
+        run bits that stand then lead nowhere without a new edge [M0 table 16].
+
+        :raises NotPossible: a serial fault is left, for keypad or terminals keep the control that
+            MODE = Stop would take from them.
+        """
+        why, elsewhere = '', False
+        if Meaning.SERIAL_FAILURE in shown.meanings:
+            elsewhere = (yield Read(MODE)) == Mode.EXT
+            if not elsewhere:
+                with contextlib.suppress(Refusal):
+                    yield Write(MODE, Mode.STOP)
+            why = yield from self._clear_line_faults()
+        try:
+            for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
+                yield from self._change(~(_RUN | Control.RESET_MALFUNCTION), add)
+        except Refusal:
+            if (yield from self.remove(control_mode)) is not Removal.COMMAND:
+                # refused while the cause of the fault lasts: the status will tell
+                with contextlib.suppress(Refusal):
+                    stop = Write(CONTROL_WORD, self._ready)
+                    yield AcknowledgeThenWrite(INV_ST_WITH_ACK, stop)
+            else:
+                yield Acknowledge(INV_ST_WITH_ACK)
+        if elsewhere and (yield Read(INV_ST)) == shown.code:
+            raise NotPossible(_CONTROLLED_ELSEWHERE)
+        return why
+
+    def _change(self, keep: Control, add: Control, *, once: bool = True) -> Steps[None]:
+        """Change some bits of the control word and leave the others to who has control."""
+        if self._reaches(_MASK):
+            # in one transaction: the AND mask first, then the OR mask [M0 §7.1]
+            yield Write(_MASK, int(keep) & 0xFFFF | int(add) << 16, once=once)
+            return
+        word = Control(int((yield Read(CONTROL_WORD))))
+        yield Write(CONTROL_WORD, word & keep | add, once=once)
+
+
+def _in_charge(status: Status | None) -> Steps[str]:
+    """Return by which control method the bus has control; MODE and SCMD where it has none."""
+    # older firmware has no more to ask for
+    if status is None or not status.from_bus:
+        return 'mode_scmd'
+    return 'mode_scmd' if (yield Read(MODE)) == Mode.BUS else 'drive_control'
+
+
+PROFILE = Profile(
+    title='NFO Sinus G2',
+    status_word=words.STATUS_WORD,
+    holders=_HOLDERS,
+    methods={'mode_scmd': ModeScmd, 'drive_control': DriveControl},
+    setpoints=_SETPOINTS,
+    in_charge=_in_charge,
+    # it works even on drives with a serial fault ([M0 §6.1.5], [C9])
+    broadcast_stop=Write(MODE, Mode.STOP),
+    # functions 43, 17 and 23 ([M0 §6.2.3], [C57])
+    names_itself=True,
+    told_by='fieldbus.sw_ver',
+    writes_and_reads=True,
+    releases='Release',
+    # the v5.0 dialect [M2]; from 4.28 on [M0] describes the protocol [C3]. There an unknown
+    # parameter is a serial fault, by which it stops while the bus has control [C21]
+    older=OlderDialect(
+        'classic', 'v5.0', before=4.28, harmless=frozenset((Holder.NOBODY, Holder.LOCAL))
+    ),
+    # before it code 1 is another format ([C3], [C5])
+    uncertain={'serial.si_prot': 4.28},
+)

@@ -1,0 +1,209 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+How a Sinus Optimal is commanded: by MODE and SMODE, or by Drive Control [M1].
+
+The registers are those of the G2, and the means nearly those; [M1] forbids to mix the two methods:
+what one has started the other does not stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+from typing import ClassVar
+
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import Procedure
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Refusal
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import Reset
+from nfo_sinus_driver.catalog.profile import SetpointTarget
+from nfo_sinus_driver.catalog.profile import Status
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.families.sinus_g2.profile import CONTROL_WORD
+from nfo_sinus_driver.families.sinus_g2.profile import MODE
+from nfo_sinus_driver.families.sinus_g2.profile import STATUS_WORD
+from nfo_sinus_driver.families.sinus_g2.profile import ModeScmd
+from nfo_sinus_driver.families.sinus_optimal import words
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import Mode
+from nfo_sinus_driver.families.sinus_optimal.words import Smode
+
+_HOLDERS: Mapping[int, Holder] = {
+    Mode.MANUAL: Holder.LOCAL,
+    Mode.AUTO: Holder.LOCAL,
+    Mode.BUS: Holder.BUS,
+}
+_SETPOINTS = {
+    'Freque': SetpointTarget('fieldbus.input_freq_setpoint', 150.0),
+    'Speed': SetpointTarget('fieldbus.input_speed_setpoint', 9000.0),
+}
+_READY = Control.BUS_CONTROL
+_RUN = Control.SWITCH_ON
+
+
+class ModeSmode(ModeScmd):
+    """
+    Control through MODE and SMODE, whose codes for stop and run are those of SCMD.
+
+    Its MODE has no Stop: 1 is Manual, the keypad's, and 2 is Auto, which may start the motor and is
+    never written [C51]. It has no way to release the motor at once [C96].
+
+    Nothing tells its control mode, so whichever is assumed, every set-point is 0 before it runs: an
+    old one in the register of the other mode would turn the motor.
+    """
+
+    means = 'SMODE'
+    references = ('fieldbus', 'terminal')
+    coasts = False
+    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
+    _command = 'fieldbus.smode'
+    _soonest = Write('fieldbus.smode', Smode.STOP)
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control of the drive."""
+        return _HOLDERS.get((yield Read(MODE)), Holder.UNKNOWN)
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """
+        Write set-point 0 for every control mode, and read it back.
+
+        :raises NotPossible: the drive keeps another value.
+        """
+        for target in self._targets(control_mode):
+            yield from target.set_to_zero()
+
+    def _targets(self, control_mode: str) -> Sequence[SetpointTarget]:
+        return tuple(_SETPOINTS.values())
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Stop as usual: there is no other way."""
+        return self.stop(control_mode)
+
+    def release(self) -> Steps[None]:
+        """Give control back to the keypad, once no run command stands."""
+        if (yield from self.in_control()):
+            yield Write(self._command, Smode.STOP)
+            yield Write(MODE, Mode.MANUAL)
+
+    def _remove_control(self) -> Steps[bool]:
+        """Leave control where it is: Manual would hand it to the keypad."""
+        yield from ()
+        return False
+
+    def _controlled_elsewhere(self) -> Steps[bool]:
+        """Tell that it does not matter: MODE is not written here."""
+        yield from ()
+        return False
+
+
+class DriveControl(ControlMethod):
+    """
+    Control through Drive Control and Drive Status: enabled, then switched on [C54].
+
+    Its reference comes from the terminals alone ([C54], [C56]), and it has no quick stop [C96].
+    """
+
+    means = 'control word'
+    references = ('terminal',)
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the bus has control, by us or by whom was here before."""
+        return bool(int((yield Read(STATUS_WORD))) & words.Status.CONTROL_FROM_BUS)
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control of the drive."""
+        return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
+
+    def take_control(self) -> Steps[None]:
+        """
+        Take control with neither Enable nor Switch on.
+
+        Who lost it to keypad or terminals has to ask anew: the bit may still stand in the word.
+        """
+        if not (yield from self.in_control()):
+            yield Write(CONTROL_WORD, Control(0))
+        yield Write(CONTROL_WORD, _READY)
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """Do nothing: the reference is none of ours."""
+        yield from ()
+
+    def run(self) -> Steps[None]:
+        """Enable, then switch on, when the drive shows that it is enabled."""
+        enabled = _READY | Control.ENABLE
+        yield Write(CONTROL_WORD, enabled)
+        yield Until(lambda status: bool((status.word or 0) & words.Status.ENABLED))
+        yield Write(CONTROL_WORD, enabled | _RUN, once=True)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """Reset Switch on, and leave the other bits to who has control."""
+        word = int((yield Read(CONTROL_WORD, once=True)))
+        try:
+            yield Write(CONTROL_WORD, word & ~_RUN, once=True)
+        except Refusal:
+            if (yield from self.in_control()):
+                raise
+
+    def release(self) -> Steps[None]:
+        """
+        Take Enable back, and keep the bus control.
+
+        Without it the terminals would have control, and a RUN input that is active might start the
+        motor; [M1] names no way to give control back to nobody.
+        """
+        if (yield from self.in_control()):
+            yield Write(CONTROL_WORD, _READY)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Reset Switch on."""
+        word = int((yield Read(CONTROL_WORD)))
+        try:
+            yield Write(CONTROL_WORD, word & ~_RUN)
+        except Refusal:
+            return Removal.NOTHING
+        return Removal.COMMAND
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """Acknowledge a fault by one rising edge of bit 7 [M1]."""
+        word = int((yield Read(CONTROL_WORD)))
+        low = word & ~(Control.FAULT_ACK | _RUN)
+        for written in (low, low | Control.FAULT_ACK, low):
+            yield Write(CONTROL_WORD, written)
+        return ''
+
+
+def _in_charge(status: Status | None) -> Steps[str]:
+    """Return by which control method the motor was started."""
+    word = int((yield Read(CONTROL_WORD)))
+    return 'drive_control' if word & Control.SWITCH_ON else 'mode_scmd'
+
+
+PROFILE = Profile(
+    title='NFO Sinus Optimal',
+    status_word=words.STATUS_WORD,
+    holders=_HOLDERS,
+    methods={'mode_scmd': ModeSmode, 'drive_control': DriveControl},
+    setpoints=_SETPOINTS,
+    in_charge=_in_charge,
+)

@@ -1,0 +1,69 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Playing the sequences of a profile by hand: no bus, no drive, each step and its answer named."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from nfo_sinus_driver.catalog.profile import Refusal
+from nfo_sinus_driver.catalog.profile import Step
+from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.status import State
+
+#: What a drive answers that refuses a step.
+REFUSED = Refusal('it does not want to')
+
+
+def status(**told: Any) -> SimpleNamespace:
+    """A status, of which only something is told."""
+    return SimpleNamespace(**{'word': None, 'state': State.UNKNOWN, 'from_bus': False, **told})
+
+
+class Wait:
+    """Stands for a step that waits for one of some statuses, and for none of others."""
+
+    def __init__(self, *reached: SimpleNamespace, not_by: Sequence[SimpleNamespace]) -> None:
+        self._reached = reached
+        self._not_by = not_by
+
+    def __eq__(self, step: object) -> bool:
+        assert isinstance(step, Until)
+        fulfilled = all(step.condition(one) for one in self._reached)
+        return fulfilled and not any(step.condition(one) for one in self._not_by)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def play(steps: Generator[Step, Any, Any], *script: tuple[Any, Any]) -> Any:
+    """
+    Play a sequence: it must yield just these steps, each of which has this answer.
+
+    :returns: its result; what it ends by is raised.
+    """
+    answer: Any = None
+    for expected, following in script:
+        step = steps.throw(answer) if isinstance(answer, Refusal) else steps.send(answer)
+        assert expected == step
+        answer = following
+    with pytest.raises(StopIteration) as end:
+        steps.throw(answer) if isinstance(answer, Refusal) else steps.send(answer)
+    return end.value.value

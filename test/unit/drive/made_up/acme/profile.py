@@ -1,0 +1,153 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How an Acme is commanded: a control word, a direction, and the size of a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import enum
+
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import SetpointTarget
+from nfo_sinus_driver.catalog.profile import Status
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.profile import one
+from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+
+_WORD, _TURN, _SIZE, _TOLD = 'bus.word', 'bus.turn', 'bus.size', 'bus.told'
+
+
+class Word(enum.IntFlag):
+    """The control word."""
+
+    RESET = 1 << 3
+    RUN = 1 << 12
+    REMOTE = 1 << 15
+
+
+class Told(enum.IntFlag):
+    """The status word."""
+
+    RUNNING = 1 << 5
+    TRIPPED = 1 << 9
+    REMOTE = 1 << 13
+
+
+class Frequency(SetpointTarget):
+    """A frequency: its direction in one register, its size in another."""
+
+    def writes(self, value: float) -> Sequence[Write]:
+        """Return what is to be written: the direction first."""
+        turn = 'reverse' if value < 0 else 'forward'
+        return (Write(_TURN, turn), Write(_SIZE, abs(value)))
+
+    def value(self, values: Sequence[object]) -> float:
+        """Return the frequency with its sign."""
+        turn, size = values
+        assert isinstance(size, float)
+        return -size if turn == 'reverse' else size
+
+
+_FREQUENCY = Frequency(_SIZE, 400.0)
+
+
+class ControlWord(ControlMethod):
+    """Control through the control word."""
+
+    means = 'control word'
+    references = ('fieldbus',)
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the bus has control."""
+        return bool(int((yield Read(_TOLD))) & Told.REMOTE)
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control."""
+        return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
+
+    def take_control(self) -> Steps[None]:
+        """Take control with no run command."""
+        yield Write(_WORD, Word.REMOTE)
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """Write set-point 0, and read it back."""
+        yield from _FREQUENCY.set_to_zero()
+
+    def run(self) -> Steps[None]:
+        """Give the run command."""
+        yield Write(_WORD, Word.REMOTE | Word.RUN, once=True)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """Take the run command back, and write set-point 0."""
+        if (yield from self.in_control()):
+            yield Write(_WORD, Word.REMOTE, once=True)
+            yield from _FREQUENCY.zero(once=True)
+
+    def release(self) -> Steps[None]:
+        """Give control back."""
+        if (yield from self.in_control()):
+            yield Write(_WORD, 0)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Take the run command back."""
+        if (yield from taken(one(Write(_WORD, Word.REMOTE)))):
+            return Removal.COMMAND
+        return Removal.NOTHING
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """Acknowledge by an edge."""
+        for word in (Word.REMOTE, Word.REMOTE | Word.RESET, Word.REMOTE):
+            yield Write(_WORD, word)
+        return ''
+
+
+def _state(word: int) -> State:
+    if word & Told.TRIPPED:
+        return State.FAULTED
+    return State.OPERATION_ENABLED if word & Told.RUNNING else State.READY_TO_SWITCH_ON
+
+
+def _in_charge(status: Status | None) -> Steps[str]:
+    yield from ()
+    return 'control_word'
+
+
+PROFILE = Profile(
+    title='Acme',
+    status_word=StatusWord(
+        state=_state,
+        by_bit={
+            Told.RUNNING: Fact.OPERATION_ENABLED,
+            Told.TRIPPED: Fact.FAULT,
+            Told.REMOTE: Fact.NETWORK_CONTROL,
+        },
+        by_state={},
+    ),
+    holders={},
+    methods={'control_word': ControlWord},
+    setpoints={'Freque': _FREQUENCY},
+    in_charge=_in_charge,
+    told_by='bus.kind',
+)

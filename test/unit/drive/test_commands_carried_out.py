@@ -1,0 +1,147 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How the steps of a profile come to the bus: in order, with a priority, and what they end by."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+from typing import cast
+
+import pytest
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import NotPossible
+from nfo_sinus_driver.catalog import Refusal
+from nfo_sinus_driver.catalog.profile import Acknowledge
+from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive.commands import carry_out
+from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Refused
+
+NO = Refused(Refused.ILLEGAL_VALUE, 'no')
+
+
+class Noted:
+    """Registers that note what is asked of them, and answer as they are told."""
+
+    def __init__(self, *answers: Any) -> None:
+        self.asked: list[tuple[Any, ...]] = []
+        self._answers = list(answers)
+
+    def _next(self, *asked: Any) -> Any:
+        self.asked.append(asked)
+        answer = self._answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def read(self, key: str, priority: Priority, *, once: bool) -> Any:
+        return self._next('read', key, priority, once)
+
+    async def write(self, step: Write, priority: Priority) -> None:
+        self._next('write', step, priority)
+
+    async def acknowledge(self, key: str, priority: Priority) -> Any:
+        return self._next('acknowledge', key, priority)
+
+    async def acknowledge_and_write(self, key: str, step: Write) -> None:
+        self._next('acknowledge and write', key, step)
+
+    async def reached(self, condition: Callable[[Any], bool]) -> None:
+        self._next('until', condition('status'))
+
+
+def carried_out(noted: Noted, steps: Steps[Any], priority: Priority = Priority.SERVICE) -> Any:
+    """What a sequence returns, or raises."""
+    done = carry_out(steps, cast(Registers, noted), priority, noted.reached)
+    return asyncio.run(done)
+
+
+def test_each_step_brings_what_the_next_one_is_given() -> None:
+    def steps() -> Steps[int]:
+        first = yield Read('a', once=True)
+        yield Write('b', first)
+        flags = yield Acknowledge('c')
+        yield AcknowledgeThenWrite('c', Write('b', 0))
+        yield Until(lambda status: status == 'status')
+        return int(first + flags)
+
+    noted = Noted(3, None, 4, None, None)
+    assert carried_out(noted, steps(), Priority.STOP) == 7
+    assert noted.asked == [
+        ('read', 'a', Priority.STOP, True),
+        ('write', Write('b', 3), Priority.STOP),
+        ('acknowledge', 'c', Priority.STOP),
+        ('acknowledge and write', 'c', Write('b', 0)),
+        ('until', True),
+    ]
+
+
+def test_a_refusal_is_raised_where_the_step_was_yielded() -> None:
+    def steps() -> Steps[str]:
+        try:
+            yield Write('a', 1)
+        except Refusal as refusal:
+            # the answer to what came before is not given again
+            return f'{refusal}, {(yield Read("b"))}'
+        return ''
+
+    assert carried_out(Noted(NO, 5), steps()) == 'no, 5'
+
+
+def test_a_refusal_that_ends_the_sequence_is_that_of_the_drive() -> None:
+    def steps() -> Steps[None]:
+        try:
+            yield Write('a', 1)
+        except Refusal:
+            if (yield Read('b')):
+                raise
+
+    with pytest.raises(Refused) as told:
+        carried_out(Noted(NO, True), steps())
+    assert told.value is NO
+    carried_out(Noted(NO, False), steps())
+
+
+@pytest.mark.parametrize('error', [NoAnswer('silence'), DriveError('not reached')])
+def test_anything_else_ends_the_sequence(error: Exception) -> None:
+    def steps() -> Steps[None]:
+        try:
+            yield Write('a', 1)
+        except Refusal:
+            yield Write('b', 2)
+
+    noted = Noted(error)
+    with pytest.raises(type(error)):
+        carried_out(noted, steps())
+    assert len(noted.asked) == 1
+
+
+def test_what_is_not_possible_is_told_to_a_person() -> None:
+    def steps() -> Steps[None]:
+        yield Read('a')
+        raise NotPossible('it is tuning')
+
+    with pytest.raises(DriveError, match='it is tuning'):
+        carried_out(Noted(0), steps())

@@ -1,0 +1,131 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every row of the table of control is visited in histories that the laws judge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping
+import contextlib
+
+import pytest
+from test_any_order import AnyOrder
+from test_any_order import G2ModeScmd
+from test_older_settings import Rig as OlderRig
+
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import control_state
+from nfo_sinus_driver.drive.control_state import ControlEvent
+from nfo_sinus_driver.drive.control_state import ControlState
+
+Row = tuple[ControlState, ControlEvent]
+
+
+class Visited(dict[Row, ControlState]):
+    """The table, which notes the rows that are looked up."""
+
+    def __init__(self, table: Mapping[Row, ControlState]) -> None:
+        super().__init__(table)
+        self.rows: set[Row] = set()
+
+    def get(self, row: Row, default: ControlState) -> ControlState:  # type: ignore[override]
+        self.rows.add(row)
+        return super().get(row, default)
+
+
+@pytest.fixture
+def visited(monkeypatch: pytest.MonkeyPatch) -> Visited:
+    visited = Visited(control_state.TRANSITIONS)
+    monkeypatch.setattr(control_state, 'TRANSITIONS', visited)
+    return visited
+
+
+@contextlib.contextmanager
+def history(**how: object) -> Iterator[AnyOrder]:
+    """Begin a history, and judge it as a whole at its end."""
+    state = G2ModeScmd()
+    state.begin(**how)  # type: ignore[arg-type]
+    try:
+        yield state
+    finally:
+        state.teardown()
+
+
+def test_every_row_is_visited(visited: Visited) -> None:
+    with history() as state:
+        # a whole day's work, and its end with the motor running
+        state.ride(wait=1.0)
+        state.stop(wait=2.5)
+        state.enable_without_run_input(wait=2.5)
+        state.run_input_on(wait=1.0)
+        state.ride(wait=1.0)
+        state.shut_down(wait=1.0)
+        # the line lost: standing, running, and while the driver ends
+        state.lose_line('silent', '', 9.0, wait=2.5)
+        state.break_line('silent', wait=9.0)
+        state.stop(wait=0.4)
+        state.mend_line(wait=2.5)
+        state.break_line('silent', wait=9.0)
+        state.shut_down(wait=1.0)
+        state.mend_line(wait=5.0)
+        # the end while it is lost, standing, being enabled, and stopping
+        state.shut_down(wait=1.0)
+        state.shut_down(wait=1.0)
+        state.enable(wait=0.004)
+        state.shut_down(wait=1.0)
+        state.ride(wait=1.0)
+        state.stop(wait=0.0)
+        state.shut_down(wait=1.0)
+    with history(delay=1) as state:
+        # the port gone at each moment of an enable that waits for the delayed start: once it is the
+        # poll that finds out
+        for step in range(50):
+            if (ControlState.ENABLING, ControlEvent.LOST) in visited.rows:
+                break
+            state.enable(wait=0.4 + 0.005 * step)
+            state.break_line('gone', wait=1.0)
+            state.mend_line(wait=2.5)
+    with history() as state:
+        # a fault that keeps the drive from taking the stop: over, lost, and the end
+        for end in ('', 'lost', 'shut down'):
+            state.ride(wait=1.0)
+            state.fault(5, standing=True, wait=1.0)
+            if end == 'lost':
+                state.break_line('silent', wait=9.0)
+                state.mend_line(wait=5.0)
+            elif end:
+                state.shut_down(wait=1.0)
+            state.end_cause(wait=0.1)
+            state.acknowledge(wait=1.0)
+    with history() as state:
+        # a tuning: to its end, stopped, lost, and the end
+        state.tune(Procedure.CALCULATE, give='', wait=5.0)
+        state.let(10.0)
+        for end in ('stop', 'lost', 'shut down', 'stop and shut down'):
+            state.tune(Procedure.STATOR_RESISTANCE, after=1.0, give='')
+            if 'stop' in end:
+                state.stop(wait=0.0)
+            if end == 'lost':
+                state.break_line('silent', wait=9.0)
+                state.mend_line(wait=5.0)
+            if 'shut' in end:
+                state.shut_down(wait=1.0)
+            state.let(15.0)
+    with contextlib.ExitStack() as stack:
+        # firmware that has to be under control to take a setting, while it is connected to
+        OlderRig(stack, '5.0').connect(drive_timeout=4.0)
+    table = set(visited)
+    unvisited = sorted(f'{event.name} in {state.name}' for state, event in table - visited.rows)
+    assert unvisited == []

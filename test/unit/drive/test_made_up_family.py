@@ -1,0 +1,269 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A family that is nothing but a folder: found, enabled, turned, reversed, faulted and stopped.
+
+The Acme has big-endian numbers, a status word of its own, a set-point in packed decimal digits and
+its direction in another register.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Sequence
+import dataclasses
+from pathlib import Path
+import struct
+import threading
+import time
+from types import SimpleNamespace
+from typing import Any
+
+from drive_rig import PATIENCE
+from drive_rig import Notes
+from drive_rig import wait_until
+import pytest
+
+from nfo_sinus_driver import families
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+
+RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ, KIND = 10, 100, 101, 102, 200, 201, 202, 300
+RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15
+RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
+
+
+class Acme:
+    """The registers of an Acme at the other end of a line; it refuses what it does not have."""
+
+    space = 'modbus'
+
+    def __init__(self) -> None:
+        self.registers = dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0)
+        self.registers[RAMP] = 50
+        self.lock = threading.Lock()
+        #: What becomes of the next write to a register.
+        self.fates: dict[int, LinkError] = {}
+        #: Register and word of all that was written, in order.
+        self.writes: list[tuple[int, int]] = []
+        self.trip(0)
+
+    def trip(self, code: int) -> None:
+        """Let a fault happen, or end: 0."""
+        word = self.registers[WORD]
+        runs = word & RUN and word & REMOTE and not code
+        told = HAS_REMOTE * bool(word & REMOTE) | RUNNING * bool(runs) | TRIPPED * bool(code)
+        usual = (3 if runs else 2) if word & REMOTE else 1
+        self.registers.update({TOLD: told, CODE: code or usual})
+        size = int(f'{self.registers[SIZE]:04X}{self.registers[SIZE + 1]:04X}')
+        hertz = (-size if self.registers[TURN] else size) if runs else 0
+        high, low = struct.unpack('>2H', struct.pack('>i', hertz))
+        self.registers.update({HERTZ: high, HERTZ + 1: low})
+
+    @property
+    def hertz(self) -> float:
+        """The frequency at which the motor turns, Hz."""
+        words = self.registers[HERTZ], self.registers[HERTZ + 1]
+        return float(struct.unpack('>i', struct.pack('>2H', *words))[0] / 100)
+
+    @property
+    def fault(self) -> int:
+        """The code of the fault that stands."""
+        return self.registers[CODE] if self.registers[TOLD] & TRIPPED else 0
+
+    # --- the link, as the bus has it ---
+
+    def open(self) -> None:
+        """Nothing has to be opened."""
+
+    def close(self) -> None:
+        """Nothing has to be closed."""
+
+    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+        """Nothing is ever in doubt."""
+
+    def identify(self, unit: int) -> SimpleNamespace:
+        """It does not tell who it is."""
+        return SimpleNamespace(done=True, found=Identification())
+
+    def parts(self, address: Address) -> Sequence[Address]:
+        """Whatever it has is read at once."""
+        return (address,)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        with self.lock:
+            numbers = self._numbers(address)
+            words = [self.registers[number] for number in numbers]
+        return Reply(struct.pack(f'>{len(words)}H', *words), time.monotonic())
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        with self.lock:
+            numbers = self._numbers(address)
+            words = struct.unpack(f'>{len(numbers)}H', data)
+            if address.index in self.fates:
+                raise self.fates.pop(address.index)
+            self.writes += zip(numbers, words, strict=True)
+            reset = words[0] & RESET and not self.registers[WORD] & RESET
+            self.registers.update(zip(numbers, words, strict=True))
+            self.trip(0 if reset and numbers[0] == WORD else self.fault)
+        return Reply(b'', time.monotonic())
+
+    def _numbers(self, address: Address) -> range:
+        numbers = range(address.index, address.index + address.size // 2)
+        if not all(number in self.registers for number in numbers):
+            raise Refused(Refused.ILLEGAL_ADDRESS, 'there is no such register')
+        return numbers
+
+
+@pytest.fixture(autouse=True)
+def _one_folder_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    more = str(Path(__file__).parent / 'made_up')
+    monkeypatch.setattr(families, '__path__', [*families.__path__, more])
+
+
+@pytest.fixture
+def acme() -> Acme:
+    return Acme()
+
+
+@pytest.fixture
+def bus(acme: Acme) -> Iterator[Bus]:
+    bus = Bus(acme)  # type: ignore[arg-type]
+    bus.start()
+    yield bus
+    bus.close()
+
+
+def test_it_is_found(bus: Bus) -> None:
+    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'acme'
+
+
+def test_one_that_tells_nothing_is_the_one_of_which_nothing_tells(acme: Acme, bus: Bus) -> None:
+    del acme.registers[KIND]
+    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'sinus_optimal'
+
+
+def test_of_two_that_tell_nothing_a_person_has_to_say(
+    acme: Acme, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = dataclasses.replace(load_family('acme').profile, told_by='')
+    monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
+    with pytest.raises(DriveError, match='set model to acme or sinus_optimal'):
+        bus.run(detect_model(bus, 1)).result(PATIENCE)
+
+
+def driver(bus: Bus, notes: Notes, **settings: Any) -> Drive:
+    settings = {'model': 'acme', 'control_method': 'control_word', **settings}
+    return Drive(bus, DriveSettings(**settings), notes)
+
+
+def turning(acme: Acme, bus: Bus, notes: Notes, **settings: Any) -> Drive:
+    """A drive that turns at -20 Hz."""
+    drive = driver(bus, notes, **settings)
+    drive.connect().result(PATIENCE)
+    drive.activate()
+    drive.enable().result(PATIENCE)
+    drive.set_setpoint(-20.0)
+    wait_until(lambda: acme.hertz == -20.0)
+    return drive
+
+
+def test_a_ride(acme: Acme, bus: Bus) -> None:
+    notes = Notes()
+    drive = driver(bus, notes)
+    drive.connect(parameters=True).result(PATIENCE)
+    drive.activate()
+    assert dict(drive.parameters.values) == {'ramp.up': 5.0}
+    assert not acme.writes
+
+    assert 'enabled' in drive.enable().result(PATIENCE)
+    runs = acme.writes.index((WORD, REMOTE | RUN))
+    # with control and set-point 0, and only then
+    assert {(WORD, REMOTE), (TURN, 0), (SIZE, 0), (SIZE + 1, 0)} <= {*acme.writes[:runs]}
+    assert acme.registers[TOLD] == HAS_REMOTE | RUNNING
+
+    drive.set_setpoint(20.0)
+    wait_until(lambda: acme.hertz == 20.0)
+    begun = len(acme.writes)
+    drive.set_setpoint(-12.34)
+    wait_until(lambda: acme.hertz == -12.34)
+    assert acme.writes[begun:] == [(TURN, 1), (SIZE, 0), (SIZE + 1, 0x1234)]
+    wait_until(lambda: drive.snapshot.actual == -12.34)
+    assert (drive.snapshot.setpoint, drive.snapshot.text) == (-12.34, 'Run')
+    # what stands there already is not written again
+    drive.set_setpoint(-50.0)
+    wait_until(lambda: acme.hertz == -50.0)
+    assert acme.writes[begun + 3 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
+
+    with acme.lock:
+        acme.trip(70)
+    wait_until(lambda: not drive.armed)
+    wait_until(lambda: acme.registers[WORD] == REMOTE)
+    wait_until(lambda: notes.told('Too hot. Let it cool'))
+    assert drive.acknowledge().result(PATIENCE) == 'acknowledged 70 Hot'
+    assert acme.hertz == 0
+
+    drive.enable().result(PATIENCE)
+    drive.set_setpoint(-30.0)
+    wait_until(lambda: acme.hertz == -30.0)
+    assert 'stopped' in drive.stop().result(PATIENCE)
+    assert (acme.hertz, acme.registers[WORD]) == (0, REMOTE)
+    assert 'given back' in drive.disconnect(1.0).result(PATIENCE)
+    assert acme.registers[WORD] == 0
+
+
+def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes(), setpoint_timeout=0.2)
+    wait_until(lambda: drive.snapshot.setpoint == 0)
+    assert (acme.hertz, acme.registers[TURN]) == (0, 0)
+    assert drive.armed
+    drive.set_setpoint(-5.0)
+    wait_until(lambda: acme.hertz == -5.0)
+
+
+def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    acme.fates[SIZE] = NoAnswer('silence')
+    begun = len(acme.writes)
+    drive.set_setpoint(30.0)
+    wait_until(lambda: acme.hertz == 30.0)
+    assert acme.writes[begun:] == [(TURN, 0), (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
+    wait_until(lambda: drive.snapshot.setpoint == 30.0)
+
+
+def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:
+    notes = Notes()
+    drive = turning(acme, bus, notes)
+    acme.fates[SIZE] = Refused(Refused.ILLEGAL_VALUE, 'not that')
+    drive.set_setpoint(-35.0)
+    wait_until(lambda: notes.told('it refused set-point -35: not that'))
+    wait_until(lambda: acme.registers[WORD] == REMOTE)
+    assert not drive.armed
+
+
+def test_it_follows_no_set_point_for_all(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    assert drive.setpoint.why_not_shared == 'takes a set-point in several writes'

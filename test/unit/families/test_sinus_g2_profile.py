@@ -1,0 +1,396 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the G2 is told, step by step, whatever it answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from support.steps import REFUSED
+from support.steps import Wait
+from support.steps import play
+from support.steps import status
+
+from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import NotPossible
+from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import Refusal
+from nfo_sinus_driver.catalog import Removal
+from nfo_sinus_driver.catalog import Reset
+from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog.profile import Acknowledge
+from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Write
+
+G2 = load_family('sinus_g2')
+MODE, SCMD, WORD = 'fieldbus.mode', 'fieldbus.scmd', 'fieldbus.drive_control'
+MASK, STATUS = 'fieldbus.drv_ctrl_write_mask', 'fieldbus.drive_status'
+ACK = 'fieldbus.inv_st_with_ack'
+INHIBIT, STOP, EXT, BUS = range(4)
+#: Control from the network; its reference, too.
+FROM_NET = 0x0200
+READY, NET_REF, RUN_BITS = 0x4076, 0x8000, 0x2009
+OVERLOAD, SIO_FAIL = G2.status_code(5), G2.status_code(14)
+
+IN_CONTROL = (Read(MODE), BUS)
+NOT_IN_CONTROL = (Read(MODE), STOP)
+SCMD_STOP = Write(SCMD, 0)
+TO_NOBODY = Write(MODE, STOP)
+
+
+def zero(once: bool = False, key: str = 'status.frq_set') -> Write:
+    return Write(key, 0.0, at='fieldbus.setpoint', once=once)
+
+
+#: Set-point 0, read back; and what the drive keeps.
+ZEROED = ((zero(), None), (Read('status.frq_set'), 0.0))
+KEPT = ((zero(), None), (Read('status.frq_set'), 5.0))
+
+
+def scmd(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMethod:
+    return _method('mode_scmd', reference, classic)
+
+
+def control(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMethod:
+    return _method('drive_control', reference, classic)
+
+
+def _method(name: str, reference: str, classic: bool) -> ControlMethod:
+    protocol = 'classic' if classic else 'modbus'
+    return G2.profile.methods[name](reference, lambda key: protocol in G2[key].addresses)
+
+
+def change(clear: int, add: int = 0, *, once: bool = True) -> Write:
+    """Some bits of the control word, as one transaction: the AND mask is the low word."""
+    return Write(MASK, ~clear & 0xFFFF | add << 16, once=once)
+
+
+# --- MODE and SCMD --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('mode', 'holder'),
+    [
+        (INHIBIT, Holder.INHIBITED),
+        (STOP, Holder.NOBODY),
+        (EXT, Holder.LOCAL),
+        (BUS, Holder.BUS),
+        (9, Holder.UNKNOWN),
+    ],
+)
+def test_who_has_control(mode: int, holder: Holder) -> None:
+    for method in (scmd(), control()):
+        assert play(method.holder(), (Read(MODE), mode)) is holder
+    assert play(scmd().in_control(), (Read(MODE), mode)) is (mode == BUS)
+
+
+def test_control_is_taken_and_the_stop_is_the_next_frame() -> None:
+    first = Write(SCMD, 0, head=True)
+    play(scmd().take_control(), (Read(MODE), STOP), (Write(MODE, BUS), None), (first, None))
+    play(scmd().take_control(), (Read(MODE), EXT), (Write(MODE, BUS), None), (first, None))
+    play(scmd().take_control(), (Read(MODE), BUS), (first, None))
+
+
+def test_a_stop_that_comes_too_soon_is_given_again_under_control() -> None:
+    first = Write(SCMD, 0, head=True)
+    reached = Wait(status(from_bus=True), not_by=[status()])
+    play(
+        scmd().take_control(),
+        (Read(MODE), STOP),
+        (Write(MODE, BUS), None),
+        (first, REFUSED),
+        (reached, None),
+        (first, None),
+    )
+
+
+def test_control_that_is_refused_is_not_followed_by_anything() -> None:
+    with pytest.raises(Refusal):
+        play(scmd().take_control(), (Read(MODE), STOP), (Write(MODE, BUS), REFUSED))
+
+
+@pytest.mark.parametrize('method', [scmd(), control()])
+def test_nobody_takes_control_under_inhibit(method: ControlMethod) -> None:
+    with pytest.raises(NotPossible, match='MODE is Inhibit'):
+        play(method.take_control(), (Read(MODE), INHIBIT))
+
+
+@pytest.mark.parametrize(
+    ('reference', 'command'),
+    [('fieldbus', 0x101), ('terminal', 0x81), ('op_mode', 0x41), ('fix7_reverse', 0x3D)],
+)
+def test_the_run_command_says_where_the_reference_comes_from(reference: str, command: int) -> None:
+    play(scmd(reference).run(), (Write(SCMD, command, once=True), None))
+
+
+def test_stop() -> None:
+    stop, to_zero = Write(SCMD, 0, once=True), zero(once=True)
+    play(scmd().stop('Freque'), (stop, None), (to_zero, None))
+    # no set-point is followed in a mode that is not known
+    play(scmd().stop(''), (stop, None))
+    # keypad or terminals have control: it is none of ours
+    play(scmd().stop('Freque'), (stop, REFUSED), (Read(MODE), EXT))
+    play(scmd().stop('Freque'), (stop, None), (to_zero, REFUSED), (Read(MODE), STOP))
+
+
+@pytest.mark.parametrize('mode', [BUS, INHIBIT])
+def test_a_refused_stop_is_told_where_the_bus_may_have_control(mode: int) -> None:
+    first = Refusal('the first')
+    with pytest.raises(Refusal) as told:
+        play(scmd().stop('Freque'), (Write(SCMD, 0, once=True), first), (Read(MODE), mode))
+    assert told.value is first
+
+
+def test_quick_stop_gives_control_back() -> None:
+    assert G2.profile.methods['mode_scmd'].coasts
+    play(scmd().quick_stop('Speed'), (TO_NOBODY, None), (zero(key='status.spd_set'), None))
+    play(scmd().quick_stop('Freque'), (TO_NOBODY, None), (zero(), REFUSED))
+    with pytest.raises(Refusal):
+        play(scmd().quick_stop('Freque'), (TO_NOBODY, REFUSED))
+
+
+def test_control_is_given_back_only_where_it_is_ours() -> None:
+    play(scmd().release(), IN_CONTROL, (TO_NOBODY, None))
+    play(scmd().release(), NOT_IN_CONTROL)
+    play(control().release(), (Read(STATUS), FROM_NET), (TO_NOBODY, None))
+    play(control().release(), (Read(STATUS), 0))
+
+
+@pytest.mark.parametrize(
+    ('command', 'setpoint', 'mode', 'removed'),
+    [
+        (None, ZEROED, ((TO_NOBODY, None), NOT_IN_CONTROL), Removal.COMMAND),
+        (None, ((zero(), REFUSED),), ((TO_NOBODY, REFUSED),), Removal.COMMAND),
+        (REFUSED, KEPT, ((TO_NOBODY, None), NOT_IN_CONTROL), Removal.COMMAND),
+        (REFUSED, ZEROED, ((TO_NOBODY, None), IN_CONTROL), Removal.SETPOINT),
+        (REFUSED, ZEROED, ((TO_NOBODY, REFUSED),), Removal.SETPOINT),
+        (REFUSED, KEPT, ((TO_NOBODY, REFUSED),), Removal.NOTHING),
+        (REFUSED, ((zero(), REFUSED),), ((TO_NOBODY, REFUSED),), Removal.NOTHING),
+    ],
+)
+def test_what_is_removed(command: Any, setpoint: Any, mode: Any, removed: Removal) -> None:
+    assert play(scmd().remove('Freque'), (SCMD_STOP, command), *setpoint, *mode) is removed
+
+
+NOTHING_REMOVED = ((SCMD_STOP, REFUSED), (zero(), REFUSED), (TO_NOBODY, REFUSED))
+COMMAND_REMOVED = ((SCMD_STOP, None), *ZEROED, (TO_NOBODY, None), NOT_IN_CONTROL)
+
+
+@pytest.mark.parametrize(
+    'script',
+    [
+        (NOT_IN_CONTROL, (Acknowledge(ACK), 5)),
+        (IN_CONTROL, *COMMAND_REMOVED, (Acknowledge(ACK), 5)),
+        # what releases the motor soonest is the very next frame
+        (IN_CONTROL, *NOTHING_REMOVED, (AcknowledgeThenWrite(ACK, TO_NOBODY), None)),
+        (IN_CONTROL, *NOTHING_REMOVED, (AcknowledgeThenWrite(ACK, TO_NOBODY), REFUSED)),
+    ],
+)
+def test_a_fault_is_acknowledged_by_reading(script: Any) -> None:
+    assert play(scmd().acknowledge(OVERLOAD, 'Freque'), *script) == ''
+
+
+GONE, STANDS = (Read('fieldbus.inv_st'), 37), (Read('fieldbus.inv_st'), SIO_FAIL.code)
+FLAGS = Acknowledge('fieldbus.sio_err')
+BY_READING = (NOT_IN_CONTROL, (Acknowledge(ACK), 14))
+
+
+def test_a_serial_fault_ends_by_mode_stop() -> None:
+    by_mode = (Read(MODE), BUS), (TO_NOBODY, None), NOT_IN_CONTROL
+    assert play(scmd().acknowledge(SIO_FAIL, 'Freque'), *by_mode, GONE, GONE) == ''
+    # Modbus has no flags
+    script = (*by_mode, STANDS, STANDS, *BY_READING)
+    assert play(scmd().acknowledge(SIO_FAIL, 'Freque'), *script) == ''
+
+
+def test_a_serial_fault_ends_by_its_flags_on_classic() -> None:
+    acknowledge = scmd(classic=True).acknowledge
+    by_mode = (Read(MODE), STOP), (TO_NOBODY, REFUSED)
+    # that a fault kept a message from being carried out is no reason of it
+    said = play(acknowledge(SIO_FAIL, 'Freque'), *by_mode, STANDS, (FLAGS, 0b10101), GONE)
+    assert said == 'wrong check sum, time-out of the serial communication'
+    said = play(acknowledge(SIO_FAIL, 'Freque'), *by_mode, STANDS, (FLAGS, 1 << 12), GONE)
+    assert said == 'flag 12'
+
+
+def test_a_serial_fault_takes_no_control_from_the_terminals() -> None:
+    script = ((Read(MODE), EXT), STANDS, STANDS, *BY_READING)
+    assert play(scmd().acknowledge(SIO_FAIL, 'Freque'), *script, GONE) == ''
+    with pytest.raises(NotPossible, match='press STOP at the drive'):
+        play(scmd().acknowledge(SIO_FAIL, 'Freque'), *script, STANDS)
+    begins = ((Read(MODE), EXT),)
+    edge = [(change(RUN_BITS | 0x80, add), None) for add in (0, 0x80, 0)]
+    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *edge, GONE) == ''
+    with pytest.raises(NotPossible, match='press STOP at the drive'):
+        play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *edge, STANDS)
+
+
+@pytest.mark.parametrize(
+    ('procedure', 'command'),
+    [
+        (Procedure.FULL, 0x201),
+        (Procedure.BASIC, 0x301),
+        (Procedure.STATOR_RESISTANCE, 0x401),
+        (Procedure.CALCULATE, 0x501),
+        (Reset.ERROR_LOG, 0x800),
+        (Reset.ENERGY, 0x900),
+    ],
+)
+def test_procedures(procedure: Procedure | Reset, command: int) -> None:
+    # once, and behind no stop that comes later
+    assert scmd().procedures[procedure] == Write(SCMD, command, once=True, head=True)
+    assert G2.profile.methods_with(procedure) == ['mode_scmd']
+
+
+# --- the control word -----------------------------------------------------------------------------
+
+
+def test_the_network_has_control() -> None:
+    assert play(control().in_control(), (Read(STATUS), FROM_NET | 0x31)) is True
+    assert play(control().in_control(), (Read(STATUS), 0x31)) is False
+
+
+@pytest.mark.parametrize(
+    ('reference', 'ready'), [('fieldbus', READY | NET_REF), ('terminal', READY)]
+)
+def test_the_control_word_is_taken_and_runs(reference: str, ready: int) -> None:
+    method = control(reference)
+    play(method.take_control(), (Read(MODE), STOP), (Write(WORD, ready), None))
+    # from a motor that still stops, too: no state between shows then
+    others = [status(state=state) for state in (State.FAULTED, State.OPERATION_ENABLED)]
+    stopping = status(state=State.STOPPING)
+    play(
+        method.run(),
+        (Wait(status(state=State.READY_TO_SWITCH_ON), stopping, not_by=others), None),
+        (Write(WORD, ready | 1, once=True), None),
+        (Wait(status(state=State.SWITCHED_ON), stopping, not_by=others), None),
+        (Write(WORD, ready | 9, once=True), None),
+    )
+
+
+def test_the_run_bits_are_reset_and_the_others_left() -> None:
+    play(control().stop('Freque'), (change(RUN_BITS), None), (zero(once=True), None))
+    # Classic has no masks
+    play(
+        control(classic=True).stop('Freque'),
+        (Read(WORD), 0xC07F),
+        (Write(WORD, 0xC076, once=True), None),
+        (zero(once=True), None),
+    )
+
+
+@pytest.mark.parametrize(
+    'refused',
+    [
+        ((change(RUN_BITS), REFUSED),),
+        ((change(RUN_BITS), None), (zero(once=True), REFUSED)),
+    ],
+)
+def test_a_refused_reset_is_told_where_the_network_has_control(refused: Any) -> None:
+    play(control().stop('Freque'), *refused, (Read(STATUS), 0))
+    with pytest.raises(Refusal):
+        play(control().stop('Freque'), *refused, (Read(STATUS), FROM_NET))
+
+
+def test_quick_stop_coasts_and_keeps_control() -> None:
+    coast = change(RUN_BITS | 4, 0x800, once=False)
+    play(control().quick_stop('Freque'), (coast, None), (zero(), REFUSED))
+
+
+@pytest.mark.parametrize(
+    ('script', 'removed'),
+    [
+        (((change(RUN_BITS, once=False), None),), Removal.COMMAND),
+        (
+            ((change(RUN_BITS, once=False), REFUSED), (TO_NOBODY, None), (Read(STATUS), 0)),
+            Removal.COMMAND,
+        ),
+        (
+            (
+                (change(RUN_BITS, once=False), REFUSED),
+                (TO_NOBODY, None),
+                (Read(STATUS), FROM_NET),
+                *ZEROED,
+            ),
+            Removal.SETPOINT,
+        ),
+        (
+            ((change(RUN_BITS, once=False), REFUSED), (TO_NOBODY, REFUSED), *ZEROED),
+            Removal.SETPOINT,
+        ),
+        (
+            ((change(RUN_BITS, once=False), REFUSED), (TO_NOBODY, REFUSED), *KEPT),
+            Removal.NOTHING,
+        ),
+    ],
+)
+def test_what_is_removed_by_the_control_word(script: Any, removed: Removal) -> None:
+    assert play(control().remove('Freque'), *script) is removed
+
+
+def test_a_fault_is_acknowledged_by_an_edge() -> None:
+    edge = [(change(RUN_BITS | 0x80, add), None) for add in (0, 0x80, 0)]
+    assert play(control().acknowledge(OVERLOAD, 'Freque'), *edge) == ''
+    # a serial one by MODE = Stop alone first
+    serial = (Read(MODE), BUS), (TO_NOBODY, REFUSED)
+    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *serial, *edge) == ''
+
+
+def test_where_no_edge_is_taken_reading_has_to_do() -> None:
+    low = change(RUN_BITS | 0x80)
+    stop = AcknowledgeThenWrite(ACK, Write(WORD, READY | NET_REF))
+    for removed, end in (
+        (((change(RUN_BITS, once=False), None),), (Acknowledge(ACK), 5)),
+        (((change(RUN_BITS, once=False), REFUSED), (TO_NOBODY, REFUSED), *KEPT), (stop, REFUSED)),
+    ):
+        script = ((low, REFUSED), *removed, end)
+        assert play(control().acknowledge(OVERLOAD, 'Freque'), *script) == ''
+
+
+# --- set-points, and who was in charge ------------------------------------------------------------
+
+
+@pytest.mark.parametrize('method', [scmd(), control()])
+def test_set_point_0_is_read_back(method: ControlMethod) -> None:
+    play(method.zero_setpoint('Freque'), *ZEROED)
+    with pytest.raises(NotPossible, match='keeps a set-point of 5 where 0 was written'):
+        play(method.zero_setpoint('Freque'), *KEPT)
+    with pytest.raises(NotPossible, match=r'no set-point over the bus in control mode \?'):
+        play(method.zero_setpoint(''))
+
+
+def test_in_charge() -> None:
+    in_charge = G2.profile.in_charge
+    # what has no control is asked for nothing: older firmware may not know it
+    assert play(in_charge(None)) == play(in_charge(status())) == 'mode_scmd'
+    assert play(in_charge(status(from_bus=True)), (Read(MODE), BUS)) == 'mode_scmd'
+    assert play(in_charge(status(from_bus=True)), (Read(MODE), STOP)) == 'drive_control'
+
+
+def test_every_parameter_that_is_named_is_one() -> None:
+    profile = G2.profile
+    assert profile.told_by in G2
+    assert profile.broadcast_stop == Write(MODE, STOP)
+    assert {*profile.uncertain} <= {*G2}
+    for target in profile.setpoints.values():
+        assert target.key in G2
+        assert target.at in G2
+    for method in profile.methods.values():
+        assert {write.key for write in method.procedures.values()} <= {*G2}
