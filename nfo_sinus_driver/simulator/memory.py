@@ -54,6 +54,8 @@ def kept(parameter: Parameter, raw: int, protocol: str) -> int:
     :raises Refused: VALUE.
     """
     target = home(parameter)
+    if protocol == target:
+        return raw
     exact = raw * parameter.factor(protocol) / parameter.factor(target)
     number = math.floor(exact + Fraction(1, 2))
     if not parameter.at(target).number.fits(number):
