@@ -37,11 +37,11 @@ help: ## list the targets
 setup: ## set up .venv, and build into install
 	@tools/setup
 
-demo: setup ## a short ride of a simulated drive, from enable to stop, recorded and drawn
-	@tools/run python -m nfo_sinus_driver.node.demo
+demo: setup ## a short run of a simulated drive, from enable to stop, recorded and drawn
+	@tools/run python -m nfo_sinus_driver.demo
 
 run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
-	@tools/run python -m nfo_sinus_driver.node.make_run
+	@tools/run python -m nfo_sinus_driver.demo.run
 
 test: setup ## lint, types, unit, ros, until the first one fails
 	@for stage in lint types unit ros; do \

@@ -51,8 +51,8 @@ from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers

@@ -16,9 +16,9 @@
 
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.drive.drive import Drive
-from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import DriveSettings

@@ -94,7 +94,14 @@ async def carry_out(
 
 
 class Commands:
-    """The commands of one drive, by the control method that its settings choose; for the bus."""
+    """
+    The commands of one drive, by the control method that its settings choose; for the bus.
+
+    Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
+
+    :raises DriveError: it cannot be carried out.
+    :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
+    """
 
     def __init__(self, settings: DriveSettings, registers: Registers) -> None:
         method = registers.model.profile.methods[settings.control_method]
@@ -115,40 +122,20 @@ class Commands:
         return await carry_out(self._method.holder(), self._registers, priority)
 
     async def take_control(self, reached: Reached) -> None:
-        """
-        Put the drive under bus control with no run command standing.
-
-        :param reached: for a drive that refuses what comes before its status says who has control.
-        :raises DriveError: it lets nobody.
-        """
+        """Put the drive under bus control with no run command standing."""
         steps = self._method.take_control()
         await carry_out(steps, self._registers, Priority.SERVICE, reached)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
-        """
-        Write set-point 0 in the unit of a control mode, and read it back.
-
-        :raises DriveError: the drive keeps another value, or takes none in this control mode.
-        """
+        """Write set-point 0 in the unit of a control mode, and read it back."""
         await carry_out(self._method.zero_setpoint(control_mode), self._registers, priority)
 
     async def run(self, reached: Reached) -> None:
-        """
-        Give the run command; once, for nobody knows what has happened before a second one.
-
-        :param reached: for what takes several steps, each confirmed by the drive's status.
-        :raises DriveError: a step is not confirmed.
-        """
+        """Give the run command; once, for nobody knows what has happened before a second one."""
         await carry_out(self._method.run(), self._registers, Priority.SERVICE, reached)
 
     async def stop(self, control_mode: str) -> None:
-        """
-        Take the run command back and write set-point 0, at the head of the bus.
-
-        Does nothing to a drive that is not under bus control.
-
-        :raises LinkError: the drive does not answer, or refuses although the bus has control.
-        """
+        """Take the run command back and write set-point 0, at the head of the bus."""
         await carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)
 
     async def quick_stop(self, control_mode: str) -> None:
@@ -156,15 +143,11 @@ class Commands:
         await carry_out(self._method.quick_stop(control_mode), self._registers, Priority.STOP)
 
     async def release(self) -> None:
-        """Give control back; never by a MODE that can start the motor [C43], [C51]."""
+        """Give control back."""
         await carry_out(self._method.release(), self._registers, Priority.SERVICE)
 
     async def remove(self, control_mode: str) -> Removal:
-        """
-        Remove run command and set-point while a fault is active, each by itself [C98].
-
-        :raises LinkError: the drive does not answer, so that nobody knows.
-        """
+        """Remove run command and set-point while a fault is active, each by itself [C98]."""
         steps = self._method.remove(control_mode)
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
@@ -174,22 +157,21 @@ class Commands:
 
         :param code: the inverter status code that is shown.
         :returns: what more the drive said of it; ``''`` if nothing.
-        :raises DriveError: it cannot be, without taking control from keypad or terminals.
-        :raises LinkError: the drive does not answer; what it did is not known.
         """
         shown = self._registers.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
-    async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
+    async def begin(
+        self, procedure: Procedure | Reset, require_wanted: Callable[[], None]
+    ) -> None:
         """
         Have the drive begin a procedure; once, for nobody knows what happened before a second time.
 
         It waits for its turn with the stops, so that one which comes later does not overtake it.
 
         :param require_wanted: called when its turn has come; if it raises, nothing is written.
-        :raises LinkError: the drive does not answer, or refuses.
         """
         write = self._method.procedures[procedure]
         await self._registers.write(write, Priority.STOP, require_wanted)

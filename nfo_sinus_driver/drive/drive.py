@@ -38,10 +38,10 @@ from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.log_watch import LogWatch
 from nfo_sinus_driver.drive.own_timeout import OwnTimeout
 from nfo_sinus_driver.drive.parameters import Parameters

@@ -18,8 +18,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import datetime
 import math
 import time
 
@@ -29,6 +27,7 @@ from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.procedure import Procedures
@@ -46,41 +45,6 @@ _TRIES = 3
 _NEARLY_NOTHING = 0.1
 
 
-@dataclass(frozen=True)
-class LogEntry:
-    """
-    One entry of the error log.
-
-    :ivar code: as the inverter status has it.
-    :ivar text: as on the display.
-    :ivar operating_time: the drive's operating time when it happened, h.
-    :ivar age: operating hours ago; NaN if the drive does not tell.
-    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
-        to come, or the drive is known to have had power ever since; else NaN.
-    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
-    """
-
-    code: int
-    text: str
-    operating_time: float
-    age: float
-    at: float = math.nan
-    latest: float = math.nan
-
-    @property
-    def wall_time(self) -> str:
-        """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
-        if not math.isnan(self.at):
-            return _local(self.at)
-        latest = '' if math.isnan(self.latest) else _local(self.latest)
-        return f'{latest} or before' if latest else ''
-
-    def __str__(self) -> str:
-        age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
-        wall_time = f' ({self.wall_time})' if self.wall_time else ''
-        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
-
-
 def code_of(entry: int) -> int:
     """Return the inverter status code of an entry as it stands in the drive."""
     return entry >> 24
@@ -89,15 +53,6 @@ def code_of(entry: int) -> int:
 def hours_of(entry: int) -> float:
     """Return the operating time of an entry as it stands in the drive, h."""
     return (entry & _TICKS) * TICK
-
-
-def _local(at: float) -> str:
-    try:
-        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
-    except (ValueError, OverflowError, OSError):
-        # no calendar goes back so far: the drive tells nonsense
-        return ''
-    return moment.isoformat(' ', 'minutes')
 
 
 class ErrorLog:

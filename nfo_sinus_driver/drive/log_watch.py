@@ -25,11 +25,11 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import LogEntry
 from nfo_sinus_driver.drive.error_log import code_of
 from nfo_sinus_driver.drive.error_log import hours_of
 from nfo_sinus_driver.drive.errors import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener

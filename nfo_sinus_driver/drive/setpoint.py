@@ -253,7 +253,7 @@ class Setpoint:
     def take(self, request: Request) -> None:
         """Take a request to all for one to this drive; who asks for it writes it, too."""
         self._shared = request
-        self._accept()
+        self._accept(self._request)
 
     def follow(self, request: Request) -> None:
         """Take a request to all for one to this drive, and write it to this drive."""
@@ -316,32 +316,32 @@ class Setpoint:
         most = min(self.most, request.most)
         return max(-most, min(most, request.value))
 
-    def _accept(self) -> tuple[float, float]:
-        """Take note that the newest request counts; return its value, and what it is limited to."""
-        request = self._request
+    def _accept(self, request: Request) -> float:
+        """Take note that a request counts; return what it is limited to."""
         limited = self._limited(request)
         self.clamped = limited != request.value
         self._expired = False
         if self._warned:
             self._warned = False
             self._tell(Severity.INFO, 'set-points arrive again')
-        return request.value, limited
+        return limited
 
     def _make(self) -> Transfer | None:
-        if self._target is None or not self.counts(self._request):
+        request = self._request
+        if self._target is None or not self.counts(request):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
             return None
-        value, limited = self._accept()
+        limited = self._accept(request)
         if self.clamped and not self._clamp_told:
             self._tell(
                 Severity.WARNING,
-                f'set-point {value:g} is limited to {limited:g} '
+                f'set-point {request.value:g} is limited to {limited:g} '
                 '(setpoint_max, or the limit of the drive)',
             )
         self._clamp_told = self.clamped
-        due = self.due(self._request)
+        due = self.due(request)
         if not due:
             return None
         # of several writes each has a turn of its own, and a newer set-point comes between

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import enum
 import functools
 import math
-from typing import TYPE_CHECKING
 from typing import NamedTuple
 from typing import Protocol
 
@@ -32,9 +31,7 @@ from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import StatusCode
-
-if TYPE_CHECKING:
-    from nfo_sinus_driver.drive.error_log import LogEntry
+from nfo_sinus_driver.drive.log_entry import LogEntry
 
 NAN = math.nan
 #: Stands for an inverter status that has not been read; no drive has it.

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.inverter import Inverter
@@ -26,14 +26,34 @@ from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import describe_drift
 from nfo_sinus_driver.drive.snapshot import Severity
 
-if TYPE_CHECKING:
-    from nfo_sinus_driver.drive.parameters import Parameters
+
+class Settings(Protocol):
+    """What is needed of the settings of a drive."""
+
+    @property
+    def values(self) -> Mapping[str, Value]:
+        """The settings that the drive has, by key."""
+
+    @property
+    def data(self) -> Mapping[str, bytes]:
+        """The same as they stand in the drive."""
+
+    def describe(self, key: str, before: Value, data: bytes) -> Change:
+        """Return the difference between a value and what data mean."""
+
+    def exact(self, key: str, value: Value) -> Value:
+        """Return a value as the drive would show it."""
+
+    async def change_now(
+        self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
+    ) -> tuple[Change, ...]:
+        """Write what differs, and read it back."""
 
 
 class WantedState:
     """What the settings of one drive shall be; used on the bus, readable from anywhere."""
 
-    def __init__(self, parameters: Parameters, inverter: Inverter) -> None:
+    def __init__(self, parameters: Settings, inverter: Inverter) -> None:
         self._parameters = parameters
         self._inverter = inverter
         self._values: dict[str, Value] = {}

@@ -28,15 +28,15 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.drive.broadcast import can_broadcast
-from nfo_sinus_driver.node.drive_node import DriveNode
-from nfo_sinus_driver.node.line import COMMANDS
-from nfo_sinus_driver.node.line import Line
+from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.qos import COMMANDS
 
 #: How long all of them together may take, s. A start delay of a drive may last an hour.
 _LONGEST_ENABLE = 3700.0
 _LONGEST_STOP = 15.0
 
-_Command = Callable[[DriveNode], Future[str]]
+_Command = Callable[[ManagedDrive], Future[str]]
 
 
 class AllDrives:
@@ -47,9 +47,9 @@ class AllDrives:
     those that failed in front.
     """
 
-    def __init__(self, node: Node, line: Line) -> None:
+    def __init__(self, node: Node, context: BusContext) -> None:
         self._node = node
-        self._line = line
+        self._context = context
         for name, callback in (
             ('~/stop_all', self._stop),
             ('~/disable_all', self._stop),
@@ -79,8 +79,8 @@ class AllDrives:
     def _stop(self) -> tuple[list[str], list[str]]:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
         failed, done = self._command(_stop_one, _LONGEST_STOP)
-        if failed and can_broadcast(self._line.bus):
-            if any(node.settings.control_method == 'monitor' for node in self._line.drives):
+        if failed and can_broadcast(self._context.bus):
+            if any(one.settings.control_method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
             else:
                 failed.append(self._broadcast())
@@ -88,8 +88,9 @@ class AllDrives:
 
     def _broadcast(self) -> str:
         try:
-            models = [node.drive.model for node in self._line.drives]
-            self._line.bus.run(broadcast_stop(self._line.bus, models)).result(_LONGEST_STOP)
+            bus, drives = self._context.bus, self._context.drives
+            models = [managed.drive.model for managed in drives]
+            bus.run(broadcast_stop(bus, models)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'
@@ -102,14 +103,14 @@ class AllDrives:
         failed: list[str] = []
         done: list[str] = []
         futures: list[tuple[str, Future[str]]] = []
-        with self._line.at_once():
-            for node in self._line.drives:
-                if node.settings.control_method == 'monitor':
+        with self._context.at_once():
+            for managed in self._context.drives:
+                if managed.settings.control_method == 'monitor':
                     continue
                 try:
-                    futures.append((node.get_name(), command(node)))
+                    futures.append((managed.name, command(managed)))
                 except DriveError as error:
-                    failed.append(f'{node.get_name()}: {error}')
+                    failed.append(f'{managed.name}: {error}')
         deadline = time.monotonic() + timeout
         for name, future in futures:
             try:
@@ -123,13 +124,11 @@ class AllDrives:
         return failed, done
 
 
-def _stop_one(node: DriveNode) -> Future[str]:
-    if node.drive.identity is None:
+def _stop_one(managed: ManagedDrive) -> Future[str]:
+    if managed.drive.identity is None:
         raise DriveError('it has never answered')
-    return node.drive.stop()
+    return managed.drive.stop()
 
 
-def _enable_one(node: DriveNode) -> Future[str]:
-    if node.state != 'active':
-        raise DriveError(node.why_not_active())
-    return node.drive.enable()
+def _enable_one(managed: ManagedDrive) -> Future[str]:
+    return managed.require_active().enable()

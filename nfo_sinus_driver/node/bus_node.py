@@ -29,9 +29,8 @@ from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.all_drives import AllDrives
-from nfo_sinus_driver.node.line import RELIABLE
-from nfo_sinus_driver.node.line import Line
-from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.setpoints import SetpointsForAll
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import declare
@@ -62,29 +61,29 @@ class BusNode(Node):
         self.drive_names: list[str] = list(values['drives'])
         self._port: str = values['port']
         link = open_link(values['protocol'], self._port, settings)
-        self.line = Line(Bus(link), Outbox(), values['retries'])
-        self._all_drives = AllDrives(self, self.line)
-        self._setpoints_for_all = SetpointsForAll(self, self.line)
-        self._told_port: str | None = ''
+        self.bus_context = BusContext(Bus(link), values['retries'])
+        AllDrives(self, self.bus_context)
+        SetpointsForAll(self, self.bus_context)
+        self._logged_port: str | None = ''
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
-        self.line.outbox.put_every(_PERIOD, self._tell)
+        self.bus_context.publish_queue.put_every(_PERIOD, self._report)
 
     def start(self) -> None:
-        """Open the port and begin to tell."""
-        self.line.outbox.start()
-        self.line.bus.start()
+        """Open the port and begin to report."""
+        self.bus_context.publish_queue.start()
+        self.bus_context.bus.start()
 
-    def _tell(self) -> None:
-        if not self.line.bus.alive:
+    def _report(self) -> None:
+        if not self.bus_context.bus.alive:
             # the driver is ending, and has closed the port
             return
-        statistics = self.line.bus.statistics()
-        silent = [node.get_name() for node in self.line.drives if node.is_silent]
+        statistics = self.bus_context.bus.statistics()
+        silent = [drive.name for drive in self.bus_context.drives if drive.is_silent]
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
-        error = self.line.bus.port_error
+        error = self.bus_context.bus.port_error
         status = diagnostics.bus_status(
             self.get_fully_qualified_name().lstrip('/'), self._port, statistics, error, silent
         )
@@ -93,9 +92,9 @@ class BusNode(Node):
 
     def _log_port(self, error: str | None) -> None:
         """Say what the port does, on change."""
-        if error == self._told_port:
+        if error == self._logged_port:
             return
-        self._told_port = error
+        self._logged_port = error
         if error is None:
             self.get_logger().info(f'{self._port} is open')
         else:

@@ -19,19 +19,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import TYPE_CHECKING
+from typing import Any
+from typing import TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
-from nfo_sinus_driver.node.line import COMMANDS
-
-if TYPE_CHECKING:
-    from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.qos import COMMANDS
 
 #: How long a service waits for the bus before it says that it does not know, s. A start delay of
 #: the drive may last an hour.
@@ -42,7 +42,7 @@ _LONGEST_REFRESH = 300.0
 #: How many calls of ``~/enable`` of one drive may wait for an answer at once.
 CALLS_OF_ENABLE = 4
 
-_Command = Callable[[Drive], Future[str]]
+_T = TypeVar('_T')
 
 
 class Commands:
@@ -52,8 +52,9 @@ class Commands:
     Each kind has a callback group of its own, so that none waits for another.
     """
 
-    def __init__(self, node: DriveNode) -> None:
+    def __init__(self, node: Node, managed: ManagedDrive) -> None:
         self._node = node
+        self._managed = managed
         # several, for to disable must not wait for an enable that waits for a start delay; but not
         # any number, for each keeps a thread that other drives may need
         group = BoundedCallbackGroup(CALLS_OF_ENABLE)
@@ -67,41 +68,48 @@ class Commands:
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(self, name: str, command: _Command, timeout: float) -> None:
+    def offer(self, name: str, command: Callable[[Drive], Future[str]], timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            return self._answer(response, command, timeout)
+            return self.answer(response, lambda: command(self._managed.drive), timeout)
 
         group = MutuallyExclusiveCallbackGroup()
         self._node.create_service(
             Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
         )
 
-    def _on_enable(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
-        if not request.data:
-            return self._answer(response, Drive.stop, _LONGEST_STOP)
-        if self._node.state != 'active':
-            response.success = False
-            response.message = self._node.why_not_active()
-            return response
-        return self._answer(response, Drive.enable, _LONGEST_COMMAND)
+    def answer(
+        self,
+        response: Any,
+        command: Callable[[], Future[_T]],
+        timeout: float,
+        describe: Callable[[_T], str] = str,
+    ) -> Any:
+        """
+        Give a command, and fill in the answer to who asked for it.
 
-    def _answer(self, response, command: _Command, timeout: float):  # type: ignore[no-untyped-def]
+        :param timeout: how long the command may take, s.
+        :param describe: makes a message of its result.
+        """
         try:
-            response.message = command(self._node.drive).result(timeout)
+            response.message = describe(command().result(timeout))
             response.success = True
         except DriveError as error:
             response.message = str(error)
-            response.success = False
         except FutureTimeoutError:
             response.message = f'the bus did not get to it within {timeout:g} s'
-            response.success = False
         except Exception as error:
             # an exception that leaves a service callback would end the executor
             self._node.get_logger().error(f'error in a service: {error!r}')
             response.message = f'error in the driver: {error}'
-            response.success = False
         return response
+
+    def _on_enable(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        if not request.data:
+            return self.answer(response, self._managed.drive.stop, _LONGEST_STOP)
+        return self.answer(
+            response, lambda: self._managed.require_active().enable(), _LONGEST_COMMAND
+        )

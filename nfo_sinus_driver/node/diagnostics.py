@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 from builtin_interfaces.msg import Time
@@ -26,11 +25,10 @@ from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Change
-from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.statistics import Statistics
 
 _LEVELS = {
@@ -45,66 +43,53 @@ def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
     return DiagnosticArray(header=Header(stamp=stamp), status=[status])
 
 
-def drive_verdict(
-    snapshot: Snapshot, *, lifecycle_state: str, stop_overdue: bool, drift: Sequence[Change]
-) -> tuple[bytes, str]:
-    """Return how grave it is what one drive says, and what a person should know of it."""
-    if stop_overdue:
+def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str]:
+    """Return how grave it is what one drive says, and what an operator should know of it."""
+    if managed.drive.stop_overdue:
         message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
         return DiagnosticStatus.ERROR, message
     if not snapshot.connected:
         # a node that nobody configured has nothing to complain about
-        waiting = lifecycle_state == 'unconfigured'
+        waiting = managed.state == 'unconfigured'
         level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
         return level, 'not connected: the log of the node says what to check'
     level = _LEVELS[snapshot.kind]
     if snapshot.kind is not Kind.STATUS:
         return level, f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
-    if drift:
+    if drift := managed.drive.parameters.drift:
         message = f'{snapshot.text}; {len(drift)} parameters differ from the parameter file'
         return DiagnosticStatus.WARN, message
     return level, snapshot.text
 
 
 def drive_status(
-    name: str,
-    verdict: tuple[bytes, str],
-    snapshot: Snapshot,
-    *,
-    lifecycle_state: str,
-    address: int,
-    identity: Identity | None,
-    last_error: LogEntry | None,
-    parameters: str,
-    drift: Sequence[Change],
-    statistics: Statistics,
+    name: str, managed: ManagedDrive, snapshot: Snapshot, verdict: tuple[bytes, str]
 ) -> DiagnosticStatus:
     """
     Return how one drive is doing.
 
     :param verdict: as :func:`drive_verdict` has it.
-    :param last_error: the newest entry of its error log.
-    :param parameters: how many of them are known.
-    :param drift: what is otherwise than the parameter file says.
     """
+    drive = managed.drive
+    identity, parameters = drive.identity, drive.parameters
     code = '' if snapshot.status is None else str(snapshot.status.code)
     serial = identity.serial if identity else ''
     values = {
-        'lifecycle state': lifecycle_state,
-        'address': str(address),
+        'lifecycle state': managed.state,
+        'address': str(drive.settings.address),
         'model': identity.model if identity else '',
         'serial number': serial,
         'firmware': identity.versions if identity else '',
         'inverter status': f'{code} {snapshot.text}'.strip(),
-        'last error': _logged(last_error),
+        'last error': _logged(drive.last_error),
         'control method': snapshot.control_method,
         'control mode': snapshot.control_mode,
-        'parameters': parameters,
-        'differs from the parameter file': ', '.join(str(change) for change in drift),
+        'parameters': parameters.progress,
+        'differs from the parameter file': ', '.join(str(change) for change in parameters.drift),
         'enabled': str(snapshot.enabled),
         'setpoint': _quantity(snapshot.setpoint, snapshot.unit),
         'actual': _quantity(snapshot.actual, snapshot.unit),
-        **_figures(statistics),
+        **_figures(drive.statistics),
     }
     level, message = verdict
     return _status(level, f'{name}: drive', message, serial, values)

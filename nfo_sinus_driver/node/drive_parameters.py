@@ -57,7 +57,7 @@ class DriveParameters:
         self._node = node
         self._drive: Drive | None = None
         self._declared: set[str] = set()
-        self._news: set[str] = set()
+        self._changed: set[str] = set()
         self._lock = threading.Lock()
         self._outside: int | None = None
         # in the group of the parameter services, so that a value is never changed by both at once
@@ -86,16 +86,16 @@ class DriveParameters:
     def note(self, keys: Collection[str]) -> None:
         """Have parameters follow the drive; may be called from any thread."""
         with self._lock:
-            self._news.update(keys)
+            self._changed.update(keys)
         self._guard.trigger()
 
     def _follow(self) -> None:
         with self._lock:
-            news, self._news = self._news, set()
+            changed, self._changed = self._changed, set()
         drive = self._drive
         if drive is None:
             return
-        for key in news & self._declared:
+        for key in changed & self._declared:
             value = drive.parameters.values.get(key)
             if value is None or value == self._node.get_parameter(key).value:
                 continue
@@ -127,7 +127,7 @@ class DriveParameters:
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:
             return parameter
-        value = understood(drive.model[parameter.name], parameter.value)
+        value = coerce(drive.model[parameter.name], parameter.value)
         return Parameter(parameter.name, value=drive.parameters.admit(parameter.name, value))
 
     @contextlib.contextmanager
@@ -172,7 +172,7 @@ class DriveParameters:
             ) from None
 
 
-def understood(parameter: CatalogParameter, given: object) -> Value:
+def coerce(parameter: CatalogParameter, given: object) -> Value:
     """
     Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for 'OFF'.
 
@@ -206,7 +206,7 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
     wanted: dict[str, Value] = {}
     for parameter in drive.model.settings:
         if parameter.key in given:
-            value = understood(parameter, given[parameter.key].value)
+            value = coerce(parameter, given[parameter.key].value)
             # what cannot be reached over this line is told when the drive is there
             reached = drive.parameters.reaches(parameter.key)
             wanted[parameter.key] = (

@@ -19,22 +19,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence
-from concurrent.futures import TimeoutError as FutureTimeoutError
 import math
-from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.srv import GetErrorLog
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
 
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.commands import Commands
-
-if TYPE_CHECKING:
-    from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
 
 #: A busy line has many other things to do, s.
 _LONGEST = 60.0
@@ -48,9 +44,14 @@ class ErrorLogServices:
     """
 
     def __init__(
-        self, node: DriveNode, commands: Commands, stamp: Callable[[float], Time]
+        self,
+        node: Node,
+        managed: ManagedDrive,
+        commands: Commands,
+        stamp: Callable[[float], Time],
     ) -> None:
-        self._node = node
+        self._managed = managed
+        self._commands = commands
         self._stamp = stamp
         node.create_service(
             GetErrorLog,
@@ -64,29 +65,24 @@ class ErrorLogServices:
     def _on_get(
         self, request: GetErrorLog.Request, response: GetErrorLog.Response
     ) -> GetErrorLog.Response:
-        try:
-            entries = self._node.drive.error_log(request.max_entries).result(_LONGEST)
-        except DriveError as error:
-            response.message = str(error)
-        except FutureTimeoutError:
-            response.message = f'the bus did not get to it within {_LONGEST:g} s'
-        except Exception as error:
-            # an exception that leaves a service callback would end the executor
-            self._node.get_logger().error(f'error in a service: {error!r}')
-            response.message = f'error in the driver: {error}'
-        else:
+        def fill_in(entries: Sequence[LogEntry]) -> str:
             response.entries = [
                 messages.error_log_entry(entry, self._stamp(entry.at)) for entry in entries
             ]
-            response.message = self._summary(entries)
-            response.success = True
-        return response
+            return self._summary(entries)
+
+        return self._commands.answer(
+            response,
+            lambda: self._managed.drive.error_log(request.max_entries),
+            _LONGEST,
+            fill_in,
+        )
 
     def _summary(self, entries: Sequence[LogEntry]) -> str:
         undated = sum(math.isnan(entry.at) for entry in entries)
         if not undated:
             return f'{len(entries)} entries'
-        since = self._node.drive.powered_since
+        since = self._managed.drive.powered_since
         return (
             f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
             f'since the driver has seen the drive with power, from operating hour {since:.1f} on'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What rclpy leaves out of managed nodes."""
+"""Who moves a managed node through its states, and what rclpy leaves out of that."""
 
 from __future__ import annotations
 
@@ -22,8 +22,94 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin
 
+from nfo_sinus_driver.node.autostart import Autostart
 
-def answer_transitions(node: LifecycleNodeMixin, in_transition: threading.Lock) -> None:
+
+class Lifecycle:
+    """
+    The state of a managed node; autostart changes it until an operator takes a hand in it.
+
+    :param node: one that is not served yet.
+    """
+
+    def __init__(self, node: LifecycleNodeMixin) -> None:
+        self._node = node
+        self._autostart = Autostart(node.get_name(), self._try_to_start)
+        #: Why the newest try of autostart failed.
+        self._complaint = ''
+        # autostart changes the state from a thread of its own
+        self._in_transition = threading.Lock()
+        _reject_invalid_transitions(node, self._in_transition)
+
+    @property
+    def state(self) -> str:
+        """Its label, such as ``active``."""
+        label: str = self._node._state_machine.current_state[1]
+        return label
+
+    @property
+    def why_not_active(self) -> str:
+        """Why the node is not active, and what to do."""
+        if self.state == 'finalized':
+            return 'the node was shut down: start the driver again'
+        if self._complaint:
+            return f'the drive has not answered yet: {self._complaint}'
+        return f'the node is {self.state}: activate it first'
+
+    @property
+    def by_operator(self) -> bool:
+        """The transition that runs on this thread was not asked for by autostart."""
+        return not self._autostart.trying
+
+    def start(self) -> None:
+        """Have the node configured and activated as soon as the drive answers, if that is set."""
+        if self._node.get_parameter('autostart').value:
+            self._autostart.start()
+
+    def end(self) -> None:
+        """End autostart, if there is one; a try that is under way goes on."""
+        self._autostart.give_up()
+
+    def join(self, timeout: float) -> None:
+        """Wait for the last try of autostart after :meth:`end`, but not for ever (s)."""
+        self._autostart.join(timeout)
+
+    def note_transition(self) -> None:
+        """Leave the lifecycle to an operator once an operator took a hand in it."""
+        if self.by_operator:
+            self._autostart.give_up()
+
+    def note_configured(self) -> None:
+        """Take note that the drive was found."""
+        self._complaint = ''
+        self.note_transition()
+
+    def complain(self, why: str, *, known: bool) -> None:
+        """
+        Log why the drive cannot be configured; of what autostart tries, once for each reason.
+
+        :param known: somebody else says so already.
+        """
+        log = self._node.get_logger()
+        if self.by_operator:
+            log.error(why)
+            return
+        news, self._complaint = why != self._complaint, why
+        if news and not known:
+            log.error(f'{why}; trying again for ever')
+
+    def _try_to_start(self) -> bool:
+        """Configure and activate; return whether the node is active."""
+        with self._in_transition:
+            # meanwhile somebody else may have taken the lifecycle over
+            if not self._autostart.over and self.state == 'unconfigured':
+                self._node.trigger_configure()
+            if not self._autostart.over and self.state == 'inactive':
+                self._node.trigger_activate()
+            return self.state == 'active'
+
+
+def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threading.Lock) -> None:
     """
     Have ``~/change_state`` wait for others, and answer also what the node's state does not have.
 

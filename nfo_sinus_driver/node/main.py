@@ -46,8 +46,8 @@ from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.executor import NodeExecutor
 from nfo_sinus_driver.node.executor import end_all
-from nfo_sinus_driver.node.output import Output
-from nfo_sinus_driver.node.output import open_closed_streams
+from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
+from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
@@ -86,13 +86,13 @@ class DriverProcess:
             self._bus_node = BusNode(bus_overrides(single_name))
             names = _renamed(self._bus_node.drive_names, single_name)
         _check_names(names)
-        line = self._bus_node.line
+        self._context = self._bus_node.bus_context
+        self._drives: list[DriveNode] = []
         for name in names:
             try:
-                line.drives.append(DriveNode(name, line))
+                self._drives.append(DriveNode(name, self._context))
             except (ParameterException, ValueError, DriveError) as error:
                 raise ValueError(f'{name}: {error}') from error
-        self._drives = line.drives
         self._warn_of_unknown_names(arguments)
         self._executors = [
             NodeExecutor(self._bus_node, _GROUPS_OF_THE_BUS),
@@ -108,18 +108,18 @@ class DriverProcess:
     def start(self) -> None:
         """Open the port and let the nodes work."""
         self._bus_node.start()
-        self._bus_node.line.listener.start()
+        self._context.setpoint_subscriber.start()
         for executor in self._executors:
             executor.start()
         for node in self._drives:
-            node.start()
+            node.lifecycle.start()
 
     @property
     def alive(self) -> bool:
         """The nodes and the bus still work."""
-        line = self._bus_node.line
-        parts = (line.bus, line.outbox, line.listener, *self._executors)
-        return all(part.alive for part in parts)
+        context = self._context
+        threads = (context.bus, context.publish_queue, context.setpoint_subscriber)
+        return all(part.alive for part in (*threads, *self._executors))
 
     def stop(self, why: str) -> bool:
         """
@@ -130,21 +130,22 @@ class DriverProcess:
         """
         confirmed = self._stop_motors(why)
         # whoever still waits for the bus is told, so that no callback keeps the executor
-        self._bus_node.line.bus.close()
-        self._bus_node.line.outbox.close()
-        self._bus_node.line.listener.close(_LAST_CALLBACK)
+        self._context.bus.close()
+        self._context.publish_queue.close()
+        self._context.setpoint_subscriber.close(_LAST_CALLBACK)
         end_all(self._executors, _LAST_CALLBACK)
         deadline = time.monotonic() + _LAST_CALLBACK
         for node in self._drives:
-            node.join(max(0.0, deadline - time.monotonic()))
+            node.lifecycle.join(max(0.0, deadline - time.monotonic()))
         return confirmed
 
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
         # all are told before the first is waited for, and nobody can enable any of them again
-        with self._bus_node.line.at_once():
+        with self._context.at_once():
             stops = {
-                node.stop_for_good(node.settings.shutdown_timeout): node for node in self._drives
+                node.stop_for_good(node.managed.settings.shutdown_timeout): node
+                for node in self._drives
             }
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
         unconfirmed: list[DriveNode] = []
@@ -152,9 +153,9 @@ class DriverProcess:
         for node, stop in _as_they_end(stops):
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
-            elif node.drive.heard:
+            elif node.managed.drive.heard:
                 # one that is silent must not take the others' time to be released
-                releases[node.drive.disconnect(_time_left(node, begun))] = node
+                releases[node.managed.drive.disconnect(_time_left(node, begun))] = node
         unconfirmed += [
             node for node, release in _as_they_end(releases) if not _confirmed(node, release)
         ]
@@ -167,12 +168,12 @@ class DriverProcess:
 
     def _may_be_there(self, node: DriveNode) -> bool:
         """Tell whether there may be a motor: one that never answered was never started by us."""
-        return node.drive.heard or self._bus_node.line.bus.port_error is None
+        return node.managed.drive.heard or self._context.bus.port_error is None
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
     """Return how much of the time that the node's exit may take is left, s."""
-    return max(0.0, begun + node.settings.shutdown_timeout - time.monotonic())
+    return max(0.0, begun + node.managed.settings.shutdown_timeout - time.monotonic())
 
 
 def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveNode, Future[str]]]:
@@ -182,8 +183,8 @@ def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveN
     All of them together have the time that an exit may take.
     """
     waiting = set(futures)
-    patience = max((node.settings.shutdown_timeout for node in futures.values()), default=0.0)
-    deadline = time.monotonic() + patience + _LAST_ANSWER
+    longest = max((one.managed.settings.shutdown_timeout for one in futures.values()), default=0.0)
+    deadline = time.monotonic() + longest + _LAST_ANSWER
     while waiting:
         left = max(0.0, deadline - time.monotonic())
         ended, waiting = wait(waiting, left, FIRST_COMPLETED)
@@ -206,7 +207,7 @@ def _confirmed(node: DriveNode, future: Future[str]) -> bool:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except Exception as error:
-        if not node.drive.heard:
+        if not node.managed.drive.heard:
             return True
         # whatever it is, the other drives have to be waited for, too
         why = str(error) if isinstance(error, DriveError) else f'error in the driver: {error!r}'
@@ -255,7 +256,7 @@ def main(args: list[str] | None = None) -> int:
     signals = HeldSignals()
     # to the last, so that none cuts the end of the process short
     signals.hold()
-    output = Output()
+    stdio = NonblockingStdio()
     try:
         return _run(signals, *take_out_node_name(sys.argv if args is None else args))
     except Exception:
@@ -263,7 +264,7 @@ def main(args: list[str] | None = None) -> int:
         traceback.print_exc()
         return 1
     finally:
-        output.close()
+        stdio.close()
 
 
 def _limit_arenas() -> None:

@@ -12,14 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tells ROS what a drive tells: topics, diagnostics and log lines."""
+"""What a drive reports goes to ROS: topics, diagnostics and log lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
 import math
-from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
@@ -31,11 +30,11 @@ from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNodeMixin
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
@@ -43,13 +42,11 @@ from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.joint import Joint
-from nfo_sinus_driver.node.line import KEPT
-from nfo_sinus_driver.node.line import LATCHED
-from nfo_sinus_driver.node.line import RELIABLE
-from nfo_sinus_driver.node.line import Line
-
-if TYPE_CHECKING:
-    from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.publish_queue import PublishQueue
+from nfo_sinus_driver.node.qos import KEPT
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import RELIABLE
 
 #: How often diagnostics go out and, while the drive is not connected, the status, s.
 _PERIOD = 1.0
@@ -59,17 +56,28 @@ class Reporter:
     """
     The listener of one drive.
 
-    Its ``on_…`` methods are called by the bus and only put something into the outbox; everything
-    else runs on the outbox's thread.
+    Its ``on_…`` methods are called by the bus and only put something into the queue; everything
+    else runs on the queue's thread.
+
+    :param managed: gives the drive; not before the queue works.
+    :param follow: told which parameters have new values, by the bus.
     """
 
-    def __init__(self, node: DriveNode, line: Line, joint: Joint) -> None:
+    def __init__(
+        self,
+        node: LifecycleNodeMixin,
+        queue: PublishQueue,
+        joint: Joint,
+        managed: Callable[[], ManagedDrive],
+        follow: Callable[[Collection[str]], None],
+    ) -> None:
         self._node = node
-        self._line = line
+        self._queue = queue
         self._joint = joint
+        self._managed = managed
+        self._follow = follow
         self._log = node.get_logger()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._drive: Callable[[], Drive] | None = None
         self._last_inv_st: tuple[int, Kind] | None = None
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
@@ -83,39 +91,35 @@ class Reporter:
         self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
         self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
-
-    def start(self, drive: Callable[[], Drive]) -> None:
-        """Begin with what is told once a second."""
-        self._drive = drive
-        self._line.outbox.put_every(_PERIOD, self._tell_regularly)
+        queue.put_every(_PERIOD, self._report_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Publish a poll."""
-        self._line.outbox.put(lambda: self._tell_snapshot(snapshot))
+        self._queue.put(lambda: self._publish_snapshot(snapshot))
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Publish measured values."""
-        self._line.outbox.put(lambda: self._tell_telemetry(telemetry))
+        self._queue.put(lambda: self._publish_telemetry(telemetry))
 
     def on_parameters(self, keys: Collection[str]) -> None:
         """Have the ROS parameters follow the drive."""
-        self._node.drive_parameters.note(keys)
+        self._follow(keys)
 
     def on_log_entry(self, entry: LogEntry) -> None:
         """Publish a new entry of the error log."""
-        self._line.outbox.put(lambda: self._tell_log_entry(entry))
+        self._queue.put(lambda: self._publish_log_entry(entry))
 
     def on_event(self, severity: Severity, text: str) -> None:
         """Log a line."""
         # one call site for each level: rclpy forbids another level at the same place
         if severity is Severity.ERROR:
-            self._line.outbox.put(lambda: self._log.error(text))
+            self._queue.put(lambda: self._log.error(text))
         elif severity is Severity.WARNING:
-            self._line.outbox.put(lambda: self._log.warning(text))
+            self._queue.put(lambda: self._log.warning(text))
         else:
-            self._line.outbox.put(lambda: self._log.info(text))
+            self._queue.put(lambda: self._log.info(text))
 
     # --- on any thread ------------------------------------------------------------------------
 
@@ -130,13 +134,13 @@ class Reporter:
         stamp: Time = (now - Duration(nanoseconds=age)).to_msg()
         return stamp
 
-    # --- on the outbox's thread ---------------------------------------------------------------
+    # --- on the queue's thread ----------------------------------------------------------------
 
     def _frame_id(self) -> str:
         frame_id: str = self._node.get_parameter('frame_id').value
         return frame_id
 
-    def _tell_snapshot(self, snapshot: Snapshot) -> None:
+    def _publish_snapshot(self, snapshot: Snapshot) -> None:
         stamp = self.stamp(snapshot.at)
         frame_id = self._frame_id()
         self._status.publish(messages.drive_status(snapshot, stamp, frame_id))
@@ -151,53 +155,36 @@ class Reporter:
             self._last_inv_st = inv_st
             self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
 
-    def _tell_telemetry(self, telemetry: Telemetry) -> None:
+    def _publish_telemetry(self, telemetry: Telemetry) -> None:
         stamp = self.stamp(telemetry.at)
         self._telemetry.publish(messages.telemetry(telemetry, stamp, self._frame_id()))
 
-    def _tell_log_entry(self, entry: LogEntry) -> None:
+    def _publish_log_entry(self, entry: LogEntry) -> None:
         self._log_entries.publish(messages.error_log_entry(entry, self.stamp(entry.at)))
 
-    def _tell_regularly(self) -> None:
-        assert self._drive is not None
-        snapshot = self._drive().snapshot
+    def _report_regularly(self) -> None:
+        snapshot = self._managed().drive.snapshot
         if not snapshot.connected:
             now = self._steady.now().nanoseconds / 1e9
             stamp = self.stamp(now)
             self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id()))
         self._diagnose(snapshot, on_change=False)
-        self._tell_statistics()
+        self._publish_statistics()
 
-    def _tell_statistics(self) -> None:
-        assert self._drive is not None
-        silent = [self._node.get_name()] if self._node.is_silent else []
+    def _publish_statistics(self) -> None:
+        managed = self._managed()
+        silent = [managed.name] if managed.is_silent else []
         stamp = self._node.get_clock().now().to_msg()
-        statistics = self._drive().statistics
+        statistics = managed.drive.statistics
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
 
     def _diagnose(self, snapshot: Snapshot, *, on_change: bool) -> None:
-        assert self._drive is not None
-        drive = self._drive()
-        diagnosis = diagnostics.drive_verdict(
-            snapshot,
-            lifecycle_state=self._node.state,
-            stop_overdue=drive.stop_overdue,
-            drift=drive.parameters.drift,
-        )
+        managed = self._managed()
+        diagnosis = diagnostics.drive_verdict(managed, snapshot)
         if on_change and diagnosis == self._last_diagnosis:
             return
         self._last_diagnosis = diagnosis
-        status = diagnostics.drive_status(
-            self._node.get_fully_qualified_name().lstrip('/'),
-            diagnosis,
-            snapshot,
-            lifecycle_state=self._node.state,
-            address=drive.settings.address,
-            identity=drive.identity,
-            last_error=drive.last_error,
-            parameters=drive.parameters.progress,
-            drift=drive.parameters.drift,
-            statistics=drive.statistics,
-        )
+        name = self._node.get_fully_qualified_name().lstrip('/')
+        status = diagnostics.drive_status(name, managed, snapshot, diagnosis)
         stamp = self._node.get_clock().now().to_msg()
         self._diagnostics.publish(diagnostics.array(status, stamp))

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
 
 from nfo_sinus_msgs.msg import Setpoint
 from rclpy.node import Node
@@ -32,12 +31,9 @@ from std_msgs.msg import Float32
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.setpoint_all import SetpointAll
 from nfo_sinus_driver.drive.setpoint_all import Told
+from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.joint import Joint
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import Line
-
-if TYPE_CHECKING:
-    from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
 
 _UNITS = {
     'Freque': Setpoint.HZ,
@@ -51,113 +47,116 @@ _NAMES = {
     Setpoint.PERCENT_TORQUE: '% of nominal torque',
     Setpoint.PROCESS: 'the process unit',
 }
-#: How often a person is told the same, s.
-_TELL_PERIOD = 10.0
+#: How often the same is logged, s.
+_LOG_PERIOD = 10.0
 
 
 class Setpoints:
-    """Hands set-points to the drive of a node; those that make no sense are told and ignored."""
+    """Hands set-points to the drive of a node; those that make no sense are logged."""
 
-    def __init__(self, node: DriveNode, line: Line, joint: Joint) -> None:
-        self._node = node
+    def __init__(
+        self, node: Node, context: BusContext, managed: ManagedDrive, joint: Joint
+    ) -> None:
+        self._clock = node.get_clock()
+        self._log = node.get_logger()
+        self._managed = managed
         self._joint = joint
-        self._told_idle = False
-        listen = line.listener.listen
-        listen(node, Float32, '~/setpoint', self._on_setpoint, NEWEST)
-        listen(node, Setpoint, '~/setpoint_stamped', self._on_stamped, NEWEST)
-        listen(node, JointState, '~/joint_command', self._on_joint_command, NEWEST)
+        self._logged_idle = False
+        subscribe = context.setpoint_subscriber.subscribe
+        subscribe(node, Float32, '~/setpoint', self._on_setpoint)
+        subscribe(node, Setpoint, '~/setpoint_stamped', self._on_stamped)
+        subscribe(node, JointState, '~/joint_command', self._on_joint_command)
 
     def be_quiet(self, quiet: bool) -> None:
         """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
-        self._told_idle = quiet
+        self._logged_idle = quiet
 
     def _on_setpoint(self, message: Float32) -> None:
         self._take(message.data)
 
     def _on_stamped(self, message: Setpoint) -> None:
-        node = self._node
-        mode = node.drive.snapshot.control_mode
-        if node.state == 'active' and message.unit != _UNITS.get(mode):
+        mode = self._managed.drive.snapshot.control_mode
+        if self._managed.active and message.unit != _UNITS.get(mode):
             unit = _NAMES.get(message.unit, f'unit {message.unit}')
             self._ignore(f'set-point in {unit} ignored: the control mode is {mode or "not known"}')
             return
-        stamp = Time.from_msg(message.header.stamp, clock_type=node.get_clock().clock_type)
-        timeout = node.settings.setpoint_timeout
+        stamp = Time.from_msg(message.header.stamp, clock_type=self._clock.clock_type)
+        timeout = self._managed.settings.setpoint_timeout
         if stamp.nanoseconds and timeout:
-            age = (node.get_clock().now() - stamp).nanoseconds / 1e9
+            age = (self._clock.now() - stamp).nanoseconds / 1e9
             if age > timeout:
                 self._ignore(f'set-point ignored: it was made {age:.1f} s ago')
                 return
         self._take(message.value)
 
     def _on_joint_command(self, message: JointState) -> None:
-        node = self._node
-        if node.state != 'active' or self._joint.name not in message.name:
+        if not self._managed.active or self._joint.name not in message.name:
             return
         index = message.name.index(self._joint.name)
         if index >= len(message.velocity):
             self._ignore('joint command ignored: it has no velocity')
             return
         try:
-            value = self._joint.setpoint(message.velocity[index], node.drive)
+            value = self._joint.setpoint(message.velocity[index], self._managed.drive)
         except ValueError as error:
             self._ignore(f'joint command ignored: {error}')
             return
         self._take(value)
 
     def _take(self, value: float) -> None:
-        node = self._node
-        if node.state != 'active':
+        if not self._managed.active:
             return
         if not math.isfinite(value):
             self._ignore(f'set-point {value} ignored: it is not a finite number')
             return
         try:
-            node.drive.set_setpoint(value)
+            self._managed.drive.set_setpoint(value)
         except DriveError as error:
             self._ignore(str(error))
             return
-        if node.drive.armed:
-            self._told_idle = False
-        elif not self._told_idle:
-            self._told_idle = True
-            node.get_logger().info(
+        if self._managed.drive.armed:
+            self._logged_idle = False
+        elif not self._logged_idle:
+            self._logged_idle = True
+            self._log.info(
                 'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
             )
 
     def _ignore(self, text: str) -> None:
-        self._node.get_logger().warning(text, throttle_duration_sec=_TELL_PERIOD)
+        self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
 
 
 class SetpointsForAll:
-    """Hands set-points for all drives of a line to them; why nobody follows them is told."""
+    """Hands set-points for all drives of a line to them; why nobody follows them is logged."""
 
-    def __init__(self, node: Node, line: Line) -> None:
-        self._line = line
+    def __init__(self, node: Node, context: BusContext) -> None:
+        self._context = context
         self._log = node.get_logger()
         self._told = Told()
         self._told_at = -math.inf
         self._all = SetpointAll(
-            line.bus,
-            lambda: {drive.get_name(): drive.drive.setpoint for drive in line.drives},
+            context.bus,
+            lambda: {managed.name: managed.drive.setpoint for managed in context.drives},
             self._on_told,
         )
-        line.listener.listen(node, Float32, '~/setpoint_all', self._on_setpoint, NEWEST)
+        context.setpoint_subscriber.subscribe(
+            node, Float32, '~/setpoint_all', self._on_setpoint
+        )
 
     def _on_setpoint(self, message: Float32) -> None:
         if math.isfinite(message.data):
             self._all.request(message.data)
         else:
             text = f'setpoint_all {message.data} ignored: it is not a finite number'
-            self._log.warning(text, throttle_duration_sec=_TELL_PERIOD)
+            self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
 
     def _on_told(self, told: Told) -> None:
         """Say on the bus what has changed; a refusal again and again, but not with each request."""
-        again = told.refused and time.monotonic() - self._told_at > _TELL_PERIOD
+        again = told.refused and time.monotonic() - self._told_at > _LOG_PERIOD
         if told == self._told and not again:
             return
         self._told, self._told_at = told, time.monotonic()
         if told.refused:
-            self._line.say(self._log.warning, f'setpoint_all refused: {told.refused}')
+            self._context.log(self._log.warning, f'setpoint_all refused: {told.refused}')
         elif told.limited:
-            self._line.say(self._log.warning, f'setpoint_all {told.limited}')
+            self._context.log(self._log.warning, f'setpoint_all {told.limited}')

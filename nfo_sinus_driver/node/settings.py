@@ -66,7 +66,7 @@ class Setting:
     fixed: bool = False
     unit: str = ''
 
-    def understood(self, given: object) -> SettingValue:
+    def coerce(self, given: object) -> SettingValue:
         """
         Take what was given for what was meant: 5 for 5.0, and 8E1 for '8E1'.
 
@@ -333,12 +333,12 @@ def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue
     for setting in settings:
         # rclpy has no other way to see an override first, and its own complaints name no remedy
         given = node._parameter_overrides.get(setting.name)
-        value = setting.default if given is None else setting.understood(given.value)
+        value = setting.default if given is None else setting.coerce(given.value)
         node.declare_parameter(setting.name, value, setting.descriptor(), ignore_override=True)
     return {setting.name: node.get_parameter(setting.name).value for setting in settings}
 
 
-def understood(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter:
+def coerce(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter:
     """
     Take what somebody sets for what is meant, if it is one of the settings.
 
@@ -346,5 +346,5 @@ def understood(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter
     """
     for setting in settings:
         if setting.name == parameter.name and parameter.type_ is not Parameter.Type.NOT_SET:
-            return Parameter(parameter.name, value=setting.understood(parameter.value))
+            return Parameter(parameter.name, value=setting.coerce(parameter.value))
     return parameter

@@ -18,29 +18,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import contextlib
 import queue
-from typing import TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.action import Tune
 from rclpy.action import ActionServer
 from rclpy.action import CancelResponse
+from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
-
-if TYPE_CHECKING:
-    from rclpy.action.server import ServerGoalHandle
-
-    from nfo_sinus_driver.node.drive_node import DriveNode
 
 _SERVICES = {
     '~/tune_full': Procedure.FULL,
@@ -66,8 +62,11 @@ class TuningServices:
     :param stamp: gives the node's time of a moment of ``time.monotonic``.
     """
 
-    def __init__(self, node: DriveNode, stamp: Callable[[float], Time]) -> None:
+    def __init__(
+        self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]
+    ) -> None:
         self._node = node
+        self._managed = managed
         self._stamp = stamp
         # reentrant, so that a second one is refused at once and a cancel need not wait
         group = ReentrantCallbackGroup()
@@ -84,31 +83,25 @@ class TuningServices:
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
-    def _service_of(self, procedure: Procedure):  # type: ignore[no-untyped-def]
+    def _service_of(
+        self, procedure: Procedure
+    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            tuned = self._result(lambda: self._begin(procedure, lambda *_: None).result())
+            tuned = self._result(lambda: self._managed.require_active().tune(procedure).result())
             response.success, response.message = tuned.success, str(tuned)
             return response
 
         return answer
 
-    def _begin(
-        self, procedure: Procedure, progress: Callable[[Snapshot, float], None]
-    ) -> Future[Tuned]:
-        if self._node.state != 'active':
-            raise DriveError(self._node.why_not_active())
-        return self._node.drive.tune(procedure, progress)
-
-    def _result(self, tune) -> Tuned:  # type: ignore[no-untyped-def]
+    def _result(self, tune: Callable[[], Tuned]) -> Tuned:
         try:
-            tuned: Tuned = tune()
+            return tune()
         except DriveError as error:
             return Tuned(False, str(error), ())
         except Exception as error:
             # an exception that leaves a callback would end the executor
             self._node.get_logger().error(f'error in a tuning: {error!r}')
             return Tuned(False, f'error in the driver: {error}', ())
-        return tuned
 
     def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
         tuned = self._result(lambda: self._followed(goal))
@@ -128,15 +121,15 @@ class TuningServices:
         procedure = _PROCEDURES.get(goal.request.procedure)
         if procedure is None:
             raise DriveError(f'there is no procedure {goal.request.procedure}: 0 to 3')
-        drive = self._node.drive
-        # the bus tells how far it is, and nobody may keep it waiting
-        news: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
-        future = self._begin(procedure, lambda *told: news.put(told))
+        drive = self._managed.require_active()
+        # the bus reports how far it is, and nobody may keep it waiting
+        reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
+        future = drive.tune(procedure, lambda *report: reports.put(report))
         cancelling = False
         while True:
             ended = future.done()
-            while not news.empty():
-                self._tell(goal, *news.get())
+            while not reports.empty():
+                self._report(goal, *reports.get())
             if ended:
                 return future.result()
             if goal.is_cancel_requested and not cancelling:
@@ -145,7 +138,7 @@ class TuningServices:
             with contextlib.suppress(FutureTimeoutError):
                 future.exception(_LOOK_PERIOD)
 
-    def _tell(self, goal: ServerGoalHandle, snapshot: Snapshot, elapsed: float) -> None:
+    def _report(self, goal: ServerGoalHandle, snapshot: Snapshot, elapsed: float) -> None:
         stamp = self._stamp(snapshot.at)
         status = inv_st(snapshot, stamp, self._node.get_parameter('frame_id').value)
         goal.publish_feedback(Tune.Feedback(status=status, elapsed=elapsed))

@@ -26,6 +26,7 @@ _RTU_LINK = 'test/unit/link/test_rtu_link.py'
 _ECHO = 'test/unit/link/test_echo.py'
 
 _CONTROLLER = 'nfo_sinus_driver/drive/controller.py'
+_STARTING = 'nfo_sinus_driver/drive/start_sequence.py'
 _TABLE = 'nfo_sinus_driver/drive/control_state.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
 _ADVICE = 'nfo_sinus_driver/drive/advice.py'
@@ -230,16 +231,16 @@ MUTANTS = (
         3,
         'deactivate does not stop the motor',
         _NODE,
-        '        self._stop_for(what, self._drive.deactivate)\n',
-        '',
+        'confirmed = self._stop_for(what, drive.deactivate)',
+        'confirmed = True',
         (_WAYS_OUT, '-k', 'deactivate'),
     ),
     Mutant(
         3,
         'a lifecycle shutdown does not stop the motor',
         _NODE,
-        "            self._stop_for('shut down', self._drive.stop)\n"
-        "            self._stop_for('shut down', self._disconnect)\n",
+        "            self._stop_for('shut down', self.managed.drive.stop)\n"
+        "            self._stop_for('shut down', self.managed.disconnect)\n",
         '            pass\n',
         (_WAYS_OUT, '-k', 'lifecycle_shutdown'),
     ),
@@ -271,7 +272,7 @@ MUTANTS = (
         4,
         'parameters are written although they do not change',
         _WRITER,
-        '        if before == words:',
+        '        if before == data:',
         '        if False:',
         (_INTERFACE, '-k', 'has_already'),
     ),
@@ -287,7 +288,7 @@ MUTANTS = (
         7,
         'what was written is believed without reading it back',
         _WRITER,
-        '        if kept == words:',
+        '        if kept == data:',
         '        if True:',
         ('test/unit/drive/test_parameters_change.py',),
     ),
@@ -495,7 +496,7 @@ MUTANTS = (
     Mutant(
         2,
         'in any order: a start that the RUN input ended waits for it',
-        _CONTROLLER,
+        _STARTING,
         ' or (delayed and seen.standby):',
         ':',
         ('test/unit/drive/test_any_order_found.py',),
@@ -632,7 +633,7 @@ MUTANTS = (
     Mutant(
         2,
         'control is taken with the set-point of an earlier session',
-        _CONTROLLER,
+        _STARTING,
         '        if not self._inverter.settings_need_control:\n',
         '        if False:\n',
         _CONTROL_TAKEN,
@@ -682,7 +683,7 @@ MUTANTS = (
         'an exit does not count a drive that is just being connected to',
         _MAIN,
         '            if self._may_be_there(node) and not',
-        '            if node.drive.identity is not None and not',
+        '            if node.managed.drive.identity is not None and not',
         ('test/ros/test_no_false_success.py', '-k', 'before_the_first_answer'),
     ),
 )

@@ -36,7 +36,7 @@ from rosbags.highlevel import AnyReader
 from ways import needs
 import yaml
 
-_DEMO = (sys.executable, '-m', 'nfo_sinus_driver.node.demo')
+_DEMO = (sys.executable, '-m', 'nfo_sinus_driver.demo')
 _DEMO_TIME = 110.0
 #: A busy machine may leave out every other message of what comes at a steady rate.
 _SHARE = 0.5
@@ -115,7 +115,7 @@ def test_the_demo_leaves_the_drive_of_another_driver_alone(bench: Bench, tmp_pat
     client = bench.client().connected()
     program = f"""
 import contextlib, sys
-from nfo_sinus_driver.node import demo
+from nfo_sinus_driver.demo import __main__ as demo
 demo.own_domain = lambda: contextlib.nullcontext({bench.domain})
 sys.exit(demo.main())
 """

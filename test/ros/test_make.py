@@ -40,7 +40,7 @@ def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
         (tmp_path / f'{name}.py').write_text(f'raise ImportError("No module named {name}")')
     path = f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}'
     done = subprocess.run(
-        [sys.executable, '-m', 'nfo_sinus_driver.node.demo', '--output', str(tmp_path / 'here')],
+        [sys.executable, '-m', 'nfo_sinus_driver.demo', '--output', str(tmp_path / 'here')],
         env={**os.environ, 'PYTHONPATH': path},
         capture_output=True,
         text=True,
@@ -58,7 +58,7 @@ def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
 
 @needs('own')
 def test_ctrl_c_ends_the_demo(bench: Bench) -> None:
-    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.node.demo']
+    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.demo']
     folder = bench.folder / 'output'
     process = Process(
         [*command, '--output', str(folder)], dict(os.environ), bench.folder / 'demo.log'
@@ -75,7 +75,7 @@ def test_ctrl_c_ends_the_demo(bench: Bench) -> None:
 @needs('own')
 def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
-    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.node.make_run']
+    command = [*_BACKGROUND, sys.executable, '-m', 'nfo_sinus_driver.demo.run']
     process = Process(command, environment, bench.folder / 'make_run.log')
     bench.callback(process.end)
     client = bench.client().connected()

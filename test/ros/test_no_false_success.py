@@ -17,8 +17,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 import signal
 import time
+from types import SimpleNamespace
 
 from bench import PATIENCE
 from bench import Bench
@@ -27,6 +29,9 @@ from bench import Process
 from bench import wait_until
 from lifecycle_msgs.msg import Transition
 import pytest
+import rclpy
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 from support.wire import Request
@@ -34,7 +39,11 @@ from support.wire import understand
 from ways import needs
 
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.drive_node import DriveNode
 
 _QUICK = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
 _REFUSING = ('--stop-in-tuning', 'refused')
@@ -164,3 +173,33 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
     # each of them keeps the line for a time-out: one on its way, one while the call came in
     assert len(waits) <= 2, asked_of[: stop + 1]
     assert drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE, address=1)
+
+
+@pytest.mark.parametrize(
+    ('unconfirmed', 'connected', 'result'),
+    [
+        (True, True, TransitionCallbackReturn.FAILURE),
+        # it stops as soon as it answers again
+        (True, False, TransitionCallbackReturn.SUCCESS),
+        # the drive has said so a moment after the time was up
+        (False, True, TransitionCallbackReturn.SUCCESS),
+    ],
+)
+def test_a_stop_that_was_not_confirmed_in_time_is_no_deactivation(
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    unconfirmed: bool,
+    connected: bool,
+    result: TransitionCallbackReturn,
+) -> None:
+    not_in_time: Future[str] = Future()
+    not_in_time.set_exception(DriveError('the stop is NOT confirmed'))
+    monkeypatch.setattr(Drive, 'deactivate', lambda self: not_in_time)
+    monkeypatch.setattr(Drive, 'stop_unconfirmed', unconfirmed)
+    monkeypatch.setattr(Drive, 'snapshot', SimpleNamespace(connected=connected))
+    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = DriveNode('nfo_sinus', BusNode().bus_context)
+        assert node.on_deactivate(None) == result
+    finally:
+        rclpy.shutdown()

@@ -47,15 +47,18 @@ MAY_IMPORT = {
     'jobs': {'link'},
     'turns': {'jobs'},
     'drive': {'bus', 'catalog', 'link'},
-    # the folder of a family in there, of its words; the rest, of which family is the usual one
+    # its folder of a family, the words of that one, and no profile: a mistake in that must not hide
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
+    'demo': {'node'},
     'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'statistics'},
 }
-#: What else they may import beside the standard library; node may import anything.
+#: Rooms that may import ROS, and anything else.
+WITH_ROS = {'demo', 'node'}
+#: What the others may import beside the standard library.
 MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'}}
 #: What opens by number, and nothing but /dev/null.
-OPENS_NO_PORT = frozenset({'node/output.py'})
+OPENS_NO_PORT = frozenset({'node/nonblocking_stdio.py'})
 #: Rooms that are about families and name them.
 NAMES_FAMILIES = {'families', 'simulator'}
 #: Files elsewhere that name some family or parameter, and what: to be made general, never more.
@@ -171,13 +174,14 @@ def violations(path: str, source: str) -> list[str]:
         top, _, rest = name.partition('.')
         if top == PACKAGE:
             other = rest.split('.')[0]
-            if other != room and other not in MAY_IMPORT[room]:
+            unseen = room == 'simulator' and 'profile' in rest.split('.')
+            if unseen or (other != room and other not in MAY_IMPORT[room]):
                 found.append(f'{room or "the package"} imports {name}')
             continue
         if top in PORT_MODULES and room not in OPENS_PORTS:
             found.append(f'{room} opens ports with {top}')
         known = top in sys.stdlib_module_names or top in MAY_USE.get(room, ())
-        if room != 'node' and not known:
+        if room not in WITH_ROS and not known:
             found.append(f'{room} imports {name}')
     if room not in OPENS_PORTS and path not in OPENS_NO_PORT:
         found += [f'{room} opens ports with {call}' for call in opens_ports(tree)]
@@ -194,6 +198,44 @@ def violations(path: str, source: str) -> list[str]:
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
         found.append(f'{lines} lines are too many')
+    return found
+
+
+def circles(sources: dict[str, str]) -> set[frozenset[str]]:
+    """
+    Groups of files that import each other, directly or through others, for types alone or not.
+
+    :param sources: of all files of the package, by their paths below it.
+    """
+    files = {path.removesuffix('.py').removesuffix('/__init__'): path for path in sources}
+    imports = {
+        path: {file_of(name, files) for name in imports_of(ast.parse(source), path)} - {path}
+        for path, source in sources.items()
+    }
+    reached = {path: reachable(path, imports) for path in imports}
+    return {
+        frozenset(other for other in others if path in reached.get(other, ()))
+        for path, others in reached.items()
+        if path in others
+    }
+
+
+def file_of(name: str, files: dict[str, str]) -> str:
+    """The file that an import is answered by, if it is one of ours."""
+    top, _, rest = name.partition('.')
+    below = rest.replace('.', '/') if top == PACKAGE else ''
+    # what is imported from a file is not one itself
+    return files.get(below) or files.get(below.rpartition('/')[0], '')
+
+
+def reachable(start: str, imports: dict[str, set[str]]) -> set[str]:
+    """All that is imported from a file on."""
+    found: set[str] = set()
+    waiting = [start]
+    while waiting:
+        new = imports.get(waiting.pop(), set()) - found
+        found |= new
+        waiting += new
     return found
 
 
@@ -217,8 +259,14 @@ def test_file_keeps_the_rules_of_the_house(path: str) -> None:
 
 def test_every_room_is_looked_at() -> None:
     rooms = {room_of(path) for path in package_files()}
-    known = {'bus', 'catalog', 'cli', 'drive', 'families', 'link', 'node', 'simulator'}
+    known = {'bus', 'catalog', 'cli', 'demo', 'drive', 'families', 'link', 'node', 'simulator'}
     assert known <= rooms <= set(MAY_IMPORT)
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    package = ROOT / PACKAGE
+    sources = {path: (package / path).read_text(encoding='utf-8') for path in package_files()}
+    assert circles(sources) == set()
 
 
 @pytest.mark.parametrize('path', sorted(LONGER))
@@ -243,7 +291,7 @@ def test_rooms_without_ros_load_without_ros() -> None:
     modules = [
         '.'.join([PACKAGE, *path.removesuffix('.py').removesuffix('/__init__').split('/')])
         for path in package_files()
-        if room_of(path) not in ('node', '')
+        if room_of(path) not in {*WITH_ROS, ''}
     ]
     program = f"""
 import importlib, sys
@@ -282,6 +330,11 @@ for module in {modules!r}:
         ('simulator/main.py', 'import rclpy.node', 'simulator imports rclpy.node'),
         ('simulator/main.py', 'from nfo_sinus_driver.link import rtu', 'simulator imports'),
         ('simulator/main.py', 'from nfo_sinus_driver import drive', 'simulator imports'),
+        (
+            'simulator/drive.py',
+            'from nfo_sinus_driver.families.sinus_g2.profile import PROFILE',
+            'simulator imports',
+        ),
         ('simulator/main.py', 'from ..link import rtu', 'simulator imports'),
         ('simulator/main.py', 'def f():\n    import nfo_sinus_driver.bus', 'simulator imports'),
         ('simulator/main.py', 'import_module("nfo_sinus_driver.link")', 'simulator imports'),
@@ -296,17 +349,19 @@ for module in {modules!r}:
         ('drive/drive.py', 'from nfo_sinus_driver.simulator import drive', 'drive imports'),
         ('catalog/family.py', 'from nfo_sinus_driver.link import Address', 'catalog imports'),
         ('node/main.py', 'from nfo_sinus_driver.simulator import main', 'node imports'),
+        ('node/main.py', 'from nfo_sinus_driver.demo import domain', 'node imports'),
+        ('demo/bench.py', 'from nfo_sinus_driver.simulator import main', 'demo imports'),
         ('cli/main.py', 'import rclpy', 'cli imports rclpy'),
         ('cli/scan.py', 'from nfo_sinus_driver.simulator import drive', 'cli imports'),
         ('drive/drive.py', 'from nfo_sinus_driver.cli import main', 'drive imports'),
         ('__init__.py', 'from nfo_sinus_driver import bus', 'the package imports'),
         ('drive/drive.py', 'import numpy', 'drive imports numpy'),
         ('drive/drive.py', 'import serial', 'drive opens ports with serial'),
-        ('node/line.py', 'from serial.tools import list_ports', 'node opens ports with serial'),
-        ('node/line.py', 'import termios', 'node opens ports with termios'),
+        ('node/qos.py', 'from serial.tools import list_ports', 'node opens ports with serial'),
+        ('node/qos.py', 'import termios', 'node opens ports with termios'),
         ('bus.py', 'import pty', 'bus opens ports with pty'),
         ('bus.py', 'import os\nos.open("/dev/ttyUSB0", os.O_RDWR)', 'bus opens ports with os.open'),
-        ('node/line.py', 'from os import open as o', 'node opens ports with os.open'),
+        ('node/qos.py', 'from os import open as o', 'node opens ports with os.open'),
         ('drive/drive.py', 'from nfo_sinus_driver.families import sinus_g2', 'drive imports'),
         ('drive/drive.py', 'key = "motor.p_nom"', 'drive names motor.p_nom'),
         ('drive/drive.py', 'say(f"{it} in error.rst_dly: {text}")', 'drive names error.rst_dly'),
@@ -353,6 +408,45 @@ def test_checker_sees(path: str, source: str, complaint: str) -> None:
 )
 def test_checker_lets_pass(path: str, source: str) -> None:
     assert violations(path, source) == []
+
+
+@pytest.mark.parametrize(
+    ('sources', 'circle'),
+    [
+        (
+            {
+                'drive/a.py': 'from nfo_sinus_driver.drive import b',
+                'drive/b.py': 'from nfo_sinus_driver.drive.c import C',
+                'drive/c.py': 'if TYPE_CHECKING:\n    from nfo_sinus_driver.drive.a import A',
+                'drive/d.py': 'from nfo_sinus_driver.drive import a',
+            },
+            {'drive/a.py', 'drive/b.py', 'drive/c.py'},
+        ),
+        (
+            {
+                'drive/__init__.py': 'from nfo_sinus_driver.drive.a import A',
+                'drive/a.py': 'def f():\n    from nfo_sinus_driver.drive import A',
+            },
+            {'drive/__init__.py', 'drive/a.py'},
+        ),
+        (
+            {'drive/a.py': 'from . import b', 'drive/b.py': 'from .a import A'},
+            {'drive/a.py', 'drive/b.py'},
+        ),
+    ],
+)
+def test_checker_sees_a_circle(sources: dict[str, str], circle: set[str]) -> None:
+    assert circles(sources) == {frozenset(circle)}
+
+
+def test_checker_sees_no_circle_where_one_does_not_come_back() -> None:
+    sources = {
+        'drive/__init__.py': 'from nfo_sinus_driver.drive.a import A',
+        'drive/a.py': 'import os\nfrom nfo_sinus_driver.drive.b import B',
+        'drive/b.py': 'import nfo_sinus_driver.bus',
+        'bus.py': 'from drive import a',
+    }
+    assert circles(sources) == set()
 
 
 def test_checker_knows_the_licence() -> None:

@@ -176,7 +176,7 @@ def test_of_two_that_tell_nothing_a_person_has_to_say(
 
 
 def driver(bus: Bus, notes: Notes, **settings: Any) -> Drive:
-    settings = {'model': 'acme', 'control_method': 'control_word', **settings}
+    settings = {'model': 'acme', 'control_method': 'drive_control', **settings}
     return Drive(bus, DriveSettings(**settings), notes)
 
 

@@ -22,7 +22,7 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.node.outbox import Outbox
+from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.schedule import Schedule
 
 #: Far longer than anything here takes, s.
@@ -87,25 +87,25 @@ def test_what_is_late_comes_once_and_in_its_old_rhythm() -> None:
 
 
 @pytest.fixture
-def outbox() -> Iterator[Outbox]:
-    outbox = Outbox()
-    outbox.start()
-    yield outbox
-    outbox.close()
+def queue() -> Iterator[PublishQueue]:
+    queue = PublishQueue()
+    queue.start()
+    yield queue
+    queue.close()
 
 
-def test_the_outbox_does_both_what_is_put_in_and_what_is_due(outbox: Outbox) -> None:
+def test_the_queue_does_both_what_is_put_in_and_what_is_due(queue: PublishQueue) -> None:
     came = threading.Semaphore(0)
-    outbox.put_every(0.02, came.release)
+    queue.put_every(0.02, came.release)
     for _ in range(5):
         assert came.acquire(timeout=PATIENCE)
     put = threading.Event()
-    outbox.put(put.set)
+    queue.put(put.set)
     assert put.wait(PATIENCE)
 
 
 def test_what_raises_keeps_nothing_back(
-    outbox: Outbox, caplog: pytest.LogCaptureFixture
+    queue: PublishQueue, caplog: pytest.LogCaptureFixture
 ) -> None:
     came = threading.Semaphore(0)
 
@@ -113,29 +113,29 @@ def test_what_raises_keeps_nothing_back(
         came.release()
         raise ValueError('oops')
 
-    outbox.put_every(0.02, raises)
+    queue.put_every(0.02, raises)
     for _ in range(3):
         assert came.acquire(timeout=PATIENCE)
-    assert outbox.alive
+    assert queue.alive
     assert 'oops' in caplog.text
 
 
-def test_it_sleeps_while_there_is_nothing_to_do(outbox: Outbox) -> None:
+def test_it_sleeps_while_there_is_nothing_to_do(queue: PublishQueue) -> None:
     ready = threading.Event()
-    outbox.put(ready.set)
+    queue.put(ready.set)
     assert ready.wait(PATIENCE)
-    clock = time.pthread_getcpuclockid(outbox._thread.ident)  # type: ignore[arg-type]
+    clock = time.pthread_getcpuclockid(queue._thread.ident)  # type: ignore[arg-type]
     before = time.clock_gettime(clock)
     time.sleep(1.0)
     assert time.clock_gettime(clock) - before < 0.1
 
 
 def test_it_ends_with_what_is_waiting_and_without_what_is_not_due() -> None:
-    outbox = Outbox()
+    queue = PublishQueue()
     done: list[str] = []
-    outbox.put_every(3600.0, lambda: done.append('in an hour'))
-    outbox.put(lambda: done.append('waiting'))
-    outbox.start()
-    outbox.close()
-    assert not outbox.alive
+    queue.put_every(3600.0, lambda: done.append('in an hour'))
+    queue.put(lambda: done.append('waiting'))
+    queue.start()
+    queue.close()
+    assert not queue.alive
     assert done == ['waiting']

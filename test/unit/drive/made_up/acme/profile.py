@@ -73,7 +73,7 @@ class Frequency(SetpointTarget):
 _FREQUENCY = Frequency(_SIZE, 400.0)
 
 
-class ControlWord(ControlMethod):
+class DriveControl(ControlMethod):
     """Control through the control word."""
 
     means = 'control word'
@@ -131,7 +131,7 @@ def _state(word: int) -> State:
 
 def _in_charge(status: Status | None) -> Steps[str]:
     yield from ()
-    return 'control_word'
+    return 'drive_control'
 
 
 PROFILE = Profile(
@@ -146,7 +146,7 @@ PROFILE = Profile(
         by_state={},
     ),
     holders={},
-    methods={'control_word': ControlWord},
+    methods={'drive_control': DriveControl},
     setpoints={'Freque': _FREQUENCY},
     in_charge=_in_charge,
     told_by='bus.kind',

@@ -16,16 +16,31 @@
 
 from __future__ import annotations
 
+import enum
 from typing import Any
 
-from nfo_sinus_driver.families.acme.profile import Told
-from nfo_sinus_driver.families.acme.profile import Word
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.family import Option
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import Argument
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.memory import Memory
+
+
+class Word(enum.IntFlag):
+    """The control word."""
+
+    RESET = 1 << 3
+    RUN = 1 << 12
+    REMOTE = 1 << 15
+
+
+class Told(enum.IntFlag):
+    """The status word."""
+
+    RUNNING = 1 << 5
+    TRIPPED = 1 << 9
+    REMOTE = 1 << 13
 
 
 class AcmeControlUnit(ControlUnit):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Records a ride: what its topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
+"""Records a run: what its topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.definitions import definition_of
-from nfo_sinus_driver.node.definitions import hash_of
-from nfo_sinus_driver.node.definitions import name_of
-from nfo_sinus_driver.node.line import LATCHED
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.demo.definitions import definition_of
+from nfo_sinus_driver.demo.definitions import hash_of
+from nfo_sinus_driver.demo.definitions import name_of
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import NEWEST
+from nfo_sinus_driver.node.qos import RELIABLE
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -90,7 +90,7 @@ class Recorder(Node):
     """
 
     def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
-        # here and not above: a ride is possible where there is only ROS
+        # here and not above: the demo runs where there is only ROS
         from rosbags.rosbag2 import StoragePlugin
         from rosbags.rosbag2 import Writer
 
@@ -118,7 +118,7 @@ class Recorder(Node):
         except OSError as error:
             self._error = self._error or error
         self.destroy_node()
-        # a ride that failed has more to tell than its bag
+        # a run that failed has more to tell than its bag
         if cause[0] is None:
             self._judge()
 
@@ -156,7 +156,7 @@ class Recorder(Node):
             self._writer.write(connection, stamp, data)
             self._count += 1
         except OSError as error:
-            # the ride goes on, for it must come to its stop; the end tells
+            # the run goes on, for it must come to its stop; the end tells
             self._error = error
 
 

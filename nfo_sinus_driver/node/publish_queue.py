@@ -31,7 +31,7 @@ _log = logging.getLogger(__name__)
 _MOST_WAITING = 1000
 
 
-class Outbox:
+class PublishQueue:
     """
     Runs functions on a thread of its own: in the order in which they were put in, or by the clock.
 
@@ -43,7 +43,7 @@ class Outbox:
         self._schedule = Schedule()
         self._something = threading.Event()
         self._closing = False
-        self._thread = threading.Thread(target=self._work, name='outbox', daemon=True)
+        self._thread = threading.Thread(target=self._work, name='publish queue', daemon=True)
 
     def start(self) -> None:
         """Start the thread."""

@@ -26,9 +26,10 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.utilities import get_default_context
+
+from nfo_sinus_driver.node.qos import NEWEST
 
 _log = logging.getLogger(__name__)
 
@@ -42,7 +43,7 @@ class _Apart(ReentrantCallbackGroup):
         return not isinstance(entity, Subscription)
 
 
-class Listener:
+class SetpointSubscriber:
     """
     Listens to a few topics for which an executor would be too slow.
 
@@ -57,22 +58,21 @@ class Listener:
         self._ways: list[tuple[Subscription, Callable[[Any], None]]] = []
         self._guard = GuardCondition(None, None, self._context)
         self._closing = False
-        self._thread = threading.Thread(target=self._work, name='listener', daemon=True)
+        self._thread = threading.Thread(target=self._work, name='setpoint subscriber', daemon=True)
 
-    def listen(
+    def subscribe(
         self,
         node: Node,
         message_type: type,
         topic: str,
         callback: Callable[[Any], None],
-        quality: QoSProfile,
     ) -> None:
-        """Have a function called with each message, once the listener was started."""
+        """Have a function called with each message, once :meth:`start` was called."""
         subscription = node.create_subscription(
             message_type,
             topic,
             callback,
-            quality,
+            NEWEST,
             callback_group=_Apart(),
             # rclpy's own would stay with the executor, and each message would wake it several times
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),

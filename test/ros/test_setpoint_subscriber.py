@@ -27,15 +27,14 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32
 
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.listener import Listener
+from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
 
 
 @pytest.fixture
 def node(domain: int) -> Iterator[Node]:
     """A node in the default context, as the driver has it."""
     rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    node = Node('test_listener')
+    node = Node('test_subscriber')
     yield node
     node.destroy_node()
     rclpy.shutdown()
@@ -70,11 +69,11 @@ def test_a_callback_that_raises_keeps_no_later_message_out(
         heard[topic] += 1
         raise ValueError('oops')
 
-    listener = Listener()
+    subscriber = SetpointSubscriber()
     publishers = {topic: node.create_publisher(Float32, topic, 1) for topic in heard}
     for topic in heard:
-        listener.listen(node, Float32, topic, lambda _, topic=topic: raises(topic), NEWEST)
-    listener.start()
+        subscriber.subscribe(node, Float32, topic, lambda _, topic=topic: raises(topic))
+    subscriber.start()
     for topic, publisher in publishers.items():
 
         def twice(topic: str = topic, publisher: rclpy.publisher.Publisher = publisher) -> bool:
@@ -82,16 +81,16 @@ def test_a_callback_that_raises_keeps_no_later_message_out(
             return heard[topic] >= 2
 
         wait_until(twice, f'{topic} is heard twice')
-    assert listener.alive
+    assert subscriber.alive
     assert 'oops' in caplog.text
-    listener.close()
-    assert not listener.alive
+    subscriber.close()
+    assert not subscriber.alive
 
 
 def test_it_ends_though_nobody_ever_spoke(node: Node) -> None:
-    listener = Listener()
-    listener.listen(node, Float32, '/one', lambda _: None, NEWEST)
-    listener.start()
-    assert listener.alive
-    listener.close()
-    assert not listener.alive
+    subscriber = SetpointSubscriber()
+    subscriber.subscribe(node, Float32, '/one', lambda _: None)
+    subscriber.start()
+    assert subscriber.alive
+    subscriber.close()
+    assert not subscriber.alive

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Draws a recorded ride: what was asked, what the motor did, and what the drive said to it."""
+"""Draws a recorded run: what was asked, what the motor did, and what the drive said to it."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Transform
 from matplotlib.transforms import blended_transform_factory
 
-from nfo_sinus_driver.node.bag import Curve
-from nfo_sinus_driver.node.bag import Ride
-from nfo_sinus_driver.node.bag import Span
-from nfo_sinus_driver.node.bag import read
+from nfo_sinus_driver.demo.bag import Curve
+from nfo_sinus_driver.demo.bag import Recording
+from nfo_sinus_driver.demo.bag import Span
+from nfo_sinus_driver.demo.bag import read
 
 #: The picture, inches and dots per inch: 1600 x 1000.
 _SIZE = (16.0, 10.0)
@@ -80,8 +80,8 @@ _SILENCE = 0.5
 
 
 def draw(bag: Path, picture: Path) -> None:
-    """Draw what a bag tells of a ride into a PNG file."""
-    ride = read(bag)
+    """Draw what a bag tells of a run into a PNG file."""
+    run = read(bag)
     with matplotlib.rc_context(_STYLE):
         # no window, and no state that is shared: the figure is drawn for the file alone
         figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor='white')
@@ -92,30 +92,30 @@ def draw(bag: Path, picture: Path) -> None:
         )
         states, frequency, speed, current = (figure.add_subplot(cell) for cell in grid)
         for axes in (states, frequency, speed, current):
-            axes.set_xlim(-0.2, ride.length + 0.2)
-            axes.xaxis.set_major_locator(MultipleLocator(_step(ride.length)))
+            axes.set_xlim(-0.2, run.length + 0.2)
+            axes.xaxis.set_major_locator(MultipleLocator(_step(run.length)))
             axes.tick_params(axis='x', labelbottom=axes is current, length=0)
-            _mark(axes, ride)
-        _draw_states(states, ride)
-        _name_calls(states, ride)
-        _draw_frequency(frequency, ride)
-        _draw_quantity(speed, ride.speed, 'motor speed (rpm)', _GREEN)
-        _draw_quantity(current, ride.current, 'output current (A)', _PURPLE, marker='o')
+            _mark(axes, run)
+        _draw_states(states, run)
+        _name_calls(states, run)
+        _draw_frequency(frequency, run)
+        _draw_quantity(speed, run.speed, 'motor speed (rpm)', _GREEN)
+        _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
         current.set_ylim(bottom=0.0)
         current.set_xlabel('time since the drive was connected (s)', labelpad=8)
-        _name_faults(frequency, ride)
+        _name_faults(frequency, run)
         figure.align_ylabels([frequency, speed, current])
-        _draw_title(figure, ride, frequency.get_legend_handles_labels()[0])
+        _draw_title(figure, run, frequency.get_legend_handles_labels()[0])
         picture.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(picture, dpi=_DPI)
 
 
-def _draw_title(figure: Figure, ride: Ride, lines: list[Artist]) -> None:
-    facts = [ride.remarks.get('drive', ''), *ride.identity, f'{ride.began:%d %B %Y, %H:%M}']
-    figure.text(_LEFT, 0.944, ride.remarks.get('title', 'A ride'), size=25, weight='bold')
+def _draw_title(figure: Figure, run: Recording, lines: list[Artist]) -> None:
+    facts = [run.remarks.get('drive', ''), *run.identity, f'{run.began:%d %B %Y, %H:%M}']
+    figure.text(_LEFT, 0.944, run.remarks.get('title', 'A test run'), size=25, weight='bold')
     figure.text(_LEFT, 0.904, '   ·   '.join(filter(None, facts)), size=14, color=_SOFT)
     figure.text(
-        _RIGHT, 0.018, f'drawn from the bag {ride.source}', size=11, color=_SOFT, ha='right'
+        _RIGHT, 0.018, f'drawn from the bag {run.source}', size=11, color=_SOFT, ha='right'
     )
     phases = [Patch(color=colour, label=phase) for phase, (colour, _) in _PHASES.items()]
     for y, handles in ((0.976, phases), (0.948, lines)):
@@ -128,16 +128,16 @@ def _draw_title(figure: Figure, ride: Ride, lines: list[Artist]) -> None:
 # --- panels -----------------------------------------------------------------------------------
 
 
-def _draw_states(axes: Axes, ride: Ride) -> None:
+def _draw_states(axes: Axes, run: Recording) -> None:
     axes.set_ylim(0.0, 2.0)
     axes.set_yticks([0.48, 1.52], ['display', 'motor'])
     axes.tick_params(axis='y', length=0)
     axes.spines[:].set_visible(False)
-    for span in ride.phases:
+    for span in run.phases:
         colour, ink = _PHASES[span.what]
         _draw_span(axes, span, 1.04, colour, ink, bold=True)
-    faulty = {span.what for span in ride.faults}
-    for span in ride.texts:
+    faulty = {span.what for span in run.faults}
+    for span in run.texts:
         fault = span.what in faulty
         _draw_span(axes, span, 0.0, '#F9DCCB' if fault else '#F0F0F0', _INK, bold=fault)
 
@@ -162,14 +162,14 @@ def _draw_span(
     text.remove()
 
 
-def _draw_frequency(axes: Axes, ride: Ride) -> None:
+def _draw_frequency(axes: Axes, run: Recording) -> None:
     followed, ignored = Curve(), Curve()
     last = -math.inf
-    for time, value in zip(ride.setpoint.times, ride.setpoint.values, strict=True):
+    for time, value in zip(run.setpoint.times, run.setpoint.values, strict=True):
         if time - last > _SILENCE:
             followed.add(last, math.nan)
             ignored.add(last, math.nan)
-        heard = any(span.begin <= time <= span.end for span in ride.enabled)
+        heard = any(span.begin <= time <= span.end for span in run.enabled)
         followed.add(time, value if heard else math.nan)
         ignored.add(time, math.nan if heard else value)
         last = time
@@ -182,7 +182,7 @@ def _draw_frequency(axes: Axes, ride: Ride) -> None:
         linestyle=(0, (1, 1.5)), label='ignored: not enabled', zorder=3,
     )
     axes.plot(
-        ride.frequency.times, ride.frequency.values, color=_BLUE, linewidth=2.4,
+        run.frequency.times, run.frequency.values, color=_BLUE, linewidth=2.4,
         label='actual frequency', zorder=4,
     )
     axes.set_ylabel('frequency (Hz)')
@@ -213,19 +213,19 @@ def _finish(axes: Axes) -> None:
 # --- marks ------------------------------------------------------------------------------------
 
 
-def _mark(axes: Axes, ride: Ride) -> None:
+def _mark(axes: Axes, run: Recording) -> None:
     """Draw calls and faults through a panel."""
-    for time, _ in ride.calls:
+    for time, _ in run.calls:
         axes.axvline(time, color=_INK, linewidth=1.0, linestyle=(0, (4, 4)), zorder=2)
-    for span in ride.faults:
+    for span in run.faults:
         axes.axvspan(span.begin, span.end, color=_VERMILION, alpha=0.10, linewidth=0, zorder=0)
         axes.axvline(span.begin, color=_VERMILION, linewidth=2.2, zorder=5)
 
 
-def _name_calls(axes: Axes, ride: Ride) -> None:
+def _name_calls(axes: Axes, run: Recording) -> None:
     """Name the calls above the panel, one above the other where they would overlap."""
     ends: list[float] = []
-    for time, name in ride.calls:
+    for time, name in run.calls:
         text = axes.text(
             time, 0.0, f'▼ {name}', transform=_at_height(axes), ha='left', va='bottom', size=13
         )
@@ -247,8 +247,8 @@ def _name_setpoints(axes: Axes, followed: Curve) -> None:
             named = value
 
 
-def _name_faults(axes: Axes, ride: Ride) -> None:
-    for span in ride.faults:
+def _name_faults(axes: Axes, run: Recording) -> None:
+    for span in run.faults:
         offset = {'textcoords': 'offset points', 'xycoords': _at_height(axes), 'zorder': 6}
         where = (span.begin, 0.985)
         axes.annotate(

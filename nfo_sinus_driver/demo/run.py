@@ -19,7 +19,7 @@ from __future__ import annotations
 import signal
 import sys
 
-from nfo_sinus_driver.node.bench import Bench
+from nfo_sinus_driver.demo.bench import Bench
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _HELP = """

@@ -13,17 +13,15 @@
 # limitations under the License.
 
 """
-``make demo``: a short ride, as any ROS client would do it.
+``make demo``: starts a simulated drive and the driver, goes through the sequence, and ends both.
 
-It starts a simulated drive and the driver, enables the drive, runs it forward and backward, lets
-a fault happen, acknowledges it, enables again and stops, and prints what it sees. What the topics
-say goes to a bag, and what the bag says to a plot. It ends with 0 only if every step happened.
+What the topics say goes to a bag, and what the bag says to a plot. It ends with 0 only if every
+step happened.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
 import importlib
@@ -35,28 +33,19 @@ import tempfile
 import threading
 import time
 
-from nfo_sinus_msgs.msg import InvSt
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.node.bench import Bench
-from nfo_sinus_driver.node.domain import own_domain
-from nfo_sinus_driver.node.recording import Recorder
-from nfo_sinus_driver.node.recording import RecordingError
-from nfo_sinus_driver.node.rider import HEADING
-from nfo_sinus_driver.node.rider import PATIENCE
-from nfo_sinus_driver.node.rider import Rider
-from nfo_sinus_driver.node.rider import StepError
+from nfo_sinus_driver.demo.bench import Bench
+from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.recording import Recorder
+from nfo_sinus_driver.demo.recording import RecordingError
+from nfo_sinus_driver.demo.sequence import HEADING
+from nfo_sinus_driver.demo.sequence import PATIENCE
+from nfo_sinus_driver.demo.sequence import DemoSequence
+from nfo_sinus_driver.demo.sequence import StepError
 
-_OVERLOAD = 5
-_BUS_STANDBY = 37
-#: How close to the set-point counts as reached, Hz.
-_NEAR = 0.3
-_RUNS_FOR = 1.0
-_LISTENS_FOR = 2.0
-_STANDS_FOR = 1.5
-_COASTS_FOR = 2.5
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')
 #: What ends it before it is done, whatever was inherited.
@@ -65,54 +54,8 @@ _INTERRUPTED = 130
 _REMARKS = {'title': 'Forward, backward, a fault, and on again', 'drive': 'simulated drive'}
 
 
-def ride(rider: Rider, bench: Bench) -> None:
-    """
-    Do the ride.
-
-    :raises StepError: a step did not happen.
-    """
-
-    def near(hertz: float) -> Callable[[], bool]:
-        return lambda: abs(rider.actual - hertz) < _NEAR
-
-    def reach(hertz: float) -> None:
-        rider.say(f'set-point {hertz:g} Hz')
-        rider.follow(hertz)
-        rider.wait_for(f'{hertz:g} Hz', near(hertz))
-        rider.watch_for(_RUNS_FOR, f'{hertz:g} Hz', near(hertz))
-
-    rider.wait_for('our driver', lambda: bench.port in rider.ports)
-    rider.wait_for('a drive', lambda: rider.status and rider.status.connected and rider.inv_st)
-    # before anything turns it is sure that nothing but ours will
-    rider.watch_for(_LISTENS_FOR, 'standstill', near(0.0))
-    rider.enable()
-    reach(30.0)
-    reach(-20.0)
-
-    rider.say('a fault happens: the simulated motor is overloaded')
-    bench.inject('fault', str(_OVERLOAD))
-    rider.wait_for('the fault', lambda: rider.inv_st and rider.inv_st.code == _OVERLOAD)
-    assert rider.inv_st is not None
-    rider.say(f'{rider.inv_st.text}: {rider.inv_st.description}. {rider.inv_st.remedy}')
-    # the drive cannot measure the speed of a motor that coasts
-    rider.wait_for('a released motor', near(0.0))
-    rider.watch_for(_COASTS_FOR, 'a released motor', near(0.0))
-    rider.trigger('fault_ack')
-    # nobody has control then, so nothing turns
-    rider.wait_for('no fault', lambda: rider.inv_st and rider.inv_st.kind == InvSt.STATUS)
-    rider.say('set-points keep coming, and nothing turns until it is enabled again')
-    rider.watch_for(_STANDS_FOR, 'standstill', near(0.0))
-
-    rider.enable()
-    reach(15.0)
-    rider.trigger('stop')
-    rider.wait_for('standby', lambda: rider.inv_st and rider.inv_st.code == _BUS_STANDBY)
-    rider.follow(None)
-    rider.watch_for(_STANDS_FOR, 'standstill', near(0.0))
-
-
 def main() -> int:
-    """Start everything, ride, end everything, and draw."""
+    """Start everything, go through the sequence, end everything, and draw."""
     for number in _ENDING:
         signal.signal(number, signal.default_int_handler)
     folder = _output_folder()
@@ -126,10 +69,10 @@ def main() -> int:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         try:
             print(bench.start_simulator())
-            with _riding(bag) as rider:
+            with _sequence(bag) as sequence:
                 driver = bench.start_driver(*_DRIVER_SETTINGS)
                 print(HEADING, flush=True)
-                ride(rider, bench)
+                sequence.run(bench)
                 driver.send_signal(signal.SIGINT)
                 if driver.wait(PATIENCE) != 0:
                     raise StepError('the driver did not end as it should')
@@ -148,7 +91,7 @@ def main() -> int:
     if bag:
         print(f'Its bag, for `ros2 bag play` and the like: {bag}')
     if not missing:
-        from nfo_sinus_driver.node import plot
+        from nfo_sinus_driver.demo import plot
 
         picture = folder / 'ride.png'
         plot.draw(bag, picture)
@@ -157,8 +100,8 @@ def main() -> int:
 
 
 @contextlib.contextmanager
-def _riding(bag: Path | None) -> Iterator[Rider]:
-    """Have a rider, and a recorder if there is to be a bag, on a thread of their own."""
+def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
+    """Have a sequence, and a recorder if there is to be a bag, on a thread of their own."""
     with contextlib.ExitStack() as stack:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.shutdown)
@@ -167,14 +110,14 @@ def _riding(bag: Path | None) -> Iterator[Rider]:
         if bag is not None:
             recorder = stack.enter_context(Recorder(bag, _REMARKS))
             executor.add_node(recorder)
-        rider = Rider()
-        stack.callback(rider.destroy_node)
-        executor.add_node(rider)
+        sequence = DemoSequence()
+        stack.callback(sequence.destroy_node)
+        executor.add_node(sequence)
         thread = threading.Thread(target=executor.spin, daemon=True)
         thread.start()
         stack.callback(thread.join)
         stack.callback(executor.shutdown)
-        yield rider
+        yield sequence
 
 
 def _output_folder() -> Path:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Reads a recorded ride back from its bag, as arrays that can be drawn; needs no ROS."""
+"""Reads a recorded run back from its bag, as arrays that can be drawn; needs no ROS."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _PHASES = {
 
 @dataclass
 class Curve:
-    """Values over time, s since the ride began."""
+    """Values over time, s since the run began."""
 
     times: list[float] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
@@ -53,7 +53,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Span:
-    """Something that held for a while, s since the ride began; a fault has a code."""
+    """Something that held for a while, s since the run began; a fault has a code."""
 
     begin: float
     end: float
@@ -62,9 +62,9 @@ class Span:
 
 
 @dataclass
-class Ride:
+class Recording:
     """
-    What a bag tells of a ride.
+    What a bag tells of a run.
 
     :ivar began: when the drive was connected; times are counted from there.
     :ivar source: the bag, its messages and its topics.
@@ -92,11 +92,11 @@ class Ride:
     calls: list[tuple[float, str]] = field(default_factory=list)
 
 
-def read(folder: Path, drive: str = '/nfo_sinus') -> Ride:
+def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     """
     Read a bag.
 
-    :param drive: the node whose ride it was.
+    :param drive: the node whose run it was.
     :raises ValueError: the drive was never connected.
     """
     heard: dict[str, list[tuple[int, Any]]] = {}
@@ -127,31 +127,31 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Ride:
 
     length = since(_nanoseconds(statuses[-1].header.stamp))
     source = f'{folder.name}: {sum(map(len, heard.values()))} messages on {len(heard)} topics'
-    ride = Ride(datetime.fromtimestamp(start / 1e9), length, remarks, source)
-    ride.identity = _identity(m for _, m in heard.get('/diagnostics', ()))
-    received('setpoint', ride.setpoint)
-    received('actual_speed', ride.speed)
+    run = Recording(datetime.fromtimestamp(start / 1e9), length, remarks, source)
+    run.identity = _identity(m for _, m in heard.get('/diagnostics', ()))
+    received('setpoint', run.setpoint)
+    received('actual_speed', run.speed)
     phases, enabled = [], []
     for time, status in measured('status'):
         if status.connected:
-            ride.frequency.add(time, status.actual)
+            run.frequency.add(time, status.actual)
             phases.append((time, _phase(status)))
             enabled.append((time, 'enabled' if status.enabled else ''))
-    ride.phases = _spans(phases, length)
-    ride.enabled = [span for span in _spans(enabled, length) if span.what]
+    run.phases = _spans(phases, length)
+    run.enabled = [span for span in _spans(enabled, length) if span.what]
     for time, telemetry in measured('telemetry'):
-        ride.current.add(time, telemetry.output_current)
+        run.current.add(time, telemetry.output_current)
     texts = measured('inv_st')
-    ride.texts = _spans([(time, m.text) for time, m in texts], length)
+    run.texts = _spans([(time, m.text) for time, m in texts], length)
     # a fault is named a moment before the drive's state is one
     faults = {m.text: m.code for _, m in texts if m.kind == m.FAULT}
-    ride.faults = [
+    run.faults = [
         dataclasses.replace(span, code=faults[span.what])
-        for span in ride.texts
+        for span in run.texts
         if span.what in faults
     ]
-    ride.calls = sorted(_calls(heard, drive, since))
-    return ride
+    run.calls = sorted(_calls(heard, drive, since))
+    return run
 
 
 def _calls(

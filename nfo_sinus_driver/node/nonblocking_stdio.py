@@ -39,7 +39,7 @@ def open_closed_streams() -> None:
             os.close(number)
 
 
-class Output:
+class NonblockingStdio:
     """
     Puts a pipe in front of standard output and error, and a thread behind it.
 
@@ -71,7 +71,7 @@ def _begin_to_pump(descriptor: int) -> threading.Thread:
     os.set_blocking(writing, False)
     os.dup2(writing, descriptor)
     os.close(writing)
-    thread = threading.Thread(target=_pump, args=(reading, original), name='output', daemon=True)
+    thread = threading.Thread(target=_pump, args=(reading, original), name='stdio', daemon=True)
     thread.start()
     return thread
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one who rides: a client of the driver that says what it sees."""
+"""The demo sequence: what a client of the driver does and sees, from enable to stop."""
 
 from __future__ import annotations
 
@@ -31,36 +31,49 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.line import LATCHED
-from nfo_sinus_driver.node.line import NEWEST
-from nfo_sinus_driver.node.line import RELIABLE
+from nfo_sinus_driver.demo.bench import Bench
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import NEWEST
+from nfo_sinus_driver.node.qos import RELIABLE
 
 #: A shared machine may be very slow; a step that takes longer has failed, s.
 PATIENCE = 30.0
+#: The line above what is printed.
 HEADING = f'{"time":>8} {"set-point":>10} {"frequency":>10} {"speed":>9} {"current":>9}  inverter'
+
+_OVERLOAD = 5
+_BUS_STANDBY = 37
+#: How close to the set-point counts as reached, Hz.
+_NEAR = 0.3
+_RUNS_FOR = 1.0
+_LISTENS_FOR = 2.0
+_STANDS_FOR = 1.5
+_COASTS_FOR = 2.5
 
 _LINE_PERIOD = 0.5
 _PUBLISH_PERIOD = 0.1
 
 
 class StepError(Exception):
-    """Something of the ride did not happen."""
+    """A step of the sequence did not happen."""
 
 
-class Rider(Node):
+class DemoSequence(Node):
     """
-    A client of the driver: publishes set-points, calls services, remembers what it hears.
+    A client of the driver: publishes set-points, calls services, and prints what it sees.
 
-    :ivar ports: on which lines there are drivers.
+    It enables the drive, runs it forward and backward, lets a fault happen, acknowledges it,
+    enables again and stops.
     """
 
     def __init__(self) -> None:
-        super().__init__('demo_rider')
-        self.status: DriveStatus | None = None
-        self.inv_st: InvSt | None = None
-        self.speed = 0.0
-        self.current = 0.0
-        self.ports: set[str] = set()
+        super().__init__('demo_sequence')
+        self._status: DriveStatus | None = None
+        self._inv_st: InvSt | None = None
+        self._speed = 0.0
+        self._current = 0.0
+        self._ports: set[str] = set()
+        #: What is published again and again.
         self._setpoint: float | None = None
         self._started = time.monotonic()
         self._next_line = 0.0
@@ -72,21 +85,62 @@ class Rider(Node):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, RELIABLE)
         self._publisher = self.create_publisher(Float32, f'{drive}/setpoint', NEWEST)
         self.create_timer(_PUBLISH_PERIOD, self._publish)
-        self._enable = self.create_client(SetBool, f'{drive}/enable')
+        self._enable_client = self.create_client(SetBool, f'{drive}/enable')
         self._triggers = {
             name: self.create_client(Trigger, f'{drive}/{name}') for name in ('stop', 'fault_ack')
         }
         # what is asked and answered is told, so that it can be recorded
-        for client in (self._enable, *self._triggers.values()):
+        for client in (self._enable_client, *self._triggers.values()):
             client.configure_introspection(
                 self.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
             )
 
-    def follow(self, hertz: float | None) -> None:
-        """Publish this set-point from now on, or none."""
-        self._setpoint = hertz
+    def run(self, bench: Bench) -> None:
+        """
+        Go through it.
 
-    def wait_for(self, what: str, condition: Callable[[], object]) -> None:
+        :raises StepError: a step did not happen.
+        """
+
+        def near(hertz: float) -> Callable[[], bool]:
+            return lambda: abs(self._actual - hertz) < _NEAR
+
+        def reach(hertz: float) -> None:
+            self._say(f'set-point {hertz:g} Hz')
+            self._setpoint = hertz
+            self._wait_for(f'{hertz:g} Hz', near(hertz))
+            self._watch_for(_RUNS_FOR, f'{hertz:g} Hz', near(hertz))
+
+        self._wait_for('our driver', lambda: bench.port in self._ports)
+        self._wait_for('a drive', lambda: self._status and self._status.connected and self._inv_st)
+        # before anything turns it is sure that nothing but ours will
+        self._watch_for(_LISTENS_FOR, 'standstill', near(0.0))
+        self._enable()
+        reach(30.0)
+        reach(-20.0)
+
+        self._say('a fault happens: the simulated motor is overloaded')
+        bench.inject('fault', str(_OVERLOAD))
+        self._wait_for('the fault', lambda: self._inv_st and self._inv_st.code == _OVERLOAD)
+        assert self._inv_st is not None
+        self._say(f'{self._inv_st.text}: {self._inv_st.description}. {self._inv_st.remedy}')
+        # the drive cannot measure the speed of a motor that coasts
+        self._wait_for('a released motor', near(0.0))
+        self._watch_for(_COASTS_FOR, 'a released motor', near(0.0))
+        self._trigger('fault_ack')
+        # nobody has control then, so nothing turns
+        self._wait_for('no fault', lambda: self._inv_st and self._inv_st.kind == InvSt.STATUS)
+        self._say('set-points keep coming, and nothing turns until it is enabled again')
+        self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
+
+        self._enable()
+        reach(15.0)
+        self._trigger('stop')
+        self._wait_for('standby', lambda: self._inv_st and self._inv_st.code == _BUS_STANDBY)
+        self._setpoint = None
+        self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
+
+    def _wait_for(self, what: str, condition: Callable[[], object]) -> None:
         """
         Print what is seen until a condition holds.
 
@@ -99,7 +153,7 @@ class Rider(Node):
             self._look_around()
         self._print()
 
-    def watch_for(self, seconds: float, what: str, condition: Callable[[], object]) -> None:
+    def _watch_for(self, seconds: float, what: str, condition: Callable[[], object]) -> None:
         """
         Print what is seen for some time, in which a condition must hold.
 
@@ -111,24 +165,22 @@ class Rider(Node):
                 raise StepError(f'did not stay so: {what}')
             self._look_around()
 
-    def enable(self) -> str:
-        """Call ``~/enable``; return the answer or raise :class:`StepError` with it."""
-        return self._call(self._enable, SetBool.Request(data=True), 'enable')
+    def _enable(self) -> None:
+        self._call(self._enable_client, SetBool.Request(data=True), 'enable')
 
-    def trigger(self, name: str) -> str:
-        """Call ``~/stop`` or ``~/fault_ack``."""
-        return self._call(self._triggers[name], Trigger.Request(), name)
+    def _trigger(self, name: str) -> None:
+        self._call(self._triggers[name], Trigger.Request(), name)
 
-    def say(self, text: str) -> None:
+    def _say(self, text: str) -> None:
         """Print a line between those of the timeline."""
         print(f'{self._now():6.1f} s  -- {text}', flush=True)
 
     @property
-    def actual(self) -> float:
+    def _actual(self) -> float:
         """Actual frequency, Hz."""
-        return float('nan') if self.status is None else self.status.actual
+        return float('nan') if self._status is None else self._status.actual
 
-    def _call(self, client: Any, request: Any, name: str) -> str:
+    def _call(self, client: Any, request: Any, name: str) -> None:
         if not client.wait_for_service(PATIENCE):
             raise StepError(f'there is no service {name}')
         future = client.call_async(request)
@@ -137,11 +189,9 @@ class Rider(Node):
         if not done.wait(PATIENCE):
             raise StepError(f'{name} does not answer')
         response = future.result()
-        self.say(f'{name}: {response.message}')
+        self._say(f'{name}: {response.message}')
         if not response.success:
             raise StepError(f'{name} was refused: {response.message}')
-        message: str = response.message
-        return message
 
     def _now(self) -> float:
         return time.monotonic() - self._started
@@ -159,13 +209,13 @@ class Rider(Node):
 
     def _print(self) -> None:
         self._next_line = self._now() + _LINE_PERIOD
-        status = self.status
-        if status is None or self.inv_st is None:
+        status = self._status
+        if status is None or self._inv_st is None:
             return
         setpoint = '--' if self._setpoint is None else f'{self._setpoint:.1f}'
         print(
-            f'{self._now():6.1f} s {setpoint:>7} Hz {status.actual:7.1f} Hz {self.speed:5.0f} rpm '
-            f'{self.current:7.2f} A  {self.inv_st.text}',
+            f'{self._now():6.1f} s {setpoint:>7} Hz {status.actual:7.1f} Hz {self._speed:5.0f} rpm '
+            f'{self._current:7.2f} A  {self._inv_st.text}',
             flush=True,
         )
 
@@ -174,17 +224,17 @@ class Rider(Node):
             self._publisher.publish(Float32(data=self._setpoint))
 
     def _on_status(self, message: DriveStatus) -> None:
-        self.status = message
+        self._status = message
 
     def _on_inv_st(self, message: InvSt) -> None:
-        self.inv_st = message
+        self._inv_st = message
 
     def _on_speed(self, message: Float32) -> None:
-        self.speed = message.data
+        self._speed = message.data
 
     def _on_telemetry(self, message: Telemetry) -> None:
-        self.current = message.output_current
+        self._current = message.output_current
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         # a bus tells its port as the hardware it is about
-        self.ports.update(status.hardware_id for status in message.status)
+        self._ports.update(status.hardware_id for status in message.status)

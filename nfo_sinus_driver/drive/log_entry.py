@@ -1,0 +1,65 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One entry of the error log of a drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+import math
+import time
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """
+    One entry of the error log.
+
+    :ivar code: as the inverter status has it.
+    :ivar text: as on the display.
+    :ivar operating_time: the drive's operating time when it happened, h.
+    :ivar age: operating hours ago; NaN if the drive does not tell.
+    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
+        to come, or the drive is known to have had power ever since; else NaN.
+    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
+    """
+
+    code: int
+    text: str
+    operating_time: float
+    age: float
+    at: float = math.nan
+    latest: float = math.nan
+
+    @property
+    def wall_time(self) -> str:
+        """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
+        if not math.isnan(self.at):
+            return _local(self.at)
+        latest = '' if math.isnan(self.latest) else _local(self.latest)
+        return f'{latest} or before' if latest else ''
+
+    def __str__(self) -> str:
+        age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
+        wall_time = f' ({self.wall_time})' if self.wall_time else ''
+        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
+
+
+def _local(at: float) -> str:
+    try:
+        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    except (ValueError, OverflowError, OSError):
+        # no calendar goes back so far: the drive tells nonsense
+        return ''
+    return moment.isoformat(' ', 'minutes')

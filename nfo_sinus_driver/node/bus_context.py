@@ -1,0 +1,74 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the nodes of one process share: the bus, the queue of what is published, and who is who."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
+from dataclasses import dataclass
+from dataclasses import field
+import threading
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive.settings import POINT_TO_POINT
+from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.publish_queue import PublishQueue
+from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
+
+#: How long the bus waits for what is to begin at once, s; no drive times out by then.
+_LONGEST_GATHERING = 0.1
+
+
+@dataclass
+class BusContext:
+    """
+    One bus and the drives on it.
+
+    :ivar retries: how often a request that nobody answered is repeated.
+    """
+
+    bus: Bus
+    retries: int
+    publish_queue: PublishQueue = field(default_factory=PublishQueue)
+    setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
+    drives: list[ManagedDrive] = field(default_factory=list)
+
+    def add(self, drive: ManagedDrive) -> None:
+        """Take in another drive."""
+        self.drives.append(drive)
+
+    def log(self, log: Callable[[str], object], text: str) -> None:
+        """Log a line from the thread that publishes, for the bus must not wait for a log."""
+        self.publish_queue.put(lambda: log(text))
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Have all that is asked of the bus meanwhile begin together, between two transactions."""
+        complete = threading.Event()
+        self.bus.call(lambda: complete.wait(_LONGEST_GATHERING))
+        try:
+            yield
+        finally:
+            complete.set()
+
+    def address_conflict(self, name: str, address: int) -> str | None:
+        """Return the name of another drive that would answer to the address of this one, too."""
+        for drive in self.drives:
+            theirs = drive.settings.address
+            if drive.name != name and (theirs == address or POINT_TO_POINT in (theirs, address)):
+                return drive.name
+        return None

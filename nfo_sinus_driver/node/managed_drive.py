@@ -1,0 +1,157 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The drive of one managed node: its settings, and the :class:`Drive` that goes by them."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+import dataclasses
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Listener
+from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.drive.settings import AUTO
+from nfo_sinus_driver.node.lifecycle import Lifecycle
+
+#: What identifies a drive or how it is commanded cannot change under way.
+ONLY_UNCONFIGURED = ('address', 'model', 'control_method', 'reference', 'classic_dialect')
+
+
+class ManagedDrive:
+    """
+    The drive of one node, as long as the node lives.
+
+    A :class:`Drive` never changes what identifies it: where the settings do, :meth:`connect` makes
+    another one.
+
+    :param name: the node's.
+    :param listener: told about every poll and event, on the worker of the bus.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        bus: Bus,
+        settings: DriveSettings,
+        listener: Listener,
+        lifecycle: Lifecycle,
+    ) -> None:
+        self.name = name
+        self._bus = bus
+        self._settings = settings
+        self._listener = listener
+        self._lifecycle = lifecycle
+        #: What ``model: auto`` stands for, as far as it is known.
+        self._found_model = DriveSettings().model
+        self._drive = Drive(bus, self._concrete, listener)
+
+    @property
+    def drive(self) -> Drive:
+        """The present one."""
+        return self._drive
+
+    @property
+    def settings(self) -> DriveSettings:
+        """What is asked for; the drive goes by it once it is connected."""
+        return self._settings
+
+    def change_settings(self, settings: DriveSettings) -> None:
+        """Ask for something else; a drive that is connected goes by it at once."""
+        self._settings = settings
+        if not self.may_be_another:
+            self._drive.settings = self._concrete
+
+    @property
+    def state(self) -> str:
+        """The label of its node's lifecycle state, such as ``active``."""
+        return self._lifecycle.state
+
+    @property
+    def active(self) -> bool:
+        """It takes commands and set-points."""
+        return self.state == 'active'
+
+    @property
+    def may_be_another(self) -> bool:
+        """No drive belongs to the node yet; one that is being looked for does not count."""
+        return self.state in ('unconfigured', 'configuring')
+
+    @property
+    def is_silent(self) -> bool:
+        """It does not respond, although somebody has configured its node."""
+        return self.state != 'unconfigured' and not self._drive.snapshot.connected
+
+    def require_active(self) -> Drive:
+        """
+        Return the drive for a command that may turn the motor.
+
+        :raises DriveError: the node takes none; the message says why, and what to do.
+        """
+        if not self.active:
+            raise DriveError(self._lifecycle.why_not_active)
+        return self._drive
+
+    def connect(self, *, patient: bool) -> bool:
+        """
+        Find the drive that the settings ask for, and watch it from then on.
+
+        :param patient: repeat the first request when nobody answers.
+        :returns: false if the settings ask for another one meanwhile.
+        :raises DriveError: it does not respond, or may not be taken over.
+        :raises ValueError: the model that was found has not all that is set.
+        """
+        before = self._drive.settings
+        if self._drive.stop_unconfirmed and not self._is_asked_for:
+            raise DriveError(f'the stop of the drive at {before.address} is not confirmed yet')
+        if self._settings.model == AUTO:
+            detection = detect_model(self._bus, self._settings.address)
+            self._found_model = self._bus.run(detection).result()
+        if before != self._concrete:
+            if before.address == self._settings.address and (
+                before.control_method != self._settings.control_method
+            ):
+                self._drive.require_standing().result()
+            self._drive = Drive(self._bus, self._concrete, self._listener)
+        self._drive.connect(patient=patient, parameters=True).result()
+        asked_for = self._is_asked_for
+        if asked_for:
+            self._drive.settings = self._concrete
+        return asked_for
+
+    def disconnect(self) -> Future[str]:
+        """Stop the motor, give control back and leave the drive alone."""
+        return self._drive.disconnect(self._settings.shutdown_timeout)
+
+    @property
+    def _concrete(self) -> DriveSettings:
+        """
+        The settings with a model that is one.
+
+        :raises ValueError: the model that was found has not all that is set.
+        """
+        if self._settings.model != AUTO:
+            return self._settings
+        return dataclasses.replace(self._settings, model=self._found_model)
+
+    @property
+    def _is_asked_for(self) -> bool:
+        """The present drive is still the one that the settings ask for."""
+        return all(
+            getattr(self._drive.settings, name) == getattr(self._concrete, name)
+            for name in ONLY_UNCONFIGURED
+        )
