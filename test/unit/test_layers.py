@@ -42,8 +42,7 @@ MAY_IMPORT = {
     'bus': {'link'},
     'signals': set(),
     'drive': {'bus', 'catalog', 'link'},
-    # the folders of a family in there, of its words; the rest, of which is the default; and no
-    # profile: a mistake in that must not hide
+    # its folder of a family, the words of that one, and no profile: a mistake in that must not hide
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals'},
     'demo': {'node'},
@@ -77,11 +76,6 @@ FAMILY = re.compile(
     '|'.join([*families(), r'sinus_', r'simulator\.sinus\b', r'(?<![a-z0-9])g2', 'optimal']),
     re.IGNORECASE,
 )
-#: Every parameter of every family: none of them is known there either.
-KEYS = re.compile(
-    '|'.join(sorted({re.escape(key) for name in families() for key in load_family(name)}))
-)
-
 MOST_LINES = 600
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
 LONGER: dict[str, int] = {}
@@ -164,12 +158,6 @@ def named(tree: ast.Module) -> set[str]:
     return {name for text in texts for name in family_names().findall(text)}
 
 
-def families_in(source: str) -> Iterator[str]:
-    """What of a family stands in a file that is to know none, the name of the package apart."""
-    text = source.replace(PACKAGE, '')
-    yield from (found[0] for pattern in (FAMILY, KEYS) for found in pattern.finditer(text))
-
-
 def violations(path: str, source: str) -> list[str]:
     """What is wrong with a file of the package; ``path`` is its path below the package."""
     tree = ast.parse(source)
@@ -192,15 +180,16 @@ def violations(path: str, source: str) -> list[str]:
             found.append(f'{room} imports {name}')
     if room not in OPENS_PORTS and path not in OPENS_NO_PORT:
         found += [f'{room} opens ports with {call}' for call in opens_ports(tree)]
-    if room not in NAMES_FAMILIES:
+    general = room == 'simulator' and path.count('/') == 1
+    if general or room not in NAMES_FAMILIES:
         more = named(tree) - NAMED.get(path, set())
         found += [f'{room} names {name}' for name in sorted(more)]
-    if room == 'simulator':
-        own, _, inside = path.removeprefix('simulator/').rpartition('/')
-        others = [name for name in families() if own and name != own]
-        found += [f'{own} imports {name}' for name in others if f'simulator.{name}' in source]
-        if not own:
-            found += [f'{inside} knows {what}' for what in families_in(source)]
+    if general:
+        words = FAMILY.findall(source.replace(PACKAGE, ''))
+        found += [f'{room} knows {word}' for word in words]
+    elif room == 'simulator':
+        others = [name for name in families() if name != path.split('/')[1]]
+        found += [f'{path} imports {name}' for name in others if f'simulator.{name}' in source]
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
         found.append(f'{lines} lines are too many')
@@ -382,20 +371,20 @@ for module in {modules!r}:
         ('node/main.py', 'if model == "sinus_optimal": pass', 'node names sinus_optimal'),
         ('link/rtu.py', 'MODE = "fieldbus.mode"', 'link names fieldbus.mode'),
         ('drive/drive.py', '\n' * 601, '601 lines are too many'),
-        ('simulator/drive.py', "model = 'sinus_g2'", 'drive.py knows sinus_g2'),
-        ('simulator/drive.py', 'class OptimalUnit: ...', 'drive.py knows Optimal'),
-        ('simulator/drive.py', 'def g2_only(): ...', 'drive.py knows g2'),
+        ('simulator/drive.py', "model = 'sinus_g2'", 'simulator knows sinus_g2'),
+        ('simulator/drive.py', 'class OptimalUnit: ...', 'simulator knows Optimal'),
+        ('simulator/drive.py', 'def g2_only(): ...', 'simulator knows g2'),
         (
             'simulator/drive.py',
             'from nfo_sinus_driver.simulator.sinus import variant',
-            'drive.py knows simulator.sinus',
+            'simulator knows simulator.sinus',
         ),
         (
             'simulator/sinus_g2/family.py',
             'from nfo_sinus_driver.simulator.sinus_optimal import family',
-            'sinus_g2 imports sinus_optimal',
+            'simulator/sinus_g2/family.py imports sinus_optimal',
         ),
-        ('simulator/drive.py', "key == 'fieldbus.mode'", 'drive.py knows fieldbus.mode'),
+        ('simulator/drive.py', "key == 'fieldbus.mode'", 'simulator names fieldbus.mode'),
         ('shed/tools.py', '', 'shed is no room of the house'),
     ],
 )

@@ -28,15 +28,16 @@ from nfo_sinus_driver.simulator.main import main
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
 
-HERE = Path(__file__).parent / 'made_up'
-COMMAND, STATUS, CODE, FREQUENCY, DIRECTION, ACTUAL = 0x10, 0x11, 0x12, 0x20, 0x22, 0x40
-ENABLE, RUN, ACKNOWLEDGE = 1 << 8, 1 << 9, 1 << 15
+HERE = Path(__file__).parent
+RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ = 10, 100, 101, 102, 200, 201, 202
+RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15
+RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 
 
 @pytest.fixture(autouse=True)
-def fable(monkeypatch):
-    for package, name in [(families, 'families'), (room, 'simulator')]:
-        monkeypatch.setattr(package, '__path__', [*package.__path__, str(HERE / name)])
+def acme(monkeypatch):
+    for package, folder in [(families, HERE.parent / 'drive/made_up'), (room, HERE / 'made_up')]:
+        monkeypatch.setattr(package, '__path__', [*package.__path__, str(folder)])
 
 
 class Master:
@@ -49,15 +50,21 @@ class Master:
         pdu = struct.pack(f'>BHHB{len(words)}H', 16, register, len(words), 2 * len(words), *words)
         return server(self.drive).answer(pdu)[0] == 16
 
-    def read(self, register):
-        answer = server(self.drive).answer(struct.pack('>BHH', 3, register, 1))
-        return struct.unpack('>h', answer[2:])[0]
+    def read(self, register, count=1):
+        answer = server(self.drive).answer(struct.pack('>BHH', 3, register, count))
+        return int.from_bytes(answer[2:], 'big', signed=True)
+
+    def run(self, digits):
+        assert self.write(SIZE, digits >> 16, digits & 0xFFFF)
+        assert self.write(WORD, REMOTE)
+        assert self.write(WORD, REMOTE | RUN)
+        self.drive.advance(5)
 
 
 @pytest.fixture
 def simulator():
     # not started: time passes when told
-    simulator = Simulator(model='fable')
+    simulator = Simulator(model='acme')
     yield simulator
     simulator.stop()
 
@@ -67,83 +74,78 @@ def master(simulator):
     return Master(simulator.drives[1])
 
 
-def run(master, frequency):
-    assert master.write(FREQUENCY, frequency >> 16, frequency & 0xFFFF)
-    assert master.write(COMMAND, ENABLE)
-    assert master.write(COMMAND, ENABLE | RUN)
-    master.drive.advance(5)
-
-
 def test_it_runs_reverses_and_stops(master):
-    run(master, 0x00002550)
-    assert (master.read(STATUS), master.read(CODE), master.read(ACTUAL)) == (0x110, 1, 255)
-    assert master.write(DIRECTION, 1)
+    assert master.read(CODE) == 1
+    master.run(0x00002550)
+    assert (master.read(TOLD), master.read(CODE)) == (HAS_REMOTE | RUNNING, 3)
+    assert master.read(HERTZ, 2) == 2550
+    assert master.write(TURN, 1)
     master.drive.advance(5)
-    assert master.read(ACTUAL) == -255
-    assert master.write(COMMAND, ENABLE)
+    assert master.read(HERTZ, 2) == -2550
+    assert master.write(WORD, REMOTE)
     assert not master.drive.motor.driven
-    assert master.read(STATUS) == 0x100
+    assert (master.read(TOLD), master.read(CODE)) == (HAS_REMOTE, 2)
 
 
 def test_its_faults(simulator, master):
-    run(master, 0x00001000)
+    master.run(0x00001000)
     simulator.inject('heat')
-    assert (master.read(CODE), master.read(STATUS) & 1) == (7, 1)
-    assert not master.write(COMMAND, ENABLE | RUN)
-    assert master.write(COMMAND, ACKNOWLEDGE)
-    assert (master.read(CODE), master.drive.motor.driven) == (0, False)
-    simulator.inject('fault', 7, standing=True)
-    assert master.write(COMMAND, ACKNOWLEDGE)
-    assert master.read(CODE) == 7
-    with pytest.raises(ValueError, match='8 is no fault of fable'):
+    assert (master.read(CODE), master.read(TOLD)) == (70, HAS_REMOTE | TRIPPED)
+    assert master.write(WORD, REMOTE | RESET)
+    assert (master.read(CODE), master.drive.motor.driven) == (2, False)
+    simulator.inject('fault', 70, standing=True)
+    assert master.write(WORD, REMOTE)
+    assert master.write(WORD, REMOTE | RESET)
+    assert master.read(CODE) == 70
+    with pytest.raises(ValueError, match='8 is no fault of acme'):
         simulator.inject('fault', 8)
 
 
 def test_what_happens_to_every_drive_happens_to_it(simulator, master):
-    run(master, 0x00001000)
+    master.run(0x00001000)
     simulator.inject('run', False)
     assert not master.drive.motor.driven
-    simulator.inject('set', 'ramps.time', '2.5')
-    assert master.read(0x30) == 25
+    simulator.inject('set', 'ramp.up', '2.5')
+    assert master.read(RAMP) == 25
     simulator.inject('factory-reset')
-    assert master.read(0x30) == 10
+    assert master.read(RAMP) == 10
     simulator.inject('power-cycle', 0)
-    assert master.read(COMMAND) == 0
+    assert master.read(WORD) == 0
     assert master.drive.writes == {}
-    assert master.drive.command_writes == {'bus.frequency': 1, 'bus.command': 2}
+    assert master.drive.command_writes == {'bus.size': 1, 'bus.word': 2}
 
 
 def test_its_registers_have_their_own_ends(master):
-    assert not master.write(FREQUENCY, 0x0000, 0x6001)
-    assert not master.write(FREQUENCY, 0x0000, 0x00AB), 'no decimal digits'
-    assert not master.write(DIRECTION, 2)
+    assert not master.write(SIZE, 0x0004, 0x0001)
+    assert not master.write(SIZE, 0x0000, 0x00AB), 'no decimal digits'
+    assert not master.write(TURN, 2)
 
 
 def test_its_options():
-    master = Master(simulated_drive('fable', most='50'))
-    run(master, 0x00006000)
-    assert master.read(ACTUAL) == 500
-    with pytest.raises(ValueError, match='fable has no option lenient'):
-        Simulator(model='fable', lenient=True)
+    master = Master(simulated_drive('acme', most='50'))
+    master.run(0x00006000)
+    assert master.read(HERTZ, 2) == 5000
+    with pytest.raises(ValueError, match='acme has no option lenient'):
+        Simulator(model='acme', lenient=True)
 
 
 def test_it_speaks_what_it_has_a_server_for():
-    with pytest.raises(ValueError, match='fable does not speak classic'):
-        Simulator(model='fable', protocol='classic')
+    with pytest.raises(ValueError, match='acme does not speak classic'):
+        Simulator(model='acme', protocol='classic')
 
 
 def test_over_a_line(open_master):
-    with Simulator(model='fable') as simulator:
+    with Simulator(model='acme') as simulator:
         client = open_master(simulator.port)
-        assert client.ask(1, struct.pack('>BHH', 3, CODE, 1), 7)[3:5] == b'\0\0'
+        assert client.ask(1, struct.pack('>BHH', 3, CODE, 1), 7)[3:5] == b'\0\1'
         state = simulator.state()
-        assert (state['model'], state['code'], state['parameters']['ramps.time']) == ('fable', 0, 1)
+        assert (state['model'], state['code'], state['parameters']['ramp.up']) == ('acme', 1, 1)
 
 
 def test_the_command_line_offers_it(capsys):
-    assert 'heat' in every_verb()
+    assert {'heat', 'sio-error'} <= every_verb().keys()
     for command, argument, offered in [
-        (main, '--help', '--most {50,60}'),
+        (main, '--help', '--most {50,400}'),
         (inject, '--help', 'let it be too hot'),
     ]:
         with pytest.raises(SystemExit):

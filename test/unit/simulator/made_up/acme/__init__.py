@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A maker that there is not."""
+"""A simulated Acme."""

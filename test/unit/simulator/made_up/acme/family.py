@@ -1,0 +1,123 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A simulated Acme: run by a control word, its direction in another register than its size."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any
+
+from nfo_sinus_driver.simulator.control_unit import ControlUnit
+from nfo_sinus_driver.simulator.family import Option
+from nfo_sinus_driver.simulator.family import SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Argument
+from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.memory import Memory
+
+
+class Word(enum.IntFlag):
+    """The control word."""
+
+    RESET = 1 << 3
+    RUN = 1 << 12
+    REMOTE = 1 << 15
+
+
+class Told(enum.IntFlag):
+    """The status word."""
+
+    RUNNING = 1 << 5
+    TRIPPED = 1 << 9
+    REMOTE = 1 << 13
+
+
+class AcmeControlUnit(ControlUnit):
+    """
+    Takes the control word.
+
+    :param most: the greatest set-point that it follows (Hz).
+    """
+
+    def __init__(self, memory: Memory, address: int, *, most: str = '400') -> None:
+        super().__init__(memory, address)
+        self._most = float(most)
+        self._word = Word(0)
+
+    def write(self, key: str, raw: int) -> bool:
+        """Take a control word; a fault is acknowledged when its bit rises."""
+        if key != 'bus.word':
+            return False
+        word = Word(raw)
+        if word & ~self._word & Word.RESET:
+            self.faults.acknowledge()
+        self._word = word
+        return True
+
+    def show(self, key: str) -> int | None:
+        """Return the control word, the status word and the status code."""
+        if key == 'bus.word':
+            return int(self._word)
+        if key == 'bus.code':
+            return self.status_code
+        if key != 'bus.told':
+            return None
+        remote = Told.REMOTE if self._word & Word.REMOTE else Told(0)
+        running = Told.RUNNING if self.motor.driven else Told(0)
+        return int(remote | running | (Told.TRIPPED if self.faults else Told(0)))
+
+    @property
+    def status_code(self) -> int:
+        """The fault, else who has control and whether the motor is driven."""
+        if not self._word & Word.REMOTE:
+            return self.faults.shown or 1
+        return self.faults.shown or (3 if self.motor.driven else 2)
+
+    def settle(self) -> None:
+        """Run the motor, or let it go."""
+        run = Word.REMOTE | Word.RUN
+        self.motor.accel = self.motor.retard = self.memory.number('ramp.up')
+        if self._word & run == run and self.run_input and not self.faults:
+            sign = -1 if self.memory.raw('bus.turn') else 1
+            self.motor.energise()
+            self.motor.demand = sign * min(self.memory.number('bus.size'), self._most)
+        else:
+            self.motor.release()
+
+    @property
+    def settled(self) -> bool:
+        """Always: it has no clock of its own."""
+        return True
+
+    def restart(self) -> None:
+        """Forget the control word."""
+        self._word = Word(0)
+
+    def report(self) -> dict[str, Any]:
+        """Return what it shows."""
+        return {'code': self.status_code, 'word': int(self._word)}
+
+
+FAMILY = SimulatedFamily(
+    control_unit=AcmeControlUnit,
+    factory={'ramp.up': 1.0},
+    options=(Option('most', 'the greatest set-point that is followed', ('50', '400')),),
+    verbs={
+        'heat': Verb(
+            'let it be too hot',
+            lambda target, given: target.one.trip(70, cause_present=given['lasts']),
+            (Argument('lasts', bool, 'it stays so', False),),
+        )
+    },
+)
