@@ -1,0 +1,140 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tests of the bus share: jobs that ask, the owner of a slot, and what may be raised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from types import SimpleNamespace
+from typing import Any
+
+from fake_link import PATIENCE
+from fake_link import Done
+from fake_link import FakeLink
+from fake_link import wait_until
+import pytest
+from support.addresses import packed
+from support.addresses import register
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Slot
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.bus import statistics as statistics_module
+from nfo_sinus_driver.bus import worker as bus_module
+from nfo_sinus_driver.link import LinkError
+
+UNIT = 1
+OTHER = 2
+
+ANYTHING = [ValueError('no'), AssertionError(), SystemExit(1), KeyboardInterrupt(), Cancelled()]
+RAISED = pytest.mark.parametrize('error', ANYTHING, ids=lambda error: type(error).__name__)
+
+
+def ask(
+    bus: Bus, number: int, priority: Priority, data: bytes | None = None, unit: int = UNIT
+) -> Future[bytes]:
+    """Let a coroutine read or write one register; the future has the bytes read."""
+
+    async def job() -> bytes:
+        if data is None:
+            return (await bus.read(unit, register(number), priority)).data
+        return (await bus.write(unit, register(number), data, priority)).data
+
+    return bus.run(job())
+
+
+def result(future: Future[Any]) -> Any:
+    return future.result(PATIENCE)
+
+
+def failure(future: Future[Any]) -> BaseException | None:
+    return future.exception(PATIENCE)
+
+
+def hold(bus: Bus, link: FakeLink, priority: Priority = Priority.REFRESH) -> Future[bytes]:
+    """Have a transaction kept on the line; to be used while the link is held."""
+    future = ask(bus, 0, priority)
+    link.wait_until_held()
+    return future
+
+
+class Writer:
+    """The owner of a slot: what is wanted, what was sent, and what came of it."""
+
+    def __init__(self, bus: Bus, number: int = 50, unit: int = UNIT) -> None:
+        self.bus = bus
+        self.wanted: int | None = None
+        self.outcomes: list[tuple[bytes | None, LinkError | None]] = []
+        self.slot = Slot(self.make, self.done)
+        self.address = register(number)
+        self.unit = unit
+
+    def want(self, value: int | None) -> None:
+        self.wanted = value
+        self.bus.request(self.slot)
+
+    def make(self) -> Transfer | None:
+        if self.wanted is None:
+            return None
+        return Transfer(self.unit, self.address, Priority.SETPOINT, packed(self.wanted))
+
+    def done(self, transfer: Transfer, error: LinkError | None) -> None:
+        self.outcomes.append((transfer.data, error))
+
+
+def spawned(bus: Bus, coroutine: Any) -> Task:
+    """Start a coroutine beside, from outside."""
+    tasks: list[Task] = []
+    bus.call(lambda: tasks.append(bus.spawn(coroutine)))
+    wait_until(lambda: tasks)
+    return tasks[0]
+
+
+def raiser(error: BaseException) -> Callable[..., Any]:
+    def function(*_: object) -> Any:
+        raise error
+
+    return function
+
+
+class Clock:
+    """A clock that only transactions move."""
+
+    def __init__(self, took: dict[int, float]) -> None:
+        self.start = self.now = 1000.0
+        self.took = took
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+def take_time(
+    link: FakeLink, monkeypatch: pytest.MonkeyPatch, took: dict[int, float]
+) -> Clock:
+    """Let transactions take a time by their register, on a clock of their own."""
+    clock = Clock(took)
+
+    def answer(done: Done) -> bytes:
+        clock.now += took.get(done.number, 0.0)
+        return packed(done.number)
+
+    link.answer = answer
+    for module in (bus_module, statistics_module):
+        monkeypatch.setattr(module, 'time', SimpleNamespace(monotonic=clock.monotonic))
+    return clock

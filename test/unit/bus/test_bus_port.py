@@ -1,0 +1,278 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The port lost and found again, the end of the bus, and its figures."""
+
+from __future__ import annotations
+
+import threading
+
+from bus_bench import UNIT
+from bus_bench import Writer
+from bus_bench import ask
+from bus_bench import failure
+from bus_bench import hold
+from bus_bench import raiser
+from bus_bench import result
+from bus_bench import take_time
+from fake_link import PATIENCE
+from fake_link import Done
+from fake_link import FakeLink
+from fake_link import wait_until
+import pytest
+from support.addresses import packed
+from support.addresses import register
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Slot
+from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.bus import worker as bus_module
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
+
+
+def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
+    assert result(ask(bus, 1, Priority.POLL)) == packed(1)
+    assert bus.port_error is None
+    gone = PortError('gone')
+    link.answer = raiser(gone)
+    link.opening = raiser(PortError('still gone'))
+    writer = Writer(bus)
+    with link.held():
+        lost = hold(bus, link)
+        others = [ask(bus, number, priority) for number, priority in enumerate(Priority)]
+        writer.want(3)
+    assert failure(lost) is gone
+    for future in others:
+        assert isinstance(failure(future), PortError)
+    wait_until(lambda: writer.outcomes)
+    assert isinstance(writer.outcomes[0][1], PortError)
+    assert link.closed >= 1
+    wait_until(lambda: bus.port_error is not None and str(bus.port_error) == 'still gone')
+    # who asks now is told at once
+    assert isinstance(failure(ask(bus, 1, Priority.STOP)), PortError)
+    sent = len(link.done)
+    link.answer = lambda done: packed(done.number)
+    link.opening = lambda: None
+    wait_until(lambda: bus.port_error is None)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
+    assert len(link.done) == sent + 1
+    assert bus.statistics().reconnects == 1
+
+
+def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
+    bus: Bus, link: FakeLink
+) -> None:
+    link.answer = raiser(PortError('gone'))
+    tasks: list[Task] = []
+
+    async def end_the_other() -> None:
+        try:
+            await bus.read(UNIT, register(1), Priority.POLL)
+        except PortError:
+            bus.cancel(tasks[0])
+            raise
+
+    async def wait_behind() -> None:
+        tasks.append(bus.current)
+        await bus.read(UNIT, register(2), Priority.POLL)
+
+    with link.held():
+        lost = hold(bus, link)
+        first = bus.run(end_the_other())
+        ended = bus.run(wait_behind())
+        last = ask(bus, 3, Priority.POLL)
+    for future in (lost, first, last):
+        assert isinstance(failure(future), PortError)
+    assert isinstance(failure(ended), Cancelled)
+
+
+def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.01)
+    link.opening = raiser(PortError('absent'))
+    bus = Bus(link)
+    assert str(bus.port_error) == 'the port is not open yet'
+    bus.start()
+    assert str(failure(ask(bus, 1, Priority.POLL))) == 'absent'
+    link.opening = lambda: None
+    wait_until(lambda: bus.port_error is None)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
+    # it was opened once, so nothing was reconnected
+    assert bus.statistics().reconnects == 0
+    bus.close()
+
+
+def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> None:
+    link.opening = raiser(PortError('gone'))
+    link.answer = raiser(PortError('gone'))
+    failure(ask(bus, 1, Priority.POLL))
+    broken = Slot(raiser(ValueError('oops')), lambda transfer, error: None)
+    writer = Writer(bus)
+
+    def want_both() -> None:
+        bus.request(broken)
+        writer.want(7)
+
+    bus.call(want_both)
+    # the other one is told all the same
+    wait_until(lambda: writer.outcomes)
+    assert str(writer.outcomes[0][1]) == 'gone'
+    assert not broken.pending
+
+
+def test_sleepers_are_not_troubled_by_a_lost_port(bus: Bus, link: FakeLink) -> None:
+    link.opening = raiser(PortError('gone'))
+    link.answer = raiser(PortError('gone'))
+    failure(ask(bus, 1, Priority.POLL))
+
+    async def sleeper() -> str:
+        await bus.sleep(0.02)
+        return 'slept'
+
+    assert result(bus.run(sleeper())) == 'slept'
+
+
+def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:
+    for times in range(1, 4):
+        link.answer = raiser(PortError('gone'))
+        failure(ask(bus, 1, Priority.POLL))
+        link.answer = lambda done: packed(done.number)
+        wait_until(lambda times=times: bus.statistics().reconnects == times)
+
+
+def test_close_ends_everything(link: FakeLink) -> None:
+    bus = Bus(link)
+    bus.start()
+
+    async def sleeper() -> None:
+        await bus.sleep(3600)
+
+    async def for_ever() -> None:
+        while True:
+            await bus.read(UNIT, register(1), Priority.POLL)
+
+    futures = [bus.run(sleeper()), bus.run(for_ever())]
+    wait_until(lambda: len(link.done) > 3)
+    bus.close()
+    assert not bus.alive
+    assert link.closed == 1
+    for future in futures:
+        assert isinstance(failure(future), Cancelled)
+    sent = len(link.done)
+    # nobody who comes too late waits for ever
+    assert isinstance(failure(ask(bus, 2, Priority.STOP)), Cancelled)
+    assert len(link.done) == sent
+    assert bus.port_error is not None
+    bus.close()
+
+
+def test_close_waits_for_the_transaction_on_the_line(link: FakeLink) -> None:
+    bus = Bus(link)
+    bus.start()
+    with link.held():
+        future = hold(bus, link)
+        closer = threading.Thread(target=bus.close)
+        closer.start()
+        assert link.closed == 0
+    closer.join(PATIENCE)
+    assert link.closed == 1
+    assert result(future) == packed(0)
+
+
+def test_coroutine_that_will_not_end_does_not_keep_the_bus(link: FakeLink) -> None:
+    bus = Bus(link)
+    bus.start()
+
+    begun = threading.Event()
+
+    async def stubborn() -> str:
+        begun.set()
+        for _ in range(5):
+            try:
+                await bus.sleep(3600)
+            except Cancelled:
+                continue
+        return 'at last'
+
+    future = bus.run(stubborn())
+    assert begun.wait(PATIENCE)
+    bus.close()
+    assert not bus.alive
+    assert result(future) == 'at last'
+
+
+def test_start_and_close_leave_no_thread(link: FakeLink) -> None:
+    before = threading.active_count()
+    for _ in range(3):
+        bus = Bus(link)
+        bus.start()
+        assert bus.alive
+        bus.close()
+    assert threading.active_count() == before
+
+
+def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = take_time(link, monkeypatch, {})
+    script: list[tuple[float, LinkError | None]] = [
+        (0.010, None),
+        (0.020, None),
+        (0.200, NoAnswer('')),
+        (0.100, DamagedAnswer('')),
+        (0.030, Refused(2)),
+        (0.000, NotReady(0.0)),
+        (0.040, None),
+    ]
+    steps = iter(script)
+
+    def answer(done: Done) -> bytes:
+        took, error = next(steps)
+        clock.now += took
+        if error is not None:
+            raise error
+        return packed(1)
+
+    link.answer = answer
+    bus = Bus(link)
+    bus.start()
+    for _ in range(6):  # one of them is not ready at first and asked again
+        wait_until(ask(bus, 1, Priority.POLL).done)
+    bus.call(lambda: bus.recorder.retry(1))
+    bus.call(lambda: bus.recorder.cycle(1, 0.3))
+    bus.call(lambda: bus.recorder.cycle(2, 0.5))
+    bus.call(lambda: bus.recorder.cycle(1, 0.2))
+    result(bus.run(nothing()))
+    figures = bus.statistics()
+    assert figures.transactions == 6
+    assert (figures.timeouts, figures.damaged, figures.refused) == (1, 1, 1)
+    assert (figures.retries, figures.reconnects) == (1, 0)
+    assert figures.utilisation == pytest.approx(0.4 / 2.0)
+    assert figures.cycle_time == 0.5
+    # a refusal is an answer too
+    assert figures.round_trip_min == pytest.approx(0.01)
+    assert figures.round_trip_mean == pytest.approx(0.025)
+    assert figures.round_trip_max == pytest.approx(0.04)
+    bus.call(lambda: bus.recorder.forget_cycle(2))
+    result(bus.run(nothing()))
+    assert bus.statistics().cycle_time == 0.2
+    bus.close()
+
+
+async def nothing() -> None:
+    return
