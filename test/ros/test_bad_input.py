@@ -67,7 +67,7 @@ def _untouched(drive: Simulated) -> None:
 
 def test_an_absent_port_is_waited_for(bench: Bench) -> None:
     driver = bench.driver()
-    _says(driver, bench.port, *bench.way.absent, 'trying again')
+    _says(driver, bench.port, *bench.way.absent, 'retrying')
     bench.simulator()
     bench.client().connected()
 
@@ -150,7 +150,7 @@ def _checks_in_order(driver: Process, *words: str) -> None:
 def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
-    _says(driver, bench.way.nobody[0], '4', 'trying again')
+    _says(driver, bench.way.nobody[0], '4', 'retrying')
     _checks_in_order(driver, *bench.way.nobody)
     client = bench.client()
     assert 'has not answered yet' in client.enable().message
@@ -165,7 +165,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
     drive.inject('power-cycle')
     drive.wait_for(lambda state: not state['silent'], timeout=PATIENCE)
     driver = bench.driver()
-    _says(driver, 'nobody answers at address 1')
+    _says(driver, 'no response from address 1')
     _checks_in_order(driver, *SILENCE)
     _untouched(drive)
 
