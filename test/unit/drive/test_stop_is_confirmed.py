@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 import contextlib
 import itertools
+from typing import Any
 from unittest import mock
 
 from drive_rig import MODE
@@ -44,7 +45,7 @@ from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator import runner_g2
 
-WAYS: dict[str, Callable[[Drive], Future[object]]] = {
+WAYS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'quick stop': lambda drive: drive.quick_stop(),
     'deactivate': lambda drive: drive.deactivate(),
@@ -60,7 +61,7 @@ WORDS = (
 
 
 @contextlib.contextmanager
-def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[object]]:
+def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[Any]]:
     """Have a drive tune that refuses everything until it is over; its status word is this."""
 
     def refuse(register: int, words: Words | None) -> None:
@@ -76,7 +77,7 @@ def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[object]]:
         yield future
 
 
-def answered(rig: VirtualRig, future: Future[object]) -> bool:
+def answered(rig: VirtualRig, future: Future[Any]) -> bool:
     """Wait for an answer; tell whether it is a success."""
     rig.answer(future)
     error = future.exception()
@@ -146,7 +147,7 @@ def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
 def test_an_enable_is_refused_until_every_quick_stop_has_ended(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     rig.ride()
-    stops: list[Future[object]] = [rig.drive.quick_stop()]
+    stops: list[Future[Any]] = [rig.drive.quick_stop()]
     releases = itertools.count()
 
     def be_busy_with_the_second(register: int, words: Words | None) -> None:
