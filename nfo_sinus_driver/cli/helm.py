@@ -69,11 +69,13 @@ class Ended(Exception):
     Something ended it; the message says what.
 
     :ivar status: the exit status, if all goes well from then on.
+    :ivar signal: the name of the signal that did it; ``''``: something else did.
     """
 
-    def __init__(self, why: str, status: int) -> None:
+    def __init__(self, why: str, status: int, signal: str = '') -> None:
         super().__init__(why)
         self.status = status
+        self.signal = signal
 
 
 class Ear:
@@ -162,7 +164,7 @@ class Helm:
             show()
             name = self.signal(_LOOK_PERIOD)
             if name:
-                raise Ended(name, 130)
+                raise Ended(name, 130, name)
         return future.result()
 
     def finish(

@@ -90,17 +90,17 @@ class _Ride:
         """
         self._require_admitted()
         # whatever happens from here on, it is stopped
-        status, why = _FAILED, 'an error in this command'
+        status, why, signal = _FAILED, 'an error in this command', ''
         try:
             self._start()
             self._follow()
         except Ended as end:
-            status, why = end.status, str(end)
+            status, why, signal = end.status, str(end), end.signal
         except DriveError as error:
             why = say(error)
             self._screen.say(why)
         finally:
-            confirmed = self._end(why)
+            confirmed = self._end(why, signal)
         return status if confirmed else _FAILED
 
     def _require_admitted(self) -> None:
@@ -163,7 +163,7 @@ class _Ride:
             if name:
                 # without --for this is how one ends it
                 wanted = name == 'SIGINT' and options.seconds is None
-                raise Ended(name, 0 if wanted else _INTERRUPTED)
+                raise Ended(name, 0 if wanted else _INTERRUPTED, name)
             if not drive.armed:
                 raise Ended(self._why_disarmed(), _FAILED)
             if self._screen.gone:
@@ -185,20 +185,20 @@ class _Ride:
             self._helm.signal(0.01)
         return 'it was stopped'
 
-    def _end(self, why: str) -> bool:
+    def _end(self, why: str, signal: str) -> bool:
         """Stop the motor and give control back; true when all of it was confirmed."""
         if self._drive.identity is None:
             return True
         confirmed = False
         try:
-            if why.startswith('SIG'):
-                self._screen.say(f'{spoken(why)}: stopping the motor')
+            if signal:
+                self._screen.say(f'{spoken(signal)}: stopping the motor')
             confirmed = self._stopping.stop()
             if confirmed:
                 told = self._stopping.answer
                 self._screen.say(say(told))
                 # who ended it so is in a hurry, or not there any more
-                hurry = (why.startswith('SIG') and why != 'SIGINT') or self._screen.gone
+                hurry = signal not in ('', 'SIGINT') or self._screen.gone
                 confirmed = self._stopping.give_back(SHUTDOWN_TIMEOUT if hurry else math.inf)
                 if confirmed and self._stopping.answer != told:
                     self._screen.say(say(self._stopping.answer))

@@ -538,7 +538,7 @@ MUTANTS = (
         'in any order: a clean-up does not stop the motor',
         _DRIVE,
         '            return await self._controller.release(timeout)\n',
-        "            return ''\n",
+        '            return Report(Cause.ONLY_WATCHED)\n',
         _OPTIMAL_SCMD,
     ),
     Mutant(
