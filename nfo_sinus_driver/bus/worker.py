@@ -55,11 +55,12 @@ from nfo_sinus_driver.bus.tasks import read_in_parts
 from nfo_sinus_driver.bus.timers import set_timer_slack
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import Keeper
+from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Reconnect
 from nfo_sinus_driver.link import Reply
 
 _log = logging.getLogger(__name__)
@@ -78,7 +79,7 @@ class Bus:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._port = Keeper(link)
+        self._port = Reconnect(link)
         self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
         self._awake = threading.Event()
         #: Which units do not answer, for coroutines on the worker.
@@ -139,9 +140,9 @@ class Bus:
             self._enter(slot)
 
     @property
-    def space(self) -> str:
-        """How parameters are addressed on this line: ``modbus`` or ``classic``."""
-        return self._link.space
+    def protocol(self) -> LineProtocol:
+        """What this line speaks."""
+        return self._link.protocol
 
     @property
     def alive(self) -> bool:
@@ -157,9 +158,9 @@ class Bus:
         """Why the port is not open, or ``None`` when it is."""
         return None if self._port.is_open else self._port.error
 
-    def use_probes(self, unit: int, probes: tuple[Address, ...]) -> None:
+    def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
         """Tell the link which parameters of a unit it may read to find out if it hears it."""
-        self.call(lambda: self._link.use_probes(unit, probes))
+        self.call(lambda: self._link.use_resync_reads(unit, addresses))
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
@@ -461,7 +462,7 @@ class Bus:
         self.silences.note(unit, now, error, now - started)
         self._scheduler.took(now - started)
         if isinstance(error, PortError):
-            self._port.lose(error, now + REOPEN_PERIOD)
+            self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
             self.recorder.transaction(unit, now, now - started, error)
 

@@ -25,11 +25,9 @@ from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
-from nfo_sinus_driver.drive.settings import ADDRESSES
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.drive.settings import require_address
-from nfo_sinus_driver.link.open import PROTOCOLS
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
@@ -63,14 +61,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     for name, default in defaults.items():
         if not hasattr(options, name):
             setattr(options, name, default)
-    protocol = 'classic' if options.protocol == 'classic' else 'modbus'
+    protocol = PROTOCOLS[options.protocol]
     if options.verb == 'scan' and not options.addresses:
-        options.addresses = tuple(filter(None, ADDRESSES[protocol]))
+        options.addresses = tuple(filter(None, protocol.units))
     against = getattr(options, 'against', None)
     named = (options.address, *getattr(options, 'addresses', ()))
     try:
         for address in named if against is None else (*named, against):
-            require_address(address, protocol)
+            protocol.require_unit(address)
     except ValueError as error:
         parser.error(str(error))
     return options

@@ -40,13 +40,13 @@ from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.open import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
-#: Parity and stop bits of Modbus [M0 §6.2.2], the likeliest first.
+#: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
@@ -128,16 +128,15 @@ def _write_params(
 
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
-    factory = PROTOCOLS[options.protocol]
-    if options.protocol == 'modbus_tcp':
+    protocol = PROTOCOLS[options.protocol]
+    if not protocol.char_formats:
         # the line is that of the gateway
         return [(0, '')]
     if options.all_settings:
-        bits = (7, 8) if factory.data_bits is None else (factory.data_bits,)
-        formats = [f'{data_bits}{parity}' for data_bits in bits for parity in _PARITIES]
+        formats = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
         return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in formats]
     return [
-        (options.baud_rate or factory.baud_rate, options.char_format or factory.char_format)
+        (options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)
     ]
 
 

@@ -21,19 +21,15 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
 from collections.abc import Mapping
-from concurrent.futures import Future
 import math
 import time
 from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.trouble import Trouble
@@ -51,18 +47,7 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.commands import carry_out
-from nfo_sinus_driver.drive.controller import Controller
-from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
@@ -79,22 +64,12 @@ class Remote:
     """
 
     def __init__(self, bus: Bus, settings: DriveSettings) -> None:
-        self._bus = bus
+        self._drive = drive = Drive(bus, settings, self)
         self.address = settings.address
-        self.model: Family = load_family(settings.model)
-        self.registers = Registers(bus, settings.address, self.model, settings.retries)
-        self.inverter = Inverter(self.model, self.registers, self, settings)
-        controller = None
-        if settings.control_method != 'monitor':
-            commands = Commands(settings, self.registers)
-            setpoint = Setpoint(
-                bus, settings.address, self.registers, self.inverter, lambda reason: None
-            )
-            controller = Controller(bus, self.inverter, commands, setpoint)
-        self._procedures = Procedures(bus, self.inverter, controller)
-        self.parameters = Parameters(
-            bus, self.inverter, self.registers, self._procedures, self._run, self._count
-        )
+        self.model: Family = drive.model
+        self.registers = drive.registers
+        self.inverter = drive.inverter
+        self.parameters = drive.parameters
         self._step: Callable[[], None] = lambda: None
 
     def __str__(self) -> str:
@@ -102,7 +77,7 @@ class Remote:
 
     def do(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
         """Run a coroutine on the bus and return its result."""
-        return self._run(command).result()
+        return self._drive.run(command).result()
 
     def identify(self, *, thoroughly: bool = True) -> Identity:
         """
@@ -110,13 +85,8 @@ class Remote:
 
         :param thoroughly: also ask for model and serial number.
         """
-
-        async def ask() -> Identity:
-            identity = await self.inverter.identify()
-            return await self.inverter.introduce() if thoroughly else identity
-
         try:
-            return self.do(ask)
+            return self._drive.identify(thoroughly=thoroughly).result()
         except DriveError as error:
             if not isinstance(error.__cause__, Refused):
                 raise
@@ -126,7 +96,7 @@ class Remote:
 
     def look(self) -> InverterStatus:
         """Read the status, without acknowledging anything."""
-        return self.do(lambda: self.inverter.look(Priority.SERVICE))
+        return self._drive.read_status().result()
 
     def read(self, only: Collection[str] | None = None) -> Mapping[str, Value]:
         """Read the settings of the drive, or some of them, and return those that it has."""
@@ -139,33 +109,15 @@ class Remote:
 
     def error_log(self, most: int) -> tuple[LogEntry, ...]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
-        log = ErrorLog(self.inverter, self.registers, self._procedures)
-        return self.do(lambda: log.read_now(most))
+        return self._drive.error_log(most).result()
 
     def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
-        steps = self.model.profile.in_charge(self.inverter.seen)
-        return self.do(lambda: carry_out(steps, self.registers, Priority.SERVICE))
+        return self._drive.method_in_charge().result()
 
     def measure(self, key: str) -> Value:
         """Read one value."""
-        return self.do(lambda: self.registers.read(key, Priority.SERVICE))
-
-    def _run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        return self._bus.run(self._explained(command))
-
-    async def _explained(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
-        known = self.inverter.identity is not None
-        try:
-            return await command()
-        except LinkError as error:
-            raise DriveError(explain(error, self.address, known=known)) from error
-        except Cancelled:
-            raise DriveError(Report(Cause.ENDING)) from None
-
-    def _count(self, keys: Collection[str]) -> None:
-        for _ in keys:
-            self._step()
+        return self._drive.measure(key).result()
 
     # --- what the layers below have to tell ---------------------------------------------------
 
@@ -181,7 +133,9 @@ class Remote:
         """Nothing: nobody polls."""
 
     def on_parameters(self, keys: Collection[str]) -> None:
-        """Nothing: the values are looked at when all are read."""
+        """Count those that were read."""
+        for _ in keys:
+            self._step()
 
     def on_log_entry(self, entry: LogEntry) -> None:
         """Nothing: nobody watches the log."""

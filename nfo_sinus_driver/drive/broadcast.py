@@ -23,14 +23,6 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.link import Address
 
-#: The address that every drive listens to and none answers [M0 §6.1.2].
-EVERYBODY = 95
-
-
-def can_broadcast(bus: Bus) -> bool:
-    """Tell whether the protocol of a line has a broadcast that every drive obeys."""
-    return bus.space == 'classic'
-
 
 async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
     """
@@ -39,10 +31,13 @@ async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
     :param models: those that are on the line.
     :raises LinkError: the port is lost.
     """
+    everybody = bus.protocol.broadcast
+    assert everybody is not None, 'the protocol has a broadcast'
+    addressing = bus.protocol.addressing
     for model in dict.fromkeys(models):
         stop = model.profile.broadcast_stop
         if stop is not None:
             parameter = model[stop.key]
-            address = Address(*parameter.at(bus.space).place)
-            data = parameter.encode(stop.value, bus.space)
-            await bus.write(EVERYBODY, address, data, Priority.STOP)
+            address = Address(*parameter.at(addressing).place)
+            data = parameter.encode(stop.value, addressing)
+            await bus.write(everybody, address, data, Priority.STOP)

@@ -41,7 +41,8 @@ async def detect_model(bus: Bus, unit: int) -> str:
 
     :raises DriveError: it does not answer, or several are left; the message says what to do.
     """
-    models = [model for model in map(load_family, families()) if _speaks(model, bus.space)]
+    addressing = bus.protocol.addressing
+    models = [model for model in map(load_family, families()) if _speaks(model, addressing)]
     try:
         if len(models) > 1 and await bus.identify(unit, Priority.SERVICE) != Identification():
             models = [model for model in models if model.profile.names_itself]
@@ -66,7 +67,7 @@ def _speaks(model: Family, protocol: str) -> bool:
 
 
 async def _has(bus: Bus, unit: int, model: Family, key: str) -> bool:
-    address = Address(*model[key].at(bus.space).place)
+    address = Address(*model[key].at(bus.protocol.addressing).place)
     try:
         await bus.read(unit, address, Priority.SERVICE)
     except Refused:

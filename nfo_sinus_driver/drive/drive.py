@@ -34,9 +34,11 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
@@ -115,7 +117,7 @@ class Drive:
         self._procedures = procedures = Procedures(bus, self._inverter, self._controller)
         #: The settings of the drive.
         self.parameters = Parameters(
-            bus, self._inverter, self._registers, procedures, self._run, self._take_parameters
+            bus, self._inverter, self._registers, procedures, self.run, self._take_parameters
         )
         self._own_timeout = OwnTimeout(
             self._inverter, self.parameters, commanded=self._controller is not None
@@ -144,6 +146,16 @@ class Drive:
     def model(self) -> Family:
         """What the catalog knows of its family."""
         return self._inverter.model
+
+    @property
+    def inverter(self) -> Inverter:
+        """What is known of it; its methods are for coroutines on the bus."""
+        return self._inverter
+
+    @property
+    def registers(self) -> Registers:
+        """Its parameters, for coroutines on the bus."""
+        return self._registers
 
     @property
     def snapshot(self) -> Snapshot:
@@ -208,7 +220,7 @@ class Drive:
         :param patient: repeat the first request when nobody answers; who tries again anyway saves
             the other drives on the line that time.
         """
-        return self._run(lambda: self._connect_first(patient, parameters))
+        return self.run(lambda: self._connect_first(patient, parameters))
 
     def require_standing(self) -> Future[None]:
         """
@@ -216,7 +228,7 @@ class Drive:
 
         It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
         """
-        return self._run(lambda: self._require_standing())
+        return self.run(lambda: self._require_standing())
 
     def disconnect(self, timeout: float) -> Future[Report]:
         """
@@ -224,7 +236,7 @@ class Drive:
 
         :param timeout: how long the motor may take to stand before it is left to its ramp, s.
         """
-        return self._run(lambda: self._disconnect(timeout))
+        return self.run(lambda: self._disconnect(timeout))
 
     def activate(self) -> None:
         """Poll at full rate and measure."""
@@ -236,7 +248,7 @@ class Drive:
 
         The result is ``None`` where there is nothing to stop.
         """
-        return self._run(lambda: self._deactivate())
+        return self.run(lambda: self._deactivate())
 
     def stop_for_good(self, patience: float) -> Future[Report | None]:
         """
@@ -244,37 +256,67 @@ class Drive:
 
         :param patience: how long the drive may take to confirm it, s.
         """
-        return self._run(lambda: self._stop_for_good(patience))
+        return self.run(lambda: self._stop_for_good(patience))
 
     def enable(self) -> Future[Report]:
         """Take control and run at set-point 0, then follow set-points that come in."""
-        return self._run(lambda: self._enable())
+        return self.run(lambda: self._enable())
 
     def stop(self) -> Future[Report]:
         """Stop as the drive's StMode says; control is kept."""
-        return self._run(lambda: self._command(lambda controller: controller.stop()))
+        return self.run(lambda: self._command(lambda controller: controller.stop()))
 
     def quick_stop(self) -> Future[Report]:
         """Release the motor at once: it coasts."""
-        return self._run(lambda: self._command(lambda controller: controller.quick_stop()))
+        return self.run(lambda: self._command(lambda controller: controller.quick_stop()))
 
     def acknowledge(self) -> Future[Report]:
         """Acknowledge a fault."""
-        return self._run(
+        return self.run(
             lambda: self._command(lambda controller: controller.acknowledge(), connected=True)
         )
 
+    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
+        """Run a coroutine on the bus; what goes wrong on the line is explained."""
+        return self._bus.run(self._explained(command))
+
+    def identify(self, *, thoroughly: bool = True) -> Future[Identity]:
+        """
+        Find out who answers, without connecting to it: a motor that runs runs on.
+
+        :param thoroughly: also ask for model and serial number.
+        """
+
+        async def ask() -> Identity:
+            identity = await self._inverter.identify()
+            return await self._inverter.introduce() if thoroughly else identity
+
+        return self.run(ask)
+
+    def read_status(self) -> Future[InverterStatus]:
+        """Read the status, connected or not, without acknowledging anything."""
+        return self.run(lambda: self._inverter.look(Priority.SERVICE))
+
+    def measure(self, key: str) -> Future[Value]:
+        """Read one parameter, connected or not."""
+        return self.run(lambda: self._registers.read(key, Priority.SERVICE))
+
+    def method_in_charge(self) -> Future[str]:
+        """Return the control method by which the bus runs it, or would be able to stop it."""
+        steps = self.model.profile.in_charge(self._inverter.seen)
+        return self.run(lambda: carry_out(steps, self._registers, Priority.SERVICE))
+
     def error_log(self, most: int = 0) -> Future[tuple[LogEntry, ...]]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
-        return self._run(lambda: self._read_error_log(most))
+        return self.run(lambda: self._read_error_log(most))
 
     def erase_error_log(self) -> Future[Report]:
         """Erase the error log; the motor must stand."""
-        return self._run(lambda: self._unless_closed(self._error_log.erase_now))
+        return self.run(lambda: self._unless_closed(self._error_log.erase_now))
 
     def reset_energy(self) -> Future[Report]:
         """Reset the kWh counter; the motor must stand."""
-        return self._run(lambda: self._unless_closed(self._error_log.reset_energy_now))
+        return self.run(lambda: self._unless_closed(self._error_log.reset_energy_now))
 
     def tune(
         self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
@@ -285,15 +327,15 @@ class Drive:
         :param progress: told on the bus what the drive says, and how long it takes already, s:
             whenever the inverter status changes, and twice a second.
         """
-        return self._run(lambda: self._tune(procedure, progress))
+        return self.run(lambda: self._tune(procedure, progress))
 
     def cancel_tuning(self) -> Future[Report | None]:
         """Stop a tuning; does nothing else, and nothing if there is none."""
-        return self._run(self._procedures.abort)
+        return self.run(self._procedures.abort)
 
     def set_drive_timeout(self, seconds: float) -> Future[Sequence[Change]]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return self._run(lambda: self._own_timeout.set_now(seconds))
+        return self.run(lambda: self._own_timeout.set_now(seconds))
 
     def set_setpoint(self, value: float) -> None:
         """
@@ -308,9 +350,6 @@ class Drive:
         self._setpoint.request(value)
 
     # --- on the bus ---------------------------------------------------------------------------
-
-    def _run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        return self._bus.run(self._explained(command))
 
     async def _explained(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
         try:
@@ -347,7 +386,8 @@ class Drive:
         return answer
 
     async def _read_error_log(self, most: int) -> tuple[LogEntry, ...]:
-        self._require_connected()
+        if self._watch.begun:
+            self._require_connected()
         return await self._error_log.read_now(most)
 
     async def _unless_closed(self, procedure: Callable[[], Awaitable[Report]]) -> Report:

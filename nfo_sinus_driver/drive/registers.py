@@ -44,10 +44,7 @@ _SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
-_PROBES = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
-#: What is less on one protocol than on the other, whose register is the same: a drive with an
-#: address beyond those of Classic could not be asked again [C10].
-_HIGHEST = {('classic', Role.BUS_ADDRESS): Fraction(94)}
+_RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
 
 
 class Registers:
@@ -68,9 +65,9 @@ class Registers:
         self._odd: dict[str, bytes] = {}
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
-        self.protocol = bus.space
-        probes = (model.key(role) for role in _PROBES if role in model.roles)
-        bus.use_probes(unit, tuple(self.address(key) for key in probes))
+        self.protocol = bus.protocol.addressing
+        reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
+        bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
@@ -81,7 +78,7 @@ class Registers:
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
-        return self.protocol == 'modbus' and self.model.profile.writes_and_reads
+        return self._bus.protocol.writes_and_reads and self.model.profile.writes_and_reads
 
     def encode(self, key: str, value: Value) -> bytes:
         """
@@ -132,8 +129,11 @@ class Registers:
         return float(low), float(high), float(parameter.factor(self.protocol))
 
     def _highest(self, key: str) -> Fraction | None:
-        role = self.model.role_of.get(key)
-        return None if role is None else _HIGHEST.get((self.protocol, role))
+        """Return the end that the line sets: beyond it a drive could not be asked again [C10]."""
+        if self.model.role_of.get(key) is not Role.BUS_ADDRESS:
+            return None
+        highest = Fraction(self._bus.protocol.units[-1])
+        return highest if highest < self.model[key].span(self.protocol)[1] else None
 
     def number(self, key: str, data: bytes) -> float:
         """Return the value of bytes as the drive understands them."""

@@ -26,8 +26,6 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Transfer
-from nfo_sinus_driver.drive.broadcast import EVERYBODY
-from nfo_sinus_driver.drive.broadcast import can_broadcast
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.setpoint import Request
@@ -104,7 +102,9 @@ class SetpointAll:
         for setpoint in members:
             setpoint.take(request)
         due = [write for setpoint in members for write in setpoint.due(request)]
-        return self._bus.write(EVERYBODY, *due[0], Priority.SETPOINT) if due else None
+        everybody = self._bus.protocol.broadcast
+        assert everybody is not None, 'this is one of the reasons why not'
+        return self._bus.write(everybody, *due[0], Priority.SETPOINT) if due else None
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         for setpoint in self._setpoints().values():
@@ -115,7 +115,7 @@ class SetpointAll:
                 setpoint.was_missed(error)
 
     def _why_not(self, setpoints: Mapping[str, Setpoint]) -> Report | None:
-        if not can_broadcast(self._bus):
+        if self._bus.protocol.broadcast is None:
             return Report(Cause.NO_BROADCAST)
         for name, setpoint in setpoints.items():
             if (refused := setpoint.why_not_shared(name)) is not None:

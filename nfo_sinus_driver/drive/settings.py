@@ -24,6 +24,7 @@ from nfo_sinus_driver.catalog import Profile
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.catalog import usual_family
+from nfo_sinus_driver.link import PROTOCOLS
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
@@ -68,30 +69,13 @@ _LONGEST_DRIVE_TIMEOUT = 25.0
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
-#: On Classic, the one of a drive that is alone on its line, whatever its own is [M0 §6.1.2].
-POINT_TO_POINT = 0
-#: What a drive can be asked by: [M0 §6.2.2]; [M0 §6.1.2], where 95 is everybody [C10].
-ADDRESSES = {'modbus': range(1, 248), 'classic': range(POINT_TO_POINT, 95)}
-
-
-def require_address(address: int, protocol: str) -> None:
-    """
-    Make sure that a drive can be asked by an address.
-
-    :raises ValueError: it cannot, and which there are.
-    """
-    allowed = ADDRESSES[protocol]
-    if address not in allowed:
-        name = protocol.title()
-        raise ValueError(f'address {address}: {name} has {allowed[0]} to {allowed[-1]}')
-
 
 @dataclass(frozen=True)
 class DriveSettings:
     """
     How one drive is to be treated; the fields are the parameters of its node.
 
-    :ivar address: one of :data:`ADDRESSES`, whichever the line has.
+    :ivar address: one that the protocol of the line has.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
@@ -146,7 +130,7 @@ class DriveSettings:
         self._require_known_method()
         modes = _control_modes(self.model)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
-        if not any(self.address in allowed for allowed in ADDRESSES.values()):
+        if not any(self.address in protocol.units for protocol in PROTOCOLS.values()):
             raise ValueError(f'address {self.address}: allowed are 0 to 247')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
         _between('idle_poll_rate', self.idle_poll_rate, 0, 1000, 'Hz (0: as poll_rate)')

@@ -28,18 +28,21 @@ from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.keeper import Keeper
-from nfo_sinus_driver.link.open import line_settings
-from nfo_sinus_driver.link.open import open_link
+from nfo_sinus_driver.link.protocol import LineProtocol
+from nfo_sinus_driver.link.protocols import PROTOCOLS
+from nfo_sinus_driver.link.protocols import line_settings
+from nfo_sinus_driver.link.protocols import open_link
+from nfo_sinus_driver.link.reconnect import Reconnect
 from nfo_sinus_driver.link.settings import LineSettings
 
 __all__ = [
+    'PROTOCOLS',
     'Address',
     'DamagedAnswer',
     'GatewaySilent',
     'Identification',
     'Inquiry',
-    'Keeper',
+    'LineProtocol',
     'LineSettings',
     'Link',
     'LinkError',
@@ -47,6 +50,7 @@ __all__ = [
     'NoPath',
     'NotReady',
     'PortError',
+    'Reconnect',
     'Refused',
     'Reply',
     'consistent_read',

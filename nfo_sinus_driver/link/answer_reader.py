@@ -60,12 +60,12 @@ class AnswerReader(ABC, Generic[_T]):
 
     @property
     @abstractmethod
-    def missing(self) -> int:
+    def bytes_needed(self) -> int:
         """How many bytes have to come yet, at least, as far as those that came tell."""
 
     @property
     @abstractmethod
-    def patience(self) -> float:
+    def inter_byte_timeout(self) -> float:
         """How long a pause may last before the next byte comes, s."""
 
     def feed(self, data: bytes) -> _T | None:

@@ -20,7 +20,9 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_ascii
+from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: Frames need no silence between them, but transmitters take a moment to switch, characters.
@@ -37,6 +39,17 @@ class AsciiLink(SerialLink):
     would leave the line unused for that, so no pause may be longer than it may take to begin one.
     """
 
+    protocol = LineProtocol(
+        name='modbus_ascii',
+        addressing='modbus',
+        units=UNITS,
+        baud_rate=19200,
+        char_format='7E1',
+        char_formats=('7E1', '7O1', '7N2', '7N1', '7E2', '7O2'),
+        identifies=True,
+        writes_and_reads=True,
+    )
+
     @property
     def _gap(self) -> float:
         return _SWITCHING * self._settings.char_time
@@ -45,8 +58,8 @@ class AsciiLink(SerialLink):
         return modbus_ascii.encode(request)
 
     def _reader(self, request: Request[_T]) -> modbus_ascii.AsciiReader[_T]:
-        pause = min(modbus_ascii.PAUSE, self._settings.response_timeout)
-        return modbus_ascii.AsciiReader(request, pause)
+        timeout = min(modbus_ascii.INTER_BYTE_TIMEOUT, self._settings.response_timeout)
+        return modbus_ascii.AsciiReader(request, timeout)
 
     def _frame_length(self, message_length: int) -> int:
         return modbus_ascii.length(message_length)

@@ -38,7 +38,6 @@ from nfo_sinus_driver.link.classic_refusal import MODE
 from nfo_sinus_driver.link.classic_refusal import SIO_ERR
 from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
 from nfo_sinus_driver.link.consistent_read import consistent_read
-from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -47,16 +46,16 @@ from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.serial_link import Port
+from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.settings import LineSettings
 
-#: Bytes in a message.
-_WORD = 2
-#: SiProt of both firmwares [M0 §6.1.2], [M2 §4], [C5].
-CHAR_FORMATS = ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1')
-
+#: What a message carries.
+_WORD = struct.Struct('>H')
 #: Pauses within an answer may last this long, s: no manual limits them [C86].
-_LUMP = 0.03
+_INTER_BYTE_TIMEOUT = 0.03
 #: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
 _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
@@ -68,7 +67,7 @@ _TURNAROUND_MARGIN = 2.0
 _KEPT_OF_SLOWEST = 0.98
 #: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
 #: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
-#: certain, see Doubts.
+#: certain, see LateReplies.
 _EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
 #: How old the inverter status may be to show that a serial fault is new, s.
 _FRESH = 1.0
@@ -90,10 +89,10 @@ class ClassicLink:
 
     A REPLY names its parameter, ACK and NAK name nothing. So whenever an answer is missing or
     damaged, or bytes come that nobody asked for, the kinds of answers that may still come are in
-    doubt (:class:`Doubts`). A parameter whose REPLY is in doubt is only read after another one has
-    been. A write is never kept waiting, for it may be a stop; but if its answer is in doubt it is
-    not believed: the line is cleared by reading something, and :class:`DamagedAnswer` says that
-    nobody knows.
+    quarantine (:class:`LateReplies`). A parameter whose REPLY is there is only read after another
+    one has been. A write is never kept waiting, for it may be a stop; but if its answer is there
+    it is not believed: the line is cleared by reading something, and :class:`DamagedAnswer` says
+    that nobody knows.
 
     An adapter that echoes what is sent is noticed at the first request; from then on an answer
     counts only behind the echo.
@@ -107,26 +106,42 @@ class ClassicLink:
     answered, ACK and NAK when they begin again within two characters; later ones may pass for the
     answer, a REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that
     protects them, so choose a format that has it.
-
-    :raises ValueError: a character format that no firmware has.
     """
 
-    space = 'classic'
+    #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
+    #: [M0 §6.1.2], [C10].
+    protocol = LineProtocol(
+        name='classic',
+        addressing='classic',
+        units=range(classic.POINT_TO_POINT, BROADCAST),
+        baud_rate=9600,
+        char_format='7E1',
+        char_formats=('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1'),
+        broadcast=BROADCAST,
+        point_to_point=classic.POINT_TO_POINT,
+    )
 
     def __init__(self, port: Port, settings: LineSettings) -> None:
-        if settings.char_format not in CHAR_FORMATS:
-            raise ValueError(
-                f'char_format {settings.char_format!r}: classic has {", ".join(CHAR_FORMATS)}'
-            )
         self._port = port
         self._settings = settings
-        self._doubts: Doubts[Kind] = Doubts(settings.response_timeout)
+        self._late: LateReplies[Request, Kind] = LateReplies(
+            settings.response_timeout, classic.kinds
+        )
         #: The inverter status that each unit told last, and when.
         self._inv_st: dict[int, tuple[int, float]] = {}
         self._last: _Answer | None = None
         self._echoes = False
         #: What the slowest unit took lately until its answer began, s.
         self._slowest = _TURNAROUND
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> ClassicLink:
+        """
+        Return the link on a port.
+
+        :raises ValueError: what is named is no port; the message says what to write.
+        """
+        return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
         """
@@ -139,12 +154,12 @@ class ClassicLink:
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         self._port.close()
-        self._doubts.clear()
+        self._late.clear()
         self._inv_st.clear()
         self._last = None
         self._echoes = False
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
         Take parameters that are safe to read; here those are asked that every firmware has.
 
@@ -154,7 +169,10 @@ class ClassicLink:
 
     def parts(self, address: Address) -> tuple[Address, ...]:
         """Return the words: a message carries one."""
-        return tuple(Address(address.space, id_, None, _WORD) for id_ in _ids(address))
+        if address.sub_index is None:
+            return (address,)
+        ids = address.index, address.sub_index
+        return tuple(Address(address.space, id_, None, _WORD.size) for id_ in ids)
 
     def read(self, unit: int, address: Address) -> Reply:
         """
@@ -164,7 +182,7 @@ class ClassicLink:
         """
         if address.sub_index is None:
             word, arrived = self._enquire(unit, address.index)
-            return Reply(word.to_bytes(_WORD, 'big'), arrived)
+            return Reply(_WORD.pack(word), arrived)
         steps = consistent_read(unit, self.parts(address))
         part = next(steps)
         while True:
@@ -178,21 +196,12 @@ class ClassicLink:
         """
         Write one parameter; unit 95 means all of them, and nobody confirms it.
 
-        Of two words the low one is written first, as they are numbered; the manuals have no
-        such parameter, so nothing says how. A refused second word leaves the first one written.
+        It has one word: nobody writes what has two, and no manual says how.
 
         :raises LinkError: as its subclasses say.
         """
-        arrived = 0.0
-        ids = _ids(address)
-        words = struct.unpack(f'>{len(ids)}H', data)
-        for position, (id_, word) in enumerate(zip(ids, words, strict=True)):
-            try:
-                arrived = self._select(Select(unit, id_, word))
-            except LinkError as error:
-                error.maybe_done = error.maybe_done or position > 0
-                raise
-        return Reply(b'', arrived)
+        (word,) = _WORD.unpack(data)
+        return Reply(b'', self._select(Select(unit, address.index, word)))
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
@@ -219,7 +228,7 @@ class ClassicLink:
             with contextlib.suppress(NoAnswer, DamagedAnswer):
                 _, _, early = self._transact(request)
                 if early:
-                    self._distrust(request)
+                    self._late.expect(request, time.monotonic())
             return self.write(unit, address, data)
         except LinkError as error:
             error.maybe_done = True
@@ -243,7 +252,7 @@ class ClassicLink:
             self._listen(request)
         answer, arrived, early = self._transact(request)
         if early:
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
             self._clear(unit)
             self._listen(request)
             answer, arrived, _ = self._transact(request)
@@ -312,22 +321,18 @@ class ClassicLink:
         """
         Read something that cannot be mistaken: what was late has come before it.
 
-        :raises NotReady: everything that could be read is in doubt.
+        :raises NotReady: everything that could be read is in quarantine.
         """
         self._enquire(unit, self._first_certain(unit))
 
     def _first_certain(self, unit: int, *numbers: int) -> int:
         """
-        Return the first of some parameters, or of those to be read at any time, not in doubt.
+        Return the first of some parameters, or of those to be read at any time, not in quarantine.
 
         :raises NotReady: all are.
         """
         questions = ((number, (number,)) for number in (*numbers, *_EVERYWHERE))
-        return self._doubts.first_certain(unit, questions)
-
-    def _distrust(self, request: Request) -> None:
-        """Expect an answer to a request, one more than has come."""
-        self._doubts.add(request.unit, classic.kinds(request))
+        return self._late.first_certain(unit, questions, time.monotonic())
 
     def _listen(self, request: Request) -> None:
         """Take what came unasked; wait for it where it could pass for the answer to a request."""
@@ -338,7 +343,7 @@ class ClassicLink:
             until = max(until, last.arrived + pause)
         while True:
             if self._port.read(until) and last:
-                self._distrust(last.request)
+                self._late.expect(last.request, time.monotonic())
             if time.monotonic() >= until:
                 return
 
@@ -361,17 +366,17 @@ class ClassicLink:
         try:
             answer, arrived, more = self._receive(request, sent)
         except (NoAnswer, DamagedAnswer):
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
             # if the adapter still echoes, the next echo will tell
             self._echoes = False
             raise
         # units answer in order: whatever was still to come has come before this
-        self._doubts.end(request.unit)
+        self._late.release(request.unit)
         self._last = _Answer(request, classic.kind(answer), arrived)
         took = arrived - sent - len(classic.encode(answer)) * self._settings.char_time
         self._slowest = max(took, _KEPT_OF_SLOWEST * self._slowest)
         if more:
-            self._distrust(request)
+            self._late.expect(request, time.monotonic())
         again = before is not None and before.request == request and isinstance(answer, Value)
         # a character less, for no clock is exact
         least = (classic.LONGEST_ANSWER - 1) * self._settings.char_time
@@ -379,8 +384,8 @@ class ClassicLink:
 
     def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
         """Return the answer, when it came, and whether more came behind it."""
-        doubt = self._doubts.of(request.unit)
-        longest = classic.LONGEST_ANSWER * self._settings.char_time + _LUMP
+        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        longest = classic.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
         deadline = sent + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         last_chance = deadline + 2 * longest
@@ -401,7 +406,7 @@ class ClassicLink:
                     self._echoes = echoed = True
                     came -= len(classic.encode(request))
                 elif echoed and classic.answers(message, request):
-                    if classic.kind(message) not in doubt:
+                    if classic.kind(message) not in quarantined:
                         return message, now, bool(messages[number:] or reader.pending)
                     if isinstance(request, Select):
                         raise _Ambiguous(
@@ -411,11 +416,6 @@ class ClassicLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
-
-
-def _ids(address: Address) -> tuple[int, ...]:
-    """Return the id of each word, the low one first."""
-    return (address.index,) if address.sub_index is None else (address.index, address.sub_index)
 
 
 class NothingToAsk:

@@ -41,7 +41,7 @@ class Echo:
         self._held = self.before = b''
 
     @property
-    def missing(self) -> int:
+    def bytes_needed(self) -> int:
         """How many bytes of the echo have to come yet."""
         return max(0, len(self._awaited) - len(self._held))
 

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 from typing import Protocol
 
+from nfo_sinus_driver.link.protocol import LineProtocol
+
 
 @dataclass(frozen=True)
 class Address:
@@ -97,10 +99,10 @@ class Link(Protocol):
     """
     One line to several units, used by one thread.
 
-    :ivar space: how parameters are addressed: ``modbus`` by register, ``classic`` by id.
+    :ivar protocol: what it speaks.
     """
 
-    space: str
+    protocol: LineProtocol
 
     def open(self) -> None:
         """
@@ -157,7 +159,7 @@ class Link(Protocol):
     def identify(self, unit: int) -> Inquiry:
         """Return the questions by which a unit tells who it is; nothing is sent yet."""
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
         Name parameters of different sizes that are safe to read at any time.
 

@@ -32,9 +32,9 @@ from nfo_sinus_driver.link.answer_reader import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 
 #: How long a pause between two characters of a frame may last, s.
-PAUSE = 1.0
+INTER_BYTE_TIMEOUT = 1.0
 #: How long one may last where no frame is begun: adapters hand characters over in lumps, s.
-_LUMP = 0.03
+_IDLE_TIMEOUT = 0.03
 
 _FRAME = re.compile(rb':((?:[0-9A-Fa-f]{2})+)\r\n')
 _BEGUN = re.compile(rb':([0-9A-Fa-f]*)\r?\Z')
@@ -63,12 +63,14 @@ class AsciiReader(AnswerReader[_T]):
     """
     Finds an answer in ASCII frames.
 
-    :param pause: how long a frame that has begun may pause, s.
+    :param inter_byte_timeout: how long a frame that has begun may pause, s.
     """
 
-    def __init__(self, request: Request[_T], pause: float = PAUSE) -> None:
+    def __init__(
+        self, request: Request[_T], inter_byte_timeout: float = INTER_BYTE_TIMEOUT
+    ) -> None:
         super().__init__(request)
-        self._pause = pause
+        self._inter_byte_timeout = inter_byte_timeout
         self._longest = length(request.answer_length)
         self._heads = [
             head.hex().upper().encode()
@@ -76,7 +78,7 @@ class AsciiReader(AnswerReader[_T]):
         ]
 
     @property
-    def missing(self) -> int:
+    def bytes_needed(self) -> int:
         """How many characters have to come yet, at least, as far as those that came tell."""
         begun = self._begun()
         digits = begun[1] if begun else b''
@@ -85,9 +87,9 @@ class AsciiReader(AnswerReader[_T]):
         return max(1, length(self._request.measure(beginning)) - come)
 
     @property
-    def patience(self) -> float:
+    def inter_byte_timeout(self) -> float:
         """How long a pause may last before the next character comes, s."""
-        return self._pause if self._begun() else _LUMP
+        return self._inter_byte_timeout if self._begun() else _IDLE_TIMEOUT
 
     def _messages(self) -> Iterator[tuple[int, int, bytes]]:
         for frame in _FRAME.finditer(self._buffer):

@@ -28,6 +28,10 @@ from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
+from nfo_sinus_driver.link.protocol import LineProtocol
+
+#: The addresses of drives [M0 §6.2.2].
+UNITS = range(1, 248)
 
 _T = TypeVar('_T')
 
@@ -35,7 +39,7 @@ _T = TypeVar('_T')
 class ModbusLink(ABC):
     """A Modbus master, whatever carries its requests."""
 
-    space = 'modbus'
+    protocol: LineProtocol
 
     def parts(self, address: Address) -> tuple[Address]:
         """Return the whole: registers that belong together are read together."""

@@ -32,7 +32,7 @@ from nfo_sinus_driver.link.modbus_pdu import Request
 #: How many bytes the check sum has.
 CRC_LENGTH = 2
 #: USB adapters hand bytes over in lumps, so a pause within an answer may last this long, s.
-LUMP = 0.03
+_INTER_BYTE_TIMEOUT = 0.03
 
 _T = TypeVar('_T')
 
@@ -55,7 +55,7 @@ def encode(request: Request[object]) -> bytes:
 class RtuReader(AnswerReader[_T]):
     """Finds an answer in RTU frames: nothing but its length and check sum tells where one is."""
 
-    patience = LUMP
+    inter_byte_timeout = _INTER_BYTE_TIMEOUT
 
     def __init__(self, request: Request[_T]) -> None:
         super().__init__(request)
@@ -63,7 +63,7 @@ class RtuReader(AnswerReader[_T]):
         self._refusal_head = modbus_pdu.refusal_head(request)
 
     @property
-    def missing(self) -> int:
+    def bytes_needed(self) -> int:
         """How many bytes have to come yet, at least, as far as those that came tell."""
         begun = max(0, self._buffer.find(self._head))
         length = self._request.measure(self._buffer[begun:]) + CRC_LENGTH

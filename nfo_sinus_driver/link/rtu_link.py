@@ -20,7 +20,9 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import rtu
+from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.protocol import LineProtocol
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 _T = TypeVar('_T')
@@ -28,6 +30,17 @@ _T = TypeVar('_T')
 
 class RtuLink(SerialLink):
     """A Modbus RTU master; between frames the line is silent for t3.5."""
+
+    protocol = LineProtocol(
+        name='modbus_rtu',
+        addressing='modbus',
+        units=UNITS,
+        baud_rate=19200,
+        char_format='8E1',
+        char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
+        identifies=True,
+        writes_and_reads=True,
+    )
 
     @property
     def _gap(self) -> float:

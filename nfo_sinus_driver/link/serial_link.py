@@ -22,11 +22,9 @@ from collections.abc import Sequence
 import contextlib
 import time
 from typing import Any
-from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.link.answer_reader import AnswerReader
-from nfo_sinus_driver.link.doubts import Doubts
 from nfo_sinus_driver.link.echo import Echo
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
@@ -36,42 +34,28 @@ from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.late_replies import Doubt
+from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
-from nfo_sinus_driver.link.modbus_probes import answer_kinds
-from nfo_sinus_driver.link.modbus_probes import probes
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.resync_reads import answer_kinds
+from nfo_sinus_driver.link.resync_reads import resync_reads
 from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
 
-#: How long a line is not trusted that has told something nobody asked for, s.
-DISTRUST = 60.0
-#: How much later than its slowest answer of late a unit may answer.
-_LATER = 1.25
-#: What is left of the memory of a slow answer with each of the next.
-_DECAY = 0.95
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
 #: How long a write waits at least for a line that is not silent, s.
-_WRITE_PATIENCE = 0.02
+_WRITE_WAIT = 0.02
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
-
-
-class Port(Protocol):
-    """What carries the bytes."""
-
-    def open(self) -> None: ...  # noqa: D102
-
-    def close(self) -> None: ...  # noqa: D102
-
-    def write(self, data: bytes) -> None: ...  # noqa: D102
-
-    def read(self, until: float) -> bytes: ...  # noqa: D102
 
 
 class SerialLink(ModbusLink):
@@ -81,9 +65,9 @@ class SerialLink(ModbusLink):
     Between frames the line is silent for a gap at least, counted from the last byte seen on it.
 
     A read answer does not name its register. So whenever an answer is missing or damaged, or
-    bytes come that nobody asked for, its shape is in doubt (:class:`Doubts`): a request whose
-    answer could be confused with it is only sent after one of another shape has been answered. A
-    write is sent at once, for it may be a stop, and its answer names what was written.
+    bytes come that nobody asked for, its shape is in quarantine (:class:`LateReplies`): a request
+    whose answer could be confused with it is only sent after one of another shape has been
+    answered. A write is sent at once, for it may be a stop, and its answer names what was written.
 
     For the same reason an answer with the very bytes of the one before is not believed at once: it
     may be the one before, told twice. The right one would come when a unit answers, so until then
@@ -96,25 +80,28 @@ class SerialLink(ModbusLink):
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
-        self._doubts: Doubts[bytes] = Doubts(settings.response_timeout)
-        self._safe: dict[int, tuple[Address, ...]] = {}
+        self._late: LateReplies[Request[Any], bytes] = LateReplies(
+            settings.response_timeout, answer_kinds
+        )
+        self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         self._echo = Echo()
-        self._last: Request[Any] | None = None
-        #: The last answer of each unit, to what, and until when it may come again.
-        self._told: dict[int, tuple[bytes, Request[Any], float]] = {}
-        #: The last answer repeats the one before it, to this request.
-        self._repeats: Request[Any] | None = None
-        #: Until when an answer may well come twice.
-        self._distrust_until = 0.0
-        #: How long a unit has taken at most to answer, s, and when the last request had left.
-        self._slowest: dict[int, float] = {}
+        #: When the last request had left.
         self._sent_at = 0.0
-        #: The probe on its way is only about that.
+        #: The resync read on its way is only about that.
         self._confirming = False
         #: Other bytes came with the last answer.
         self._stray = False
         #: When the last byte was on the line, as far as we know.
         self._line_end = 0.0
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> SerialLink:
+        """
+        Return the link on a port.
+
+        :raises ValueError: what is named is no port; the message says what to write.
+        """
+        return cls(port_of(port, settings), settings)
 
     def open(self) -> None:
         """
@@ -128,18 +115,12 @@ class SerialLink(ModbusLink):
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         self._port.close()
-        self._doubts.clear()
+        self._late.clear()
         self._echo = Echo()
-        self._told.clear()
-        self._last = None
 
-    def distrust(self) -> None:
-        """Expect answers that come twice: it has been heard that they do."""
-        self._distrust_until = time.monotonic() + DISTRUST
-
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
-        self._safe[unit] = tuple(probes)
+        self._resync_addresses[unit] = tuple(addresses)
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address
@@ -154,7 +135,8 @@ class SerialLink(ModbusLink):
         """
         request = write_and_read_of(unit, address, data, source)
         self._await_silence(request)
-        if not self._doubts.of(unit).isdisjoint(answer_kinds(request)):
+        quarantined = self._late.quarantined(unit, time.monotonic())
+        if not quarantined.isdisjoint(answer_kinds(request)):
             return self.write(unit, address, data)
         return Reply(*self._ask(request))
 
@@ -183,14 +165,14 @@ class SerialLink(ModbusLink):
         """Return the answer to a request, and when its last byte came."""
         self._await_silence(request)
         # a write answer names what was written, and nobody believes it without reading back
-        probed = not isinstance(request, Write) and self._make_certain(request)
+        resynced = not isinstance(request, Write) and self._make_certain(request)
         try:
             answer = self._transact(request)
         except Refused:
             self._confirm(request)
             raise
         except LinkError as error:
-            error.heard = probed
+            error.heard = resynced
             raise
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
@@ -200,17 +182,13 @@ class SerialLink(ModbusLink):
         self._await_silence(request)
         with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
             self._transact(request)
-        if self._repeats is not None:
+        if self._late.repeated is not None:
             # it may be the one before, told twice
-            self._doubt(request)
+            self._late.expect(request, time.monotonic())
 
-    def _in_doubt(self, request: Request[Any]) -> bool:
+    def _in_quarantine(self, request: Request[Any]) -> bool:
         """Tell whether the answer to an earlier request would look like that to this one."""
-        return request.answer_head in self._doubts.of(request.unit)
-
-    def _doubt(self, request: Request[Any]) -> None:
-        """Expect an answer to a request, one more than has come."""
-        self._doubts.add(request.unit, answer_kinds(request))
+        return request.answer_head in self._late.quarantined(request.unit, time.monotonic())
 
     def _make_certain(self, request: Request[Any]) -> bool:
         """
@@ -219,14 +197,14 @@ class SerialLink(ModbusLink):
         :returns: whether it was asked, and answered.
         :raises NotReady: that cannot be told from others either.
         """
-        if not self._in_doubt(request):
+        if not self._in_quarantine(request):
             return False
-        questions = [(request, (request.answer_head,)), *self._probes(request.unit)]
-        question = self._doubts.first_certain(request.unit, questions)
+        questions = [(request, (request.answer_head,)), *self._resync_reads(request.unit)]
+        question = self._late.first_certain(request.unit, questions, time.monotonic())
         if question is request:
             return False
         try:
-            self._probe(question)
+            self._resync_read(question)
         except LinkError as error:
             # nobody has heard the request itself
             error.maybe_done = False
@@ -234,14 +212,14 @@ class SerialLink(ModbusLink):
         self._await_silence(request)
         return True
 
-    def _probes(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
-        return probes(unit, self._safe.get(unit, ()))
+    def _resync_reads(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
+        return resync_reads(unit, self._resync_addresses.get(unit, ()))
 
-    def _probe(self, probe: Request[Any]) -> None:
+    def _resync_read(self, read: Request[Any]) -> None:
         """Have a unit answer, whatever it says."""
         # a refusal that is believed tells as well as an answer that all is said
         with contextlib.suppress(Refused):
-            self._transact(probe)
+            self._transact(read)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
         """
@@ -249,29 +227,36 @@ class SerialLink(ModbusLink):
 
         :param names_it: the answer says itself what it is about.
         """
-        if self._repeats is None:
-            return
-        if time.monotonic() > self._distrust_until:
-            if not names_it and self._repeats != request:
-                self._listen(request)
-            return
-        if names_it or self._repeats == request:
-            # what it says is right, but it may come once more
-            self._doubts.add(request.unit, (request.answer_head,))
-            return
+        now = time.monotonic()
+        doubt = self._late.doubt_about(request, now, names_it=names_it)
+        if doubt is Doubt.LISTEN:
+            self._listen(request)
+        elif doubt is Doubt.ONCE_MORE:
+            self._late.quarantine(request.unit, (request.answer_head,), now)
+        elif doubt is Doubt.RESYNC:
+            self._late.expect(request, now)
+            self._resync(request)
+
+    def _resync(self, request: Request[Any]) -> None:
+        """
+        Have a unit answer something else: had another answer to the request come, it would show.
+
+        :raises DamagedAnswer: it did, or nothing that tells could be asked.
+        :raises NoAnswer: the unit does not answer.
+        """
         stray = self._stray
-        self._doubt(request)
         self._confirming = True
         try:
             stray |= self._await_silence(request)
-            self._probe(self._doubts.first_certain(request.unit, self._probes(request.unit)))
+            reads = self._resync_reads(request.unit)
+            self._resync_read(self._late.first_certain(request.unit, reads, time.monotonic()))
             if not stray and not self._stray:
                 return
         except (NotReady, NeverSilent):
             pass
         except (NoAnswer, DamagedAnswer):
-            # the right answer may be as late as that to the probe
-            self._doubt(request)
+            # the right answer may be as late as that to the other
+            self._late.expect(request, time.monotonic())
             raise
         finally:
             self._confirming = False
@@ -284,12 +269,11 @@ class SerialLink(ModbusLink):
         :raises DamagedAnswer: it came.
         """
         length = self._frame_length(request.answer_length) * self._settings.char_time
-        until = self._sent_at + _LATER * self._slowest.get(request.unit, 0.0) + length
+        until = self._sent_at + self._late.longest(request.unit) + length
         while (now := time.monotonic()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
-                self._doubt(request)
-                self.distrust()
+                self._late.heard_unasked(time.monotonic())
                 raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _await_silence(self, request: Request[Any]) -> bool:
@@ -302,8 +286,8 @@ class SerialLink(ModbusLink):
         :raises NeverSilent: there is none.
         """
         is_write = isinstance(request, (Write, WriteAndRead))
-        patience = self._write_patience if is_write else self._settings.response_timeout
-        give_up = max(self._line_end + self._gap, time.monotonic()) + patience
+        wait = self._write_wait if is_write else self._settings.response_timeout
+        give_up = max(self._line_end + self._gap, time.monotonic()) + wait
         came = False
         while True:
             data = self._port.read(self._line_end + self._gap)
@@ -313,27 +297,24 @@ class SerialLink(ModbusLink):
                     return came
                 continue
             came = True
-            self.distrust()
+            self._late.heard_unasked(now)
             self._line_end = max(self._line_end, now)
-            if self._last is not None:
-                self._doubt(self._last)
             if now > give_up:
                 if is_write:
                     return came
                 raise NeverSilent('the line is never silent: noise, or another master on it')
 
     @property
-    def _write_patience(self) -> float:
+    def _write_wait(self) -> float:
         """How long a write waits for a line that is not silent, s: one answer of two registers."""
         longest = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
-        return max(_WRITE_PATIENCE, longest)
+        return max(_WRITE_WAIT, longest)
 
     # --- one transaction --------------------------------------------------------------------------
 
     def _transact(self, request: Request[_T]) -> tuple[_T, float]:
         frame = self._encode(request)
-        self._last = request
-        self._repeats = None
+        self._late.sent(request)
         self._echo.sent(frame)
         self._port.write(frame)
         self._sent_at = time.monotonic() + len(frame) * self._settings.char_time
@@ -342,10 +323,10 @@ class SerialLink(ModbusLink):
         try:
             answer, arrived = self._receive(request, reader, frame)
         except (NoAnswer, DamagedAnswer):
-            self._doubt(request)
+            self._late.expect(request, time.monotonic())
             raise
         except Refused:
-            self._doubts.end(request.unit)
+            self._late.release(request.unit)
             self._remember(request, reader.frame)
             raise
         finally:
@@ -354,37 +335,33 @@ class SerialLink(ModbusLink):
                 self._echo.present = True
             self._stray = bool(self._echo.before or reader.other.replace(frame, b'', 1))
         self._remember(request, reader.frame)
-        late = self._in_doubt(request)
+        late = request.answer_head in self._late.quarantined(request.unit, arrived)
         if not late:
             # units answer in order: whatever was still to come has come before this
-            self._doubts.end(request.unit)
-        if not late and self._repeats is None:
+            self._late.release(request.unit)
+        if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         took = arrived - self._sent_at - len(reader.frame) * self._settings.char_time
-        # one slow answer is remembered for some dozens
-        self._slowest[request.unit] = max(took, _DECAY * self._slowest.get(request.unit, 0.0))
+        self._late.took(request.unit, took)
         if late or reader.received:
-            self.distrust()
             # it may answer an earlier write of the same, or answer twice: one more may come
-            self._doubt(request)
+            self._late.heard_unasked(time.monotonic())
         return answer, arrived
 
     def _remember(self, request: Request[Any], frame: bytes) -> None:
-        """Note what a unit told, and whether it told just that a moment ago."""
+        """Take note of what a unit told, and that it may come once more."""
         now = time.monotonic()
-        before = self._told.get(request.unit)
-        if before is not None and before[0] == frame and now < before[2]:
-            self._repeats = before[1]
         again = self._settings.response_timeout + len(frame) * self._settings.char_time
-        self._told[request.unit] = frame, request, now + again
+        self._late.note(request, frame, now, now + again)
 
     def _receive(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes
     ) -> tuple[_T, float]:
         char_time = self._settings.char_time
         # an exception names neither register nor length: it may belong to the earlier request
-        believe_refusal = refusal_head(request) not in self._doubts.of(request.unit)
+        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        believe_refusal = refusal_head(request) not in quarantined
         first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         length = self._frame_length(request.answer_length)
@@ -405,8 +382,9 @@ class SerialLink(ModbusLink):
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
                 return answer, now
-            rest = (self._echo.missing + reader.missing) * char_time + reader.patience
-            deadline = min(max(first, now + rest), last_chance + _PAUSES * reader.patience)
+            pause = reader.inter_byte_timeout
+            rest = (self._echo.bytes_needed + reader.bytes_needed) * char_time + pause
+            deadline = min(max(first, now + rest), last_chance + _PAUSES * pause)
         held = self._echo.give_up()
         if held and not isinstance(request, Write):
             answer = _feed(reader, held, refusals)

@@ -29,6 +29,7 @@ import socket
 import time
 from typing import Any
 from typing import TypeVar
+from urllib.parse import urlsplit
 
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import GatewaySilent
@@ -38,14 +39,19 @@ from nfo_sinus_driver.link.errors import NoPath
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import understand
 from nfo_sinus_driver.link.modbus_tcp import FrameReader
 from nfo_sinus_driver.link.modbus_tcp import encode
+from nfo_sinus_driver.link.protocol import LineProtocol
+from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
 
+#: Where gateways listen.
+_PORT = 502
 #: How long the gateway may take to accept a connection, s.
 _CONNECT_TIMEOUT = 3.0
 #: How long it may take to acknowledge bytes before the connection counts as lost, s.
@@ -59,11 +65,22 @@ class TcpLink(ModbusLink):
     A Modbus master on one connection to a gateway; a unit is a drive behind it.
 
     Every request has a number of its own, which its answer repeats: a late or doubled answer is
-    told from the right one by that, so no unit is ever in doubt. Drives that do not answer leave
-    the connection as it is.
+    told from the right one by that, so nothing is ever in quarantine. Drives that do not answer
+    leave the connection as it is.
 
     :param response_timeout: from a request sent to its answer, s.
     """
+
+    protocol = LineProtocol(
+        name='modbus_tcp',
+        addressing='modbus',
+        units=UNITS,
+        # the line behind a gateway is set in the gateway
+        baud_rate=19200,
+        char_format='8E1',
+        identifies=True,
+        writes_and_reads=True,
+    )
 
     def __init__(self, host: str, port: int, response_timeout: float) -> None:
         self._host = host
@@ -73,6 +90,15 @@ class TcpLink(ModbusLink):
         self._socket: socket.socket | None = None
         self._reader = FrameReader()
         self._number = 0
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
+        """
+        Return the link to a gateway; of the settings only the ``response_timeout`` counts.
+
+        :raises ValueError: the port is no gateway; the message says what to write.
+        """
+        return cls(*_host_and_port(port), settings.response_timeout)
 
     def open(self) -> None:
         """
@@ -99,8 +125,8 @@ class TcpLink(ModbusLink):
         if connection is not None:
             connection.close()
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
-        """Take parameters that are safe to read; here nothing has to be probed."""
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """Take parameters that are safe to read; here nothing has to be resynchronised."""
 
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""
@@ -166,6 +192,21 @@ class TcpLink(ModbusLink):
 
     def _lost(self, why: OSError | str) -> PortError:
         return PortError(f'the connection to {self._name} was lost ({why}): {_HINT}')
+
+
+def _host_and_port(port: str) -> tuple[str, int]:
+    """Return where a gateway is: ``host``, ``host:port`` or ``[IPv6 address]:port``."""
+    try:
+        parts = urlsplit(f'//{port}')
+        where = parts.hostname, _PORT if parts.port is None else parts.port
+    except ValueError:
+        where = None, 0
+    host, number = where
+    if host is None or not number or parts.netloc != port or '@' in port:
+        raise ValueError(
+            f'port {port!r} is no gateway: modbus_tcp wants host:port, such as 192.0.2.1:502'
+        )
+    return host, number
 
 
 def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:

@@ -28,7 +28,6 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
-from nfo_sinus_driver.drive.broadcast import can_broadcast
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -81,7 +80,7 @@ class AllDrives:
     def _stop(self) -> tuple[list[str], list[str]]:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
         failed, done = self._command(_stop_one, _LONGEST_STOP)
-        if failed and can_broadcast(self._context.bus):
+        if failed and self._context.bus.protocol.broadcast is not None:
             if any(one.settings.control_method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
             else:

@@ -24,7 +24,6 @@ from dataclasses import field
 import threading
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.drive.settings import POINT_TO_POINT
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
@@ -67,8 +66,9 @@ class BusContext:
 
     def address_conflict(self, name: str, address: int) -> str | None:
         """Return the name of another drive that would answer to the address of this one, too."""
+        alone = self.bus.protocol.point_to_point
         for drive in self.drives:
             theirs = drive.settings.address
-            if drive.name != name and (theirs == address or POINT_TO_POINT in (theirs, address)):
+            if drive.name != name and (theirs == address or alone in (theirs, address)):
                 return drive.name
         return None

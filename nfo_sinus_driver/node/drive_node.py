@@ -37,7 +37,6 @@ from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive.settings import require_address
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
@@ -56,6 +55,7 @@ from nfo_sinus_driver.node.tuning import TuningServices
 from nfo_sinus_driver.node.wording import NodeError
 from nfo_sinus_driver.node.wording import Wording
 
+_NAMES = frozenset(setting.name for setting in DRIVE_SETTINGS)
 #: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 
@@ -245,7 +245,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         wanted = {name: value for name, value in values.items() if name in names}
         retries = self._bus_context.retries
         settings = DriveSettings(**wanted, retries=retries)  # type: ignore[arg-type]
-        require_address(settings.address, self._bus_context.bus.space)
+        self._bus_context.bus.protocol.require_unit(settings.address)
         other = self._bus_context.address_conflict(self.get_name(), settings.address)
         if other is not None:
             raise ValueError(
@@ -287,9 +287,12 @@ class DriveNode(LifecycleNodeMixin, Node):
 
         :raises ValueError: they make no sense, or cannot be changed now.
         """
+        changed = {one.name: one.value for one in parameters if one.name in _NAMES}
+        if not changed:
+            # those of the drive are many
+            return self.managed.settings
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']
-        changed = {parameter.name: parameter.value for parameter in parameters}
         _require_gear_ratio(changed)
         # not read_only for rclpy, so that what was dumped can be loaded
         autostart = self.get_parameter('autostart').value

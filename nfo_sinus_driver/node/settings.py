@@ -29,7 +29,7 @@ from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.link.open import PROTOCOLS
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
 
 #: What YAML makes of a character format without quotes.

@@ -13,73 +13,74 @@
 # limitations under the License.
 
 """
-The Classic protocol as a simulated G2 speaks it ([M0 §6.1], [M2]).
+The Classic protocol: messages, whom they are for, and what comes back ([M0 §6.1], [M2]).
 
-A message that cannot be carried out sets a flag of SioErr, and while the bus has control that is a
-serial fault: the motor coasts, MODE becomes Stop [M0 §6.1.5].
+What a drive says to a message is its :class:`Server`'s business.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from fractions import Fraction
-import math
+import abc
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
-from nfo_sinus_driver.simulator.drive import COMMANDS
+from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.line_faults import Reply
-from nfo_sinus_driver.simulator.measured import measure
-from nfo_sinus_driver.simulator.memory import convert
-from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.serial_side import CLASSIC
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long the rest of a message may take (s). No manual says [C86].
 _PAUSE = 1.0
-#: Counters of 24 bits [C26].
-_SHORT = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
-_24_BITS = 0xFFFFFF
-_REFERENCES = frozenset({'status.frq_set', 'status.spd_set', 'status.trq_set', 'status.reg_set'})
-_FLAGS: Mapping[Reason, SioErr] = {
-    # there are no functions here, only parameters
-    Reason.FUNCTION: SioErr.UNKNOWN,
-    Reason.ADDRESS: SioErr.UNKNOWN,
-    Reason.VALUE: SioErr.OUT_OF_RANGE,
-    Reason.STATE: SioErr.NOT_PERMITTED,
-}
 
 
-class _Wrong(Exception):
+class Wrong(Exception):
     """A message that is not carried out, and the flag that says why."""
 
-    def __init__(self, flag: SioErr) -> None:
+    def __init__(self, flag: LineError) -> None:
         super().__init__(flag.name)
         self.flag = flag
+
+
+class Server(abc.ABC):
+    """
+    What one drive does with Classic messages; its family says.
+
+    :ivar own_address: a message to address 0 is answered with the drive's own [C86].
+    :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
+    """
+
+    own_address: bool
+    lower_case: bool
+
+    @abc.abstractmethod
+    def enquiry(self, id_: int) -> int:
+        """
+        Return the word that stands at an id.
+
+        :raises Wrong: it cannot be read.
+        """
+
+    @abc.abstractmethod
+    def select(self, id_: int, word: int, *, to_all: bool) -> None:
+        """
+        Set what stands at an id.
+
+        :raises Wrong: it cannot be set, or not now.
+        """
+
+    @abc.abstractmethod
+    def refused(self, flag: LineError) -> bool:
+        """Take note of a message that is not carried out; return whether it is answered by NAK."""
 
 
 class Classic:
     """Classic messages: whom they are for, and what the drive says to them."""
 
     name = 'classic'
-    bus_type = CLASSIC
+    spoken = 'classic'
     serial = True
-
-    def __init__(self) -> None:
-        self._models: dict[str, _Ids] = {}
 
     @staticmethod
     def gap(timing: Timing) -> float:
@@ -111,153 +112,31 @@ class Classic:
             return classic_frames.is_select(request.body)
         return request.address in (POINT_TO_POINT, drive.address)
 
-    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+    @staticmethod
+    def answer(drive: SimulatedDrive, request: Request) -> bytes:
         """Let the drive carry out a message; return the answer, empty if there is none."""
-        firmware = drive.firmware
-        sender = drive.address if firmware.own_address else request.address
-        message = classic_frames.parse(request.body, small_letters=firmware.lower_case)
+        server = drive.servers['classic']
+        assert isinstance(server, Server)
+        small = server.lower_case
+        sender = drive.address if server.own_address else request.address
+        message = classic_frames.parse(request.body, small_letters=small)
+        to_all = request.address == BROADCAST
         answer = b''
         try:
             if message.wrong:
-                raise _Wrong(message.wrong)
+                raise Wrong(message.wrong)
             if message.value is None:
-                word = self._enquiry(drive, message.id)
-                small = firmware.lower_case
+                word = server.enquiry(message.id)
                 answer = classic_frames.reply(sender, message.id, word, small_letters=small)
             else:
-                self._select(drive, message.id, message.value, request.address == BROADCAST)
+                server.select(message.id, message.value, to_all=to_all)
                 answer = classic_frames.acknowledge(sender, True)
-        except _Wrong as wrong:
-            drive.serial_error(wrong.flag)
-            # what did not arrive whole has not arrived; of a check sum [M2 §6] thinks otherwise
-            unheard = SioErr.STRUCTURE | (SioErr(0) if firmware.naks_damage else SioErr.CHECK_SUM)
-            if not wrong.flag & unheard:
+        except Wrong as wrong:
+            if server.refused(wrong.flag):
                 answer = classic_frames.acknowledge(sender, False)
-        return b'' if request.address == BROADCAST else answer
+        return b'' if to_all else answer
 
     @staticmethod
     def instead(request: Request, there: bool) -> Reply | None:
         """Nothing: on a wire, silence is silence."""
         return None
-
-    def _ids(self, model: Family) -> _Ids:
-        if model.name not in self._models:
-            self._models[model.name] = _Ids(model)
-        return self._models[model.name]
-
-    def _enquiry(self, drive: SimulatedDrive, id_: int) -> int:
-        """Return the word that stands at an id."""
-        log = drive.model.error_logs['classic']
-        entry, position = divmod(id_ - log.first, log.stride)
-        if 0 <= entry < drive.firmware.log_size:
-            return to_words(log.codec.encode(drive.faults.log_word(entry)))[position]
-        parameter, position = self._find(drive, id_)
-        if parameter.access is Access.WRITE:
-            raise _Wrong(SioErr.UNREADABLE)
-        try:
-            raw = _read(drive, parameter.key)
-        except Refused as refused:
-            raise _Wrong(_FLAGS[refused.reason]) from refused
-        if parameter.key in _SHORT and drive.firmware.short_counters:
-            raw &= _24_BITS
-        words = to_words(parameter.at('classic').number.encode(raw))
-        if len(words) > 1 and drive.tears:
-            drive.tears -= drive.counters.carry(parameter)
-        return words[position]
-
-    def _select(self, drive: SimulatedDrive, id_: int, word: int, to_all: bool) -> None:
-        """Set the parameter at an id."""
-        parameter, _ = self._find(drive, id_)
-        key, firmware = parameter.key, drive.firmware
-        closed = key in _REFERENCES and not firmware.sets_references
-        if closed or parameter.access not in (Access.WRITE, Access.READ_WRITE):
-            raise _Wrong(SioErr.UNWRITABLE)
-        raw = parameter.at('classic').number.decode(to_bytes([word]))
-        if key == 'fieldbus.scmd':
-            raw = _command(drive, raw)
-        if drive.faults and not self._in_spite_of_a_fault(drive, key, raw, to_all):
-            raise _Wrong(SioErr.BLOCKED)
-        if firmware.bus_only and not _permitted(drive, key, raw):
-            raise _Wrong(SioErr.NOT_PERMITTED)
-        if key in firmware.codes and raw not in firmware.codes[key]:
-            raise _Wrong(SioErr.OUT_OF_RANGE)
-        if key == 'serial.address' and raw > firmware.most_address:
-            raise _Wrong(SioErr.OUT_OF_RANGE)
-        try:
-            drive.write_raw(key, _at_home(parameter, raw))
-        except Refused as refused:
-            blocked = refused.reason is Reason.STATE and drive.faults
-            raise _Wrong(SioErr.BLOCKED if blocked else _FLAGS[refused.reason]) from refused
-        if key in COMMANDS:
-            drive.runner.by_fieldbus = False
-
-    @staticmethod
-    def _in_spite_of_a_fault(drive: SimulatedDrive, key: str, raw: int, to_all: bool) -> bool:
-        """Whether a SELECT is one of those that an active fault does not keep off [M0 §6.1.5]."""
-        if key in ('fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'):
-            return True
-        stops = key == 'fieldbus.mode' and raw == Mode.STOP
-        return stops and drive.faults.serial and (to_all or drive.firmware.obeys_stop)
-
-    def _find(self, drive: SimulatedDrive, id_: int) -> tuple[Parameter, int]:
-        found = self._ids(drive.model).find(id_)
-        if found is None or found[0].key in drive.firmware.lacks:
-            raise _Wrong(SioErr.UNKNOWN)
-        since = found[0].since
-        if since is not None and drive.version is not None and drive.version < since:
-            raise _Wrong(SioErr.UNKNOWN)
-        return found
-
-
-class _Ids:
-    """Which parameter stands at which id, and which of its words."""
-
-    def __init__(self, model: Family) -> None:
-        self._by_id = {
-            id_: (parameter, position)
-            for parameter in model.values()
-            if 'classic' in parameter.addresses
-            for position, id_ in enumerate(parameter.at('classic').numbers)
-        }
-
-    def find(self, id_: int) -> tuple[Parameter, int] | None:
-        return self._by_id.get(id_)
-
-
-def _read(drive: SimulatedDrive, key: str) -> int:
-    """Read a parameter as this protocol carries it, side effects included."""
-    raw = drive.read_raw(key)
-    if key == 'fieldbus.setpoint':
-        key = drive.runner.setpoint_key
-    parameter = drive.memory.model[key]
-    # what is measured may be finer here than in the memory
-    shown = measure(parameter, 'classic', drive.motor, drive.counters)
-    return convert(parameter, raw, 'classic') if shown is None else shown
-
-
-def _command(drive: SimulatedDrive, raw: int) -> int:
-    """Return an SCMD as the drive understands it: to the old one much means Stop [C31]."""
-    if not drive.firmware.even_stops:
-        return raw
-    if raw == Scmd.RESET_E_OUT:
-        raise _Wrong(SioErr.OUT_OF_RANGE)
-    return raw if raw & 1 or raw & Scmd.ERASE_E_LOG else Scmd.STOP
-
-
-def _permitted(drive: SimulatedDrive, key: str, raw: int) -> bool:
-    """Whether MODE permits a SELECT, where nothing is changed before MODE = Sio [C100]."""
-    mode = drive.runner.mode
-    if mode == Mode.INHIBIT:
-        # whether this is taken is left to the drive's variant [C101]
-        return key == 'fieldbus.scmd' and raw == Scmd.STOP
-    return mode == Mode.BUS or key == 'fieldbus.mode'
-
-
-def _at_home(parameter: Parameter, raw: int) -> int:
-    """Return the number that the memory keeps for a Classic one, which is coarser [C14]."""
-    protocol = home(parameter)
-    exact = raw * parameter.factor('classic') / parameter.factor(protocol)
-    kept = math.floor(exact + Fraction(1, 2))
-    if not parameter.at(protocol).number.fits(kept):
-        raise _Wrong(SioErr.OUT_OF_RANGE)
-    return kept

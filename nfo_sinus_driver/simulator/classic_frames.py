@@ -21,11 +21,10 @@ They are cut by their length: a check sum may be any control character, EOT amon
 from __future__ import annotations
 
 from dataclasses import dataclass
+import enum
 import functools
 import operator
 import re
-
-from nfo_sinus_driver.simulator.faults import SioErr
 
 STX, ETX, EOT, ENQ, ACK, NAK = 0x02, 0x03, 0x04, 0x05, 0x06, 0x15
 
@@ -44,7 +43,25 @@ _ENQUIRY = re.compile(rb'(?s)..(.)([0-9A-Fa-f]{4})\x05')
 _SELECT = re.compile(rb'(?s)..\x02(.)([0-9A-Fa-f]{4})=([0-9A-Fa-f]{4})\x03.')
 _SMALL = re.compile(rb'[a-f]')
 
-_NOTHING = SioErr(0)
+
+class LineError(enum.IntFlag):
+    """What may go wrong on the line: the flags by which a drive tells it [M2 table 4]."""
+
+    BLOCKED = 1 << 0
+    PARITY = 1 << 1
+    CHECK_SUM = 1 << 2
+    STRUCTURE = 1 << 3
+    TIMEOUT = 1 << 4
+    PREFIX = 1 << 5
+    NOT_PERMITTED = 1 << 6
+    UNKNOWN = 1 << 7
+    UNREADABLE = 1 << 8
+    UNWRITABLE = 1 << 9
+    OUT_OF_RANGE = 1 << 10
+    OVERRUN = 1 << 14
+
+
+_NOTHING = LineError(0)
 
 
 @dataclass(frozen=True)
@@ -59,7 +76,7 @@ class Message:
 
     id: int = 0
     value: int | None = None
-    wrong: SioErr = _NOTHING
+    wrong: LineError = _NOTHING
 
 
 def length(buffer: bytes) -> int:
@@ -91,11 +108,11 @@ def parse(frame: bytes, *, small_letters: bool = True) -> Message:
     select = _SELECT.fullmatch(frame)
     match = select or _ENQUIRY.fullmatch(frame)
     if match is None or (not small_letters and _SMALL.search(b''.join(match.groups()[1:]))):
-        return Message(wrong=SioErr.STRUCTURE)
+        return Message(wrong=LineError.STRUCTURE)
     if select and check_sum(frame[3:-1]) != frame[-1]:
-        return Message(wrong=SioErr.CHECK_SUM)
+        return Message(wrong=LineError.CHECK_SUM)
     if match[1] != _PREFIX:
-        return Message(wrong=SioErr.PREFIX)
+        return Message(wrong=LineError.PREFIX)
     return Message(int(match[2], 16), int(select[3], 16) if select else None)
 
 

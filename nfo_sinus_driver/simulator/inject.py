@@ -24,7 +24,7 @@ import sys
 from nfo_sinus_driver.simulator.control import Client
 from nfo_sinus_driver.simulator.control import ControlError
 from nfo_sinus_driver.simulator.control import control_path
-from nfo_sinus_driver.simulator.injections import VERBS
+from nfo_sinus_driver.simulator.family import every_verb
 from nfo_sinus_driver.simulator.injections import Argument
 
 _EXAMPLES = """
@@ -53,7 +53,7 @@ def inject(argv: Sequence[str]) -> int:
                 state = client.state(options.address) if one else client.states()
                 print(json.dumps(state, indent=2, ensure_ascii=False))
             else:
-                names = [argument.name for argument in VERBS[options.verb].arguments]
+                names = [argument.name for argument in every_verb()[options.verb].arguments]
                 given = {name: getattr(options, name) for name in names}
                 client.inject(options.verb, address=options.address, **given)
     except ControlError as error:
@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         help='the drive; needed where there are several and it happens to one',
     )
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
-    for name, verb in VERBS.items():
+    for name, verb in every_verb().items():
         sub = verbs.add_parser(name, help=verb.help, description=verb.help)
         for argument in verb.arguments:
             _add(sub, argument)

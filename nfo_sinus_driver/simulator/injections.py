@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What can be made to happen to a running simulator, by ``simulator inject`` and by tests."""
+"""
+What can be made to happen to a running simulator, by ``simulator inject`` and by tests.
+
+Here is what can happen to a drive of any family and to its line; a family may have more.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +30,8 @@ from typing import Any
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
-from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 
 #: Stands for an argument that must be given.
 _REQUIRED: Any = object()
@@ -153,12 +155,6 @@ def _as_is(value: object) -> object:
     return value
 
 
-def _keypad(target: Target, given: dict[str, Any]) -> None:
-    drive = target.one
-    press = {'stop': drive.press_stop, 'ext': drive.press_ext, 'start': drive.press_start}
-    press[given['key']]()
-
-
 def _set(target: Target, given: dict[str, Any]) -> None:
     drive = target.one
     value = parse_setting(drive.memory.model, given['key'], given['value'])
@@ -167,24 +163,6 @@ def _set(target: Target, given: dict[str, Any]) -> None:
 
 def _line_dead(target: Target, given: dict[str, Any]) -> None:
     target.line.faults.dead_until = target.now + given['seconds']
-
-
-def _sio_error(target: Target, given: dict[str, Any]) -> None:
-    flags = {flag.bit_length() - 1: flag for flag in SioErr}
-    if given['bit'] not in flags:
-        raise ValueError(f'SioErr has no bit {given["bit"]}, only {", ".join(map(str, flags))}')
-    target.one.serial_error(flags[given['bit']])
-
-
-def _torn(target: Target, given: dict[str, Any]) -> None:
-    target.one.tears += given['times']
-
-
-def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
-    runner = target.one.runner
-    if not isinstance(runner, G2Runner):
-        raise ValueError(f'{target.one.model.name} does not tune over the bus')
-    runner.fail_tuning(given['code'])
 
 
 def _load(target: Target, given: dict[str, Any]) -> None:
@@ -218,7 +196,7 @@ VERBS: Mapping[str, Verb] = {
         'let a fault happen: the motor coasts until it is acknowledged',
         lambda target, given: target.one.trip(given['code'], cause_present=given['standing']),
         (
-            Argument('code', int, 'InvSt code of the fault, such as 5'),
+            Argument('code', int, 'status code of the fault, such as 5'),
             Argument('standing', bool, 'its cause lasts until ack-cause-gone', False),
         ),
     ),
@@ -226,31 +204,16 @@ VERBS: Mapping[str, Verb] = {
         'take away the causes of all faults, so that they can be acknowledged',
         lambda target, _: target.one.end_fault_causes(),
     ),
-    'sio-error': Verb(
-        'let something go wrong on the line: a flag of SioErr, and Sio Fail under bus control',
-        _sio_error,
-        (Argument('bit', int, 'bit of SioErr, such as 1: parity'),),
-    ),
-    'torn': Verb(
-        'let a counter carry just after Classic has read one of its two words',
-        _torn,
-        (Argument('times', int, 'how many times', 1),),
-    ),
     'run': Verb(
         'switch the digital input RUN',
         lambda target, given: target.one.set_run_input(given['state'] == 'on'),
         (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
     ),
-    'keypad': Verb(
-        'press a key: stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally)',
-        _keypad,
-        (Argument('key', str, 'stop, ext or start', choices=('stop', 'ext', 'start')),),
-    ),
     'set': Verb(
         'change a parameter at the keypad',
         _set,
         (
-            Argument('key', str, 'its name, such as control.accel'),
+            Argument('key', str, 'its name, as in the table of parameters'),
             Argument('value', _as_is, 'in its own unit, such as 7'),
         ),
     ),
@@ -262,11 +225,6 @@ VERBS: Mapping[str, Verb] = {
         'change the load of the motor',
         _load,
         (Argument('share', float, 'torque at nominal speed, 1 is the nominal torque'),),
-    ),
-    'tuning-fails': Verb(
-        'let the next tuning end with a fault',
-        _fail_tuning,
-        (Argument('code', int, 'InvSt code: 16 (TunFailP) or 17 (TunFailM)'),),
     ),
     'power-cycle': Verb(
         'take the mains away and give them back',

@@ -188,7 +188,7 @@ class Line:
     def _hears(self, drive: SimulatedDrive) -> bool:
         if not drive.listening:
             return False
-        return self._always_heard or drive.serial.hears(self.protocol.bus_type, self.timing)
+        return self._always_heard or drive.control_unit.hears(self.protocol.spoken, self.timing)
 
     def _send(self, address: int, replies: Sequence[Reply], asked: Arrived) -> None:
         for reply in replies:

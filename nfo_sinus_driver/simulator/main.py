@@ -24,23 +24,17 @@ import signal
 import sys
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import ControlError
-from nfo_sinus_driver.simulator.doors import GATEWAY_TIMEOUT
-from nfo_sinus_driver.simulator.doors import PROTOCOLS
-from nfo_sinus_driver.simulator.firmware import DIALECTS
-from nfo_sinus_driver.simulator.identification import KNOWN
-from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
+from nfo_sinus_driver.simulator.endpoints import PROTOCOLS
+from nfo_sinus_driver.simulator.family import every_option
+from nfo_sinus_driver.simulator.family import machine_of
+from nfo_sinus_driver.simulator.family import simulated
 from nfo_sinus_driver.simulator.inject import inject
 from nfo_sinus_driver.simulator.injections import parse_setting
-from nfo_sinus_driver.simulator.machine import machine_of
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
-from nfo_sinus_driver.simulator.timing import BAUD_CODES
-from nfo_sinus_driver.simulator.timing import FORMATS
-from nfo_sinus_driver.simulator.variant import CHOICES
-from nfo_sinus_driver.simulator.variant import Variant
 
 #: Lets the line's thread go on soon after another one was busy (s).
 _SWITCH_INTERVAL = 0.0002
@@ -50,15 +44,6 @@ While it runs, "simulator inject --link LINK VERB ..." makes things happen to it
 RUN input, the keypad, a power cycle, noise on the line; see "simulator inject --help".
 """
 
-#: What the options say that choose where the manuals leave a drive open.
-_OPEN = {
-    'run_command_in_fault': 'what an acknowledged fault does to a run command (default: drops; of '
-    'the Optimal keeps)',
-    'refuses_in_fault': 'what is refused while a fault is active; on Classic always all '
-    '(default: nothing)',
-    'stop_in_tuning': 'whether SCMD = Stop ends a tuning, or is refused until it is over '
-    '(default: taken)',
-}
 _ROS_ARGS = '--ros-args'
 
 
@@ -135,6 +120,7 @@ def _simulator(options: argparse.Namespace) -> Simulator:
     """
     if options.link is not None and options.tcp is not None:
         raise ValueError('--link and --tcp exclude each other')
+    chosen = {name: getattr(options, name) for name in every_option()}
     return Simulator(
         options.address or [1],
         model=options.model,
@@ -144,8 +130,6 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         baud=options.baud,
         char_format=options.char_format,
         also=options.also,
-        dialect=options.dialect,
-        lenient=options.lenient,
         echo=options.echo,
         gateway_timeout=options.gateway_timeout,
         paced=options.paced,
@@ -156,27 +140,17 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         run_input=options.run_input,
         boot_time=options.boot_time,
         serial_numbers=options.serial,
-        newer_functions=options.newer_functions,
-        variant=_variant(options),
+        **{name: value for name, value in chosen.items() if value is not None},
     )
-
-
-def _variant(options: argparse.Namespace) -> Variant | None:
-    """Return what the options say of what the manuals leave open; ``None`` if they say nothing."""
-    given = {name: getattr(options, name) for name in CHOICES}
-    chosen = {name: choice for name, choice in given.items() if choice is not None}
-    return Variant(**chosen) if chosen else None
 
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     settings: dict[str, Value] = {}
-    machine = machine_of(load_family(model))
+    machine = machine_of(model)
     for text in given:
         key, equals, value = text.partition('=')
         if not equals:
             raise ValueError(f'argument --set: {text!r} is not NAME=VALUE')
-        if key == 'serial.address':
-            raise ValueError('argument --set: give the address with --address')
         settings[key] = parse_setting(machine, key, value)
     return settings
 
@@ -205,12 +179,12 @@ def _seconds(text: str) -> float:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='simulator',
-        description='Simulates whole NFO Sinus drives on a pseudo-terminal or TCP port.',
+        description='Simulates whole drives on a pseudo-terminal or TCP port.',
         epilog=_EPILOG,
     )
     add = parser.add_argument
     add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
-    add('--model', default='sinus_g2', choices=families(), help='default: sinus_g2')
+    add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
         '--address',
         type=_address,
@@ -228,19 +202,8 @@ def _parser() -> argparse.ArgumentParser:
         help='serve the same drives by another protocol as well, at a link or TCP port; may be '
         'repeated',
     )
-    add('--baud', type=int, choices=BAUD_CODES, help='default: 19200, of classic 9600')
-    add('--char-format', choices=FORMATS, help='default: 8E1, of classic and modbus_ascii 7E1')
-    add(
-        '--dialect',
-        choices=DIALECTS,
-        help='the manual that describes the Classic protocol of the drives (default: as their '
-        'firmware, fieldbus.sw_ver, says)',
-    )
-    add(
-        '--lenient',
-        action='store_true',
-        help='a Classic message that is refused while the bus has control is no serial fault',
-    )
+    add('--baud', type=int, help='default: 19200, of classic 9600')
+    add('--char-format', metavar='FORMAT', help='default: 8E1, of classic and modbus_ascii 7E1')
     add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
     add(
         '--gateway-timeout',
@@ -270,7 +233,8 @@ def _parser() -> argparse.ArgumentParser:
         action='append',
         default=[],
         metavar='NAME=VALUE',
-        help='a parameter other than factory, such as control.retard=60; may be repeated',
+        help='a parameter other than factory, by its name in the table of parameters; may be '
+        'repeated',
     )
     add(
         '--no-run-input',
@@ -293,13 +257,10 @@ def _parser() -> argparse.ArgumentParser:
         help='serial number of a drive, at most 16 characters; once for each drive, in the order '
         'of their addresses (default: made of the address)',
     )
-    add(
-        '--newer-functions',
-        default=KNOWN,
-        choices=NEWER_FUNCTIONS,
-        help='how drives treat functions 17, 23 and 43, which older ones do not have '
-        '(default: known)',
-    )
-    for name, choices in CHOICES.items():
-        add(f'--{name.replace("_", "-")}', choices=choices, help=_OPEN[name])
+    for name, option in every_option().items():
+        flag = f'--{name.replace("_", "-")}'
+        if option.choices:
+            add(flag, choices=option.choices, help=option.help)
+        else:
+            add(flag, action='store_true', default=None, help=option.help)
     return parser

@@ -16,24 +16,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from collections.abc import Mapping
+from collections.abc import Sequence
+import functools
+from typing import ClassVar
 
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import to_bytes
+from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.identification import KNOWN
-from nfo_sinus_driver.simulator.identification import REFUSED
-from nfo_sinus_driver.simulator.identification import SILENT
+from nfo_sinus_driver.simulator.memory import carried
+from nfo_sinus_driver.simulator.memory import kept
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 
-_READ = 3
-_READ_INPUT = 4
-_WRITE_SINGLE = 6
-_WRITE_MULTIPLE = 16
-_REPORT_SLAVE_ID = 17
-_WRITE_AND_READ = 23
-_ENCAPSULATED = 43
+#: How a drive treats a function.
+KNOWN, REFUSED, SILENT = 'known', 'refused', 'silent'
+TREATMENTS = (KNOWN, REFUSED, SILENT)
+
+READ = 3
+READ_INPUT = 4
+WRITE_SINGLE = 6
+WRITE_MULTIPLE = 16
+REPORT_SLAVE_ID = 17
+WRITE_AND_READ = 23
+ENCAPSULATED = 43
 _DEVICE_IDENTIFICATION = 14
 #: Read device ID codes: basic, regular, specific; and which objects belong to each.
 _BASIC, _REGULAR, _SPECIFIC = 1, 2, 4
@@ -46,116 +55,205 @@ _MOST_WRITTEN = 123
 _MOST_WRITTEN_WITH_READ = 121
 
 
-def answer(drive: SimulatedDrive, pdu: bytes) -> bytes:
-    """Let the drive carry out a request PDU and return the answer PDU; empty if it stays silent."""
-    function = pdu[0] if pdu else 0
-    treated = drive.newer_functions if function in _NEWER else KNOWN
-    if treated == SILENT:
-        return b''
-    try:
-        if treated == REFUSED:
-            raise Refused(Reason.FUNCTION, f'function {function} came with a newer firmware')
-        if function not in _FUNCTIONS[drive.model.name]:
-            raise Refused(Reason.FUNCTION, f'function {function} is not supported')
+
+class Server:
+    """
+    What one drive does with Modbus requests.
+
+    One parameter in one message, the whole of it [M0 §6.2.3]. Registers are those of the tables;
+    a family may have other functions, and say who it is.
+    """
+
+    #: The functions that it has.
+    functions: ClassVar[frozenset[int]] = frozenset((READ, WRITE_SINGLE, WRITE_MULTIPLE))
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        self.drive = drive
+        self._by_base = _registers(drive.model)
+        # the manuals of some tell of none
+        self._log = drive.model.error_logs.get('modbus')
+
+    def treats(self, function: int) -> str:
+        """Return which of :data:`TREATMENTS` a function gets."""
+        return KNOWN if function in self.functions else REFUSED
+
+    def slave_id(self) -> bytes:
+        """Return what function 17 reports."""
+        return self.drive.serial_number.encode('ascii')
+
+    def device_objects(self) -> Mapping[int, bytes]:
+        """Return the objects of Read Device Identification, by their numbers."""
+        return {}
+
+    def answer(self, pdu: bytes) -> bytes:
+        """Carry out a request PDU and return the answer PDU; empty if it stays silent."""
+        function = pdu[0] if pdu else 0
+        treated = self.treats(function)
+        if treated == SILENT:
+            return b''
         try:
-            return _HANDLERS[function](drive, pdu[1:])
-        except ValueError as error:
-            raise Refused(Reason.VALUE, str(error)) from error
-    except Refused as refused:
-        return pymodbus_compat.encode_exception(function, refused.reason)
+            if treated == REFUSED:
+                raise Refused(Reason.FUNCTION, f'function {function} is not supported')
+            try:
+                return self._carry_out(function, pdu[1:])
+            except ValueError as error:
+                raise Refused(Reason.VALUE, str(error)) from error
+        except Refused as refused:
+            return pymodbus_compat.encode_exception(function, refused.reason)
+
+    # ---- registers ----
+
+    def read(self, register: int, count: int) -> tuple[int, ...]:
+        """
+        Read the parameter at a register, as words, the low one first.
+
+        :raises Refused: no such parameter, or not its length.
+        """
+        entry = self._log_entry(register, count)
+        if entry is not None:
+            return entry
+        parameter = self._find(register, count)
+        raw = carried(parameter, self.drive.read_raw(parameter.key), 'modbus')
+        return to_words(parameter.at('modbus').number.encode(raw))
+
+    def write(self, register: int, words: Sequence[int]) -> None:
+        """
+        Write the parameter at a register.
+
+        :raises Refused: as the reason says.
+        """
+        parameter = self._find(register, len(words))
+        raw = parameter.at('modbus').number.decode(to_bytes(words))
+        self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
+        self.drive.control_unit.written(parameter.key, 'modbus')
+
+    def write_and_read(
+        self, register: int, words: Sequence[int], source: int, count: int
+    ) -> tuple[int, ...]:
+        """
+        Write the parameter at ``register``, then read the one at ``source``.
+
+        :raises Refused: as the reason says; nothing was written if there is none at ``source``.
+        """
+        self._find(source, count)
+        self.write(register, words)
+        return self.read(source, count)
+
+    def _log_entry(self, register: int, count: int) -> tuple[int, ...] | None:
+        """Return the entry of the error log at ``register``; ``None`` if it is none."""
+        log = self._log
+        entry, rest = divmod(register - log.first, log.stride) if log else (-1, 0)
+        if log is None or not 0 <= entry < log.limit:
+            return None
+        if rest or 2 * count != log.codec.size:
+            raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
+        return to_words(log.codec.encode(self.drive.faults.log_entry(entry)))
+
+    def _find(self, register: int, count: int) -> Parameter:
+        """Return the parameter that stands at ``register`` and has exactly ``count`` of them."""
+        parameter = self._by_base.get(register)
+        if parameter is None:
+            raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
+        whole = parameter.at('modbus').codec.size // 2
+        if count != whole:
+            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {whole} registers, not {count}')
+        return parameter
+
+    # ---- requests ----
+
+    def _carry_out(self, function: int, data: bytes) -> bytes:
+        if function == READ:
+            return pymodbus_compat.encode_read(self._read_words(data))
+        if function == READ_INPUT:
+            # the same registers by another function [M1]
+            return pymodbus_compat.encode_read_input(self._read_words(data))
+        if function == WRITE_SINGLE:
+            return self._write_single(data)
+        if function == WRITE_MULTIPLE:
+            return self._write_multiple(data)
+        if function == WRITE_AND_READ:
+            return self._write_and_read(data)
+        if function == REPORT_SLAVE_ID:
+            return self._report_slave_id(data)
+        assert function == ENCAPSULATED
+        return self._identify(data)
+
+    def _read_words(self, data: bytes) -> tuple[int, ...]:
+        register, count = pymodbus_compat.decode_read(data)
+        if not 1 <= count <= _MOST_READ or len(data) != 4:
+            raise Refused(Reason.VALUE, f'a request for {count} registers is malformed')
+        return self.read(register, count)
+
+    def _write_single(self, data: bytes) -> bytes:
+        register, word = pymodbus_compat.decode_write_single(data)
+        if len(data) != 4:
+            raise Refused(Reason.VALUE, 'a request of a wrong length')
+        self.write(register, [word])
+        return pymodbus_compat.encode_write_single(register, word)
+
+    def _write_multiple(self, data: bytes) -> bytes:
+        register, count, words = pymodbus_compat.decode_write_multiple(data)
+        right = 1 <= count <= _MOST_WRITTEN and len(words) == count and data[4] == 2 * count
+        if not right or len(data) != 5 + 2 * count:
+            raise Refused(Reason.VALUE, f'a write of {count} registers is malformed')
+        self.write(register, words)
+        return pymodbus_compat.encode_write_multiple(register, count)
+
+    def _write_and_read(self, data: bytes) -> bytes:
+        source, wanted, register, count, words = pymodbus_compat.decode_write_and_read(data)
+        right = 1 <= count <= _MOST_WRITTEN_WITH_READ and len(words) == count
+        right = right and data[8] == 2 * count and 1 <= wanted <= _MOST_READ
+        if not right or len(data) != 9 + 2 * count:
+            raise Refused(Reason.VALUE, f'a write of {count} and read of {wanted} is malformed')
+        return pymodbus_compat.encode_write_and_read(
+            self.write_and_read(register, words, source, wanted)
+        )
+
+    def _report_slave_id(self, data: bytes) -> bytes:
+        if data:
+            raise Refused(Reason.VALUE, 'a request of a wrong length')
+        # not pymodbus's, which puts the standard's run indicator behind it [C94]
+        report = self.slave_id()
+        return bytes((REPORT_SLAVE_ID, len(report))) + report
+
+    def _identify(self, data: bytes) -> bytes:
+        if data[:1] != bytes((_DEVICE_IDENTIFICATION,)):
+            raise Refused(Reason.FUNCTION, 'only MEI type 14 is supported')
+        code, first = pymodbus_compat.decode_device(data)
+        if len(data) != 3:
+            raise Refused(Reason.VALUE, 'a request of a wrong length')
+        objects = self.device_objects()
+        if code == _SPECIFIC:
+            if first not in objects:
+                raise Refused(Reason.ADDRESS, f'there is no object {first}')
+            return pymodbus_compat.encode_device(code, _CONFORMITY, {first: objects[first]})
+        if code not in _STREAMS:
+            raise Refused(Reason.VALUE, f'read device ID code {code} is not supported')
+        stream = _STREAMS[code]
+        # from an object that is not there the standard begins anew
+        wanted = stream[first if first in stream else 0 :]
+        return pymodbus_compat.encode_device(
+            code, _CONFORMITY, {number: objects[number] for number in wanted}
+        )
+
+
+def server(drive: SimulatedDrive) -> Server:
+    """Return what does this with the requests to a drive."""
+    found = drive.servers['modbus']
+    assert isinstance(found, Server)
+    return found
 
 
 def is_write(pdu: bytes) -> bool:
     """Whether a request only writes, so that it may go to everybody."""
-    return pdu[:1] in (bytes([_WRITE_SINGLE]), bytes([_WRITE_MULTIPLE]))
+    return pdu[:1] in (bytes([WRITE_SINGLE]), bytes([WRITE_MULTIPLE]))
 
 
-def _read(drive: SimulatedDrive, data: bytes) -> bytes:
-    return pymodbus_compat.encode_read(_words(drive, data))
-
-
-def _read_input(drive: SimulatedDrive, data: bytes) -> bytes:
-    # the same registers by another function [M1]
-    return pymodbus_compat.encode_read_input(_words(drive, data))
-
-
-def _words(drive: SimulatedDrive, data: bytes) -> tuple[int, ...]:
-    register, count = pymodbus_compat.decode_read(data)
-    if not 1 <= count <= _MOST_READ or len(data) != 4:
-        raise Refused(Reason.VALUE, f'a request for {count} registers is malformed')
-    return drive.read(register, count)
-
-
-def _write_single(drive: SimulatedDrive, data: bytes) -> bytes:
-    register, word = pymodbus_compat.decode_write_single(data)
-    if len(data) != 4:
-        raise Refused(Reason.VALUE, 'a request of a wrong length')
-    drive.write(register, [word])
-    return pymodbus_compat.encode_write_single(register, word)
-
-
-def _write_multiple(drive: SimulatedDrive, data: bytes) -> bytes:
-    register, count, words = pymodbus_compat.decode_write_multiple(data)
-    right = 1 <= count <= _MOST_WRITTEN and len(words) == count and data[4] == 2 * count
-    if not right or len(data) != 5 + 2 * count:
-        raise Refused(Reason.VALUE, f'a write of {count} registers is malformed')
-    drive.write(register, words)
-    return pymodbus_compat.encode_write_multiple(register, count)
-
-
-def _write_and_read(drive: SimulatedDrive, data: bytes) -> bytes:
-    source, wanted, register, count, words = pymodbus_compat.decode_write_and_read(data)
-    right = 1 <= count <= _MOST_WRITTEN_WITH_READ and len(words) == count and data[8] == 2 * count
-    if not right or not 1 <= wanted <= _MOST_READ or len(data) != 9 + 2 * count:
-        raise Refused(Reason.VALUE, f'a write of {count} and read of {wanted} is malformed')
-    return pymodbus_compat.encode_write_and_read(
-        drive.write_and_read(register, words, source, wanted)
-    )
-
-
-def _report_slave_id(drive: SimulatedDrive, data: bytes) -> bytes:
-    if data:
-        raise Refused(Reason.VALUE, 'a request of a wrong length')
-    # not pymodbus's, which puts the standard's run indicator behind it [C94]
-    report = drive.serial_number.encode('ascii')
-    return bytes((_REPORT_SLAVE_ID, len(report))) + report
-
-
-def _identify(drive: SimulatedDrive, data: bytes) -> bytes:
-    if data[:1] != bytes((_DEVICE_IDENTIFICATION,)):
-        raise Refused(Reason.FUNCTION, 'only MEI type 14 is supported')
-    code, first = pymodbus_compat.decode_device(data)
-    if len(data) != 3:
-        raise Refused(Reason.VALUE, 'a request of a wrong length')
-    objects = drive.identification
-    if code == _SPECIFIC:
-        if first not in objects:
-            raise Refused(Reason.ADDRESS, f'there is no object {first}')
-        return pymodbus_compat.encode_device(code, _CONFORMITY, {first: objects[first]})
-    if code not in _STREAMS:
-        raise Refused(Reason.VALUE, f'read device ID code {code} is not supported')
-    stream = _STREAMS[code]
-    # from an object that is not there the standard begins anew
-    wanted = stream[first if first in stream else 0 :]
-    return pymodbus_compat.encode_device(
-        code, _CONFORMITY, {number: objects[number] for number in wanted}
-    )
-
-
-_HANDLERS: Mapping[int, Callable[[SimulatedDrive, bytes], bytes]] = {
-    _READ: _read,
-    _READ_INPUT: _read_input,
-    _WRITE_SINGLE: _write_single,
-    _WRITE_MULTIPLE: _write_multiple,
-    _REPORT_SLAVE_ID: _report_slave_id,
-    _WRITE_AND_READ: _write_and_read,
-    _ENCAPSULATED: _identify,
-}
-#: What only the newer firmware of a G2 has.
-_NEWER = frozenset((_REPORT_SLAVE_ID, _WRITE_AND_READ, _ENCAPSULATED))
-#: The functions of each family [C57].
-_BASIC_FUNCTIONS = frozenset((_READ, _WRITE_SINGLE, _WRITE_MULTIPLE))
-_FUNCTIONS: Mapping[str, frozenset[int]] = {
-    'sinus_g2': _BASIC_FUNCTIONS | _NEWER,
-    'sinus_optimal': _BASIC_FUNCTIONS | {_READ_INPUT},
-}
+@functools.cache
+def _registers(model: Family) -> Mapping[int, Parameter]:
+    """Return which parameter begins at which holding register [M0 table 4, table 5]."""
+    return {
+        parameter.at('modbus').index: parameter
+        for parameter in model.values()
+        if 'modbus' in parameter.addresses
+    }

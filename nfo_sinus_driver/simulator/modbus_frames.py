@@ -23,12 +23,10 @@ import re
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import Reply
-from nfo_sinus_driver.simulator.modbus import answer
 from nfo_sinus_driver.simulator.modbus import is_write
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.refusal import GatewayReason
-from nfo_sinus_driver.simulator.serial_side import MODBUS_ASCII
-from nfo_sinus_driver.simulator.serial_side import MODBUS_RTU
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: Everybody obeys a write to this address and nobody answers.
@@ -70,7 +68,7 @@ class _OnSerialLine(abc.ABC):
 
     def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        pdu = answer(drive, request.body)
+        pdu = server(drive).answer(request.body)
         if not pdu or _for_all(request.address, request.body):
             return b''
         return self.wrap(request.address, pdu)
@@ -85,7 +83,7 @@ class ModbusRtu(_OnSerialLine):
     """RTU frames: cut by their length, and by silence where their CRC is not right."""
 
     name = 'modbus_rtu'
-    bus_type = MODBUS_RTU
+    spoken = 'modbus_rtu'
 
     @staticmethod
     def gap(timing: Timing) -> float:
@@ -121,7 +119,7 @@ class ModbusAscii(_OnSerialLine):
     """ASCII frames: a colon, upper-case digits, LRC, CR LF; as slow as anybody likes."""
 
     name = 'modbus_ascii'
-    bus_type = MODBUS_ASCII
+    spoken = 'modbus_ascii'
 
     @staticmethod
     def gap(timing: Timing) -> float:
@@ -169,7 +167,7 @@ class ModbusTcp:
     """
 
     name = 'modbus_tcp'
-    bus_type = MODBUS_RTU
+    spoken = 'modbus_rtu'
     serial = False
 
     def __init__(self, wait: float) -> None:
@@ -210,7 +208,7 @@ class ModbusTcp:
 
     def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        pdu = answer(drive, request.body[2:])
+        pdu = server(drive).answer(request.body[2:])
         if not pdu or _for_all(request.address, request.body[2:]):
             return b''
         return self._framed(request, pdu)

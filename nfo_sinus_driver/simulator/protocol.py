@@ -43,8 +43,8 @@ class Protocol(Interface):
     """How frames look, whom they concern and what comes back."""
 
     name: str
-    #: BusType of a drive that speaks it [M0 table 4].
-    bus_type: int
+    #: The protocol that the drives themselves speak: the one behind a gateway.
+    spoken: str
     #: Bytes go over a serial line, not through a gateway.
     serial: bool
 

@@ -24,25 +24,18 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive
 
 def describe(drive: SimulatedDrive) -> dict[str, Any]:
     """Return everything about a drive, in engineering units; it can be written as JSON."""
-    motor, runner = drive.motor, drive.runner
+    motor = drive.motor
     return {
         'address': drive.address,
         'model': drive.model.name,
         'serial_number': drive.serial_number,
         'time': drive.time,
         'silent': not drive.listening,
-        'mode': int(runner.mode),
-        'source': runner.source.value,
-        'scmd': int(runner.scmd),
-        'run_input': runner.run_input,
-        'inv_st': drive.inv_st,
-        'inv_st_text': drive.inv_st_text,
+        'run_input': drive.control_unit.run_input,
+        **drive.control_unit.report(),
         'fault': next(iter(drive.faults.codes), 0),
         'faults': drive.faults.codes,
         'alarms': drive.faults.alarms,
-        'state': runner.state,
-        'control_word': int(runner.control_word),
-        'status_word': int(runner.status_word),
         'frequency': motor.frequency,
         'speed': motor.speed,
         'rotor_speed': motor.rotor_speed,
@@ -51,13 +44,6 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'current': motor.current,
         'torque': 100 * motor.torque,
         'dc_link': motor.dc_link,
-        'setpoint': drive.peek(runner.setpoint_key),
-        'setpoint_raw': drive.memory.raw(runner.setpoint_key),
-        'setpoint_key': runner.setpoint_key,
-        'sio_err': int(drive.faults.sio_err),
-        'ack_reads': drive.ack_reads,
-        'sio_err_reads': drive.sio_err_reads,
-        'mode_ext_writes': drive.mode_ext_writes,
         'writes': dict(drive.writes),
         'command_writes': dict(drive.command_writes),
         'error_log': [[entry.code, entry.op_time] for entry in drive.faults.log],

@@ -27,30 +27,22 @@ import time
 from typing import Any
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
-from nfo_sinus_driver.simulator.doors import GATEWAY_TIMEOUT
-from nfo_sinus_driver.simulator.doors import door
-from nfo_sinus_driver.simulator.doors import parse_door
-from nfo_sinus_driver.simulator.drive import LINE_SETTINGS
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.firmware import firmware_of
-from nfo_sinus_driver.simulator.firmware import with_firmware
-from nfo_sinus_driver.simulator.identification import KNOWN
-from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
-from nfo_sinus_driver.simulator.injections import VERBS
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
+from nfo_sinus_driver.simulator.endpoints import endpoint
+from nfo_sinus_driver.simulator.endpoints import parse_endpoint
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.family import verbs_of
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
-from nfo_sinus_driver.simulator.machine import machine_of
-from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.report import describe
-from nfo_sinus_driver.simulator.timing import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 from nfo_sinus_driver.simulator.trace import Trace
-from nfo_sinus_driver.simulator.variant import Variant
 
 #: How often every drive catches up with the clock while nobody asks it (s).
 _TICK = 0.05
@@ -63,15 +55,13 @@ class Simulator:
     Simulated drives on one line, or on several; a context manager.
 
     :param addresses: one drive for each.
-    :param protocol: one of :data:`~nfo_sinus_driver.simulator.doors.PROTOCOLS`.
+    :param model: the drive family, by the name of its folder.
+    :param protocol: one of :data:`~nfo_sinus_driver.simulator.endpoints.PROTOCOLS`.
     :param link: a symbolic link to the pseudo-terminal; without it, only the device.
     :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
     :param baud: of the line and of the drives; by default the protocol's.
     :param char_format: likewise.
     :param also: more lines to the same drives, each as ``PROTOCOL:LINK`` or ``PROTOCOL:TCP_PORT``.
-    :param dialect: the manual that describes the drives' Classic protocol, ``2.03`` or ``5.0``;
-        by default as the parameter fieldbus.sw_ver says.
-    :param lenient: a Classic message that is refused is no serial fault.
     :param echo: the first line returns every byte it gets, as a half-duplex adapter does.
     :param gateway_timeout: how long the gateway of Modbus TCP waits for a drive (s).
     :param paced: bytes take the time they take on a real line.
@@ -82,10 +72,8 @@ class Simulator:
     :param boot_time: how long a drive is silent after power-on (s).
     :param serial_numbers: of the first drives, in the order of their addresses; the rest have
         their own.
-    :param newer_functions: how the drives treat functions 17, 23 and 43: ``known``, ``refused``
-        or ``silent``.
-    :param variant: what the drives do where the manuals leave it open; by default as their family.
-    :raises ValueError: a wrong address, model, protocol, baud rate or parameter.
+    :param options: what else can be chosen of drives of this family.
+    :raises ValueError: a wrong address, model, protocol, baud rate, parameter or option.
     :raises PortError: the port or link cannot be had.
     :raises ControlError: another simulator is there.
 
@@ -101,15 +89,13 @@ class Simulator:
         self,
         addresses: Sequence[int] = (1,),
         *,
-        model: str = 'sinus_g2',
+        model: str = USUAL,
         protocol: str = 'modbus_rtu',
         link: str | None = None,
         tcp: int | None = None,
         baud: int | None = None,
         char_format: str | None = None,
         also: Sequence[str] = (),
-        dialect: str | None = None,
-        lenient: bool = False,
         echo: bool = False,
         gateway_timeout: float = GATEWAY_TIMEOUT,
         paced: bool = False,
@@ -120,47 +106,35 @@ class Simulator:
         run_input: bool = True,
         boot_time: float = 2.0,
         serial_numbers: Sequence[str] = (),
-        newer_functions: str = KNOWN,
-        variant: Variant | None = None,
+        **options: Any,
     ) -> None:
-        machine = machine_of(load_family(model))
-        known = with_firmware(machine, settings or {}, dialect)
-        firmware = firmware_of(Memory(machine, known))
-        first = door(
-            protocol, link=link, tcp=tcp, baud=baud, char_format=char_format, firmware=firmware
-        )
-        doors = [first, *(parse_door(text, firmware) for text in also)]
+        first = endpoint(protocol, link=link, tcp=tcp, baud=baud, char_format=char_format)
+        endpoints = [first, *map(parse_endpoint, also)]
         if echo and not first.make(0.0).serial:
             raise ValueError(f'{protocol} has no echo')
         for address in _checked(addresses):
-            for one in doors:
-                one.check(model, address)
-        timing = first.timing
-        labels = {key: machine[key].labels for key in LINE_SETTINGS}
-        serial = {
-            'serial.bus_type': labels['serial.bus_type'][first.bus_type],
-            'serial.si_baud': labels['serial.si_baud'][BAUD_CODES[timing.baud]],
-            'serial.si_prot': labels['serial.si_prot'][first.format_code(firmware)],
-            **known,
-        }
-        if newer_functions not in NEWER_FUNCTIONS:
-            raise ValueError(f'newer_functions: choose one of {", ".join(NEWER_FUNCTIONS)}')
+            for one in endpoints:
+                one.check(address)
         if len(serial_numbers) > len(addresses):
             raise ValueError(f'{len(serial_numbers)} serial numbers for {len(addresses)} drives')
         self.drives = {
-            address: SimulatedDrive(
+            address: simulated_drive(
                 model,
                 address,
-                settings=serial,
+                settings=settings,
                 run_input=run_input,
                 boot_time=boot_time,
                 serial_number=number,
-                newer_functions=newer_functions,
-                lenient=lenient,
-                variant=variant,
+                **options,
             )
             for address, number in itertools.zip_longest(addresses, serial_numbers)
         }
+        for drive, one in itertools.product(self.drives.values(), endpoints):
+            if one.tables not in drive.servers:
+                raise ValueError(f'{model} does not speak {one.protocol}')
+        for drive in self.drives.values():
+            drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
+        self._verbs = verbs_of(model)
         self.lock = threading.RLock()
         self.control: str | None = None
         self.failure: Exception | None = None
@@ -176,7 +150,7 @@ class Simulator:
                     'stop it, or choose another --link or --control'
                 )
             self.lines = []
-            for number, one in enumerate(doors):
+            for number, one in enumerate(endpoints):
                 port = one.open()
                 stack.callback(port.close)
                 stream = None
@@ -208,7 +182,7 @@ class Simulator:
             # nothing went wrong: keep it all until stop()
             self._clean_up = stack.pop_all()
         self.protocol = protocol
-        self.timing = timing
+        self.timing = first.timing
 
     def start(self) -> None:
         """Begin to serve."""
@@ -259,13 +233,13 @@ class Simulator:
         self, what: str, *values: object, address: int | None = None, **arguments: object
     ) -> None:
         """
-        Let something happen: see :data:`~nfo_sinus_driver.simulator.injections.VERBS`.
+        Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`.
 
         :raises ValueError: no such verb, drive or argument, or a value that is not possible.
         """
-        if what not in VERBS:
-            raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(VERBS)}')
-        verb = VERBS[what]
+        if what not in self._verbs:
+            raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(self._verbs)}')
+        verb = self._verbs[what]
         try:
             bound = verb.bind(values, arguments)
         except ValueError as error:

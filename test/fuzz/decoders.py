@@ -210,7 +210,7 @@ def _judge_line(
             except Refused as error:
                 answer, refused = None, error
             assert len(reader.other) + len(reader.frame) == len(fed), 'bytes were lost or doubled'
-            assert reader.missing >= 1 and reader.patience > 0
+            assert reader.bytes_needed >= 1 and reader.inter_byte_timeout > 0
             if answer is None and refused is None:
                 break
             begin = len(reader.passed_over)

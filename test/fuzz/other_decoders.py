@@ -36,7 +36,7 @@ from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.link import classic_refusal
 from nfo_sinus_driver.simulator.classic import Classic
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
@@ -170,7 +170,7 @@ def _receiving(
     def case(random: Random, frames: int) -> None:
         mutator = Mutator(random)
         protocol = make()
-        drive = SimulatedDrive()
+        drive = simulated_drive()
         receiver = Receiver(protocol, 0.0, _SILENCE)
         now = 0.0
 

@@ -330,8 +330,8 @@ MUTANTS = (
         8,
         'a late answer is believed',
         'nfo_sinus_driver/link/serial_link.py',
-        '        probed = not isinstance(request, Write) and self._make_certain(request)',
-        '        probed = False',
+        '        resynced = not isinstance(request, Write) and self._make_certain(request)',
+        '        resynced = False',
         (_RTU_LINK,),
     ),
     Mutant(
@@ -353,8 +353,8 @@ MUTANTS = (
     Mutant(
         8,
         'an answer that comes twice is believed twice',
-        'nfo_sinus_driver/link/serial_link.py',
-        '        if self._repeats is None:',
+        'nfo_sinus_driver/link/late_replies.py',
+        '        if self.repeated is None:',
         '        if True:',
         (_ECHO,),
     ),

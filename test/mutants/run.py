@@ -67,7 +67,7 @@ def _is_noticed(mutant: Mutant) -> bool:
         done = subprocess.run(
             (*_PYTEST, *mutant.tests),
             cwd=copy,
-            env={**os.environ, 'PYTHONPATH': path, 'PYTHONDONTWRITEBYTECODE': '1'},
+            env={**os.environ, 'FULL': '1', 'PYTHONPATH': path, 'PYTHONDONTWRITEBYTECODE': '1'},
             capture_output=True,
             text=True,
             check=False,

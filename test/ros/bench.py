@@ -33,6 +33,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
+import forks
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from lifecycle_msgs.srv import GetState
@@ -69,6 +70,8 @@ A_WHILE = 2.0
 POLL_RATE = 25.0
 #: For a test that does.
 FULL_RATE = ('-p', 'poll_rate:=0.0')
+#: For a test that wants the command itself, and no fork.
+EXECUTED = ('env',)
 
 TOPICS = {
     'status': (DriveStatus, 10),
@@ -104,21 +107,30 @@ def holds_for(seconds: float, condition: Callable[[], Any], what: str) -> None:
         time.sleep(0.02)
 
 
+def start(
+    command: list[str], environment: dict[str, str], log: Path
+) -> subprocess.Popen[bytes]:
+    """Start any command; what it says goes to the end of a file."""
+    with log.open('ab') as stream:
+        return subprocess.Popen(
+            command,
+            env=environment,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+
 class Process:
     """A process whose output goes to a file."""
 
-    def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
+    def __init__(
+        self, command: list[str], environment: dict[str, str], log: Path, start: Any = start
+    ) -> None:
         self._log = log
         self._may_end = False
-        with log.open('ab') as stream:
-            self._process = subprocess.Popen(
-                command,
-                env=environment,
-                stdout=stream,
-                stderr=subprocess.STDOUT,
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,
-            )
+        self._process = start(command, environment, log)
 
     @property
     def text(self) -> str:
@@ -200,7 +212,8 @@ class Bench(contextlib.ExitStack):
         command = [_executable('simulator'), '--trace', str(self.trace)]
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
         command += [*(['--paced'] if paced else []), *arguments]
-        process = Process(command, self._environment, self.folder / 'simulator.log')
+        log = self.folder / 'simulator.log'
+        process = Process(command, self._environment, log, forks.start)
         self.callback(process.end)
         wait_until(lambda: 'serving' in process.text or not process.running, 'the simulator')
         assert process.running, process.text
@@ -219,10 +232,14 @@ class Bench(contextlib.ExitStack):
         return self.bare_driver(*settings, *arguments, through=through)
 
     def bare_driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
-        """Start a driver with ROS arguments alone, by way of another command if need be."""
+        """
+        Start a driver with ROS arguments alone, by way of another command if need be.
+
+        With one it is a process that was executed as such, and else a fork.
+        """
         command = [*through, _executable('driver'), '--ros-args', *arguments]
         log = self.folder / f'driver{len(self._drivers)}.log'
-        process = Process(command, self._environment, log)
+        process = Process(command, self._environment, log, start if through else forks.start)
         self._drivers.append(process)
         _watched.append(process)
         self.callback(_watched.remove, process)

@@ -239,7 +239,7 @@ class Stubborn(contextlib.ExitStack):
         #: What can be set the way that the bench goes.
         self.names = tuple(settings(bench.way))
         self.simulator = Simulator(
-            **bench.line, trace=str(bench.trace), variant=hardest(bench.way.model)
+            **bench.line, trace=str(bench.trace), **hardest(bench.way.model)
         )
         self.drive: SimulatedDrive = self.simulator.drives[1]
 

@@ -27,6 +27,7 @@ import sys
 import time
 
 from bench import A_WHILE
+from bench import EXECUTED
 from bench import PATIENCE
 from bench import Bench
 from bench import Client
@@ -103,7 +104,7 @@ def test_a_busy_port_is_waited_for_and_its_holder_is_named(bench: Bench) -> None
 @needs('serial')
 def test_a_second_driver_on_the_port_is_told_who_has_it(bench: Bench) -> None:
     bench.simulator()
-    first = bench.driver()
+    first = bench.driver(through=EXECUTED)
     bench.client().connected()
     second = bench.driver('-r', '__ns:=/second')
     _says(second, 'in use by driver (pid ')

@@ -16,13 +16,13 @@
 
 from __future__ import annotations
 
-from nfo_sinus_driver.simulator.variant import Variant
+from collections.abc import Mapping
 
 _HARDEST = {
-    'sinus_g2': Variant(run_command_in_fault='keeps', refuses_in_fault='all'),
+    'sinus_g2': {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'},
 }
 
 
-def hardest(model: str = 'sinus_g2') -> Variant | None:
-    """Return it for a drive family; ``None`` where it is as drives of this family are anyway."""
-    return _HARDEST.get(model)
+def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
+    """Return its options for a drive family; none where drives of it are so anyway."""
+    return _HARDEST.get(model, {})

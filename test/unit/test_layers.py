@@ -44,7 +44,7 @@ MAY_IMPORT = {
     'drive': {'bus', 'catalog', 'link'},
     # of drive/ only events.py, which has no code
     'wording': {'catalog', 'drive'},
-    # the codes of each drive that is simulated
+    # the folders of a family in there, of its words; the rest, of which is the default
     'simulator': {'catalog', 'families'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'wording'},
     'demo': {'node'},
@@ -71,6 +71,16 @@ NAMED = {
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
 PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
+
+#: What names a family in a file that is to know none: in an import, an identifier, a text.
+FAMILY = re.compile(
+    '|'.join([*families(), r'sinus_', r'simulator\.sinus\b', r'(?<![a-z0-9])g2', 'optimal']),
+    re.IGNORECASE,
+)
+#: Every parameter of every family: none of them is known there either.
+KEYS = re.compile(
+    '|'.join(sorted({re.escape(key) for name in families() for key in load_family(name)}))
+)
 
 MOST_LINES = 600
 #: Files that have been allowed to be longer, and how long: to be split, never to grow.
@@ -154,6 +164,12 @@ def named(tree: ast.Module) -> set[str]:
     return {name for text in texts for name in family_names().findall(text)}
 
 
+def families_in(source: str) -> Iterator[str]:
+    """What of a family stands in a file that is to know none, the name of the package apart."""
+    text = source.replace(PACKAGE, '')
+    yield from (found[0] for pattern in (FAMILY, KEYS) for found in pattern.finditer(text))
+
+
 def violations(path: str, source: str) -> list[str]:
     """What is wrong with a file of the package; ``path`` is its path below the package."""
     tree = ast.parse(source)
@@ -178,6 +194,12 @@ def violations(path: str, source: str) -> list[str]:
     if room not in NAMES_FAMILIES:
         more = named(tree) - NAMED.get(path, set())
         found += [f'{room} names {name}' for name in sorted(more)]
+    if room == 'simulator':
+        own, _, inside = path.removeprefix('simulator/').rpartition('/')
+        others = [name for name in families() if own and name != own]
+        found += [f'{own} imports {name}' for name in others if f'simulator.{name}' in source]
+        if not own:
+            found += [f'{inside} knows {what}' for what in families_in(source)]
     lines = source.count('\n')
     if lines > LONGER.get(path, MOST_LINES):
         found.append(f'{lines} lines are too many')
@@ -228,6 +250,11 @@ def package_files() -> list[str]:
     return sorted(path.relative_to(package).as_posix() for path in package.rglob('*.py'))
 
 
+def package_sources() -> dict[str, str]:
+    """What stands in each of them."""
+    return {path: (ROOT / PACKAGE / path).read_text(encoding='utf-8') for path in package_files()}
+
+
 def own_files() -> list[str]:
     """Every Python file of the project, by its path; nothing that was built or installed."""
     folders = (PACKAGE, 'test', 'benchmark', 'launch', 'tools', 'docs', 'msg_defs')
@@ -235,9 +262,9 @@ def own_files() -> list[str]:
     return sorted(path.relative_to(ROOT).as_posix() for path in [*found, *ROOT.glob('*.py')])
 
 
-@pytest.mark.parametrize('path', package_files())
-def test_file_keeps_the_rules_of_the_house(path: str) -> None:
-    assert violations(path, (ROOT / PACKAGE / path).read_text(encoding='utf-8')) == []
+def test_every_file_keeps_the_rules_of_the_house() -> None:
+    found = {path: violations(path, source) for path, source in package_sources().items()}
+    assert {path: rules for path, rules in found.items() if rules} == {}
 
 
 def test_every_room_is_looked_at() -> None:
@@ -247,9 +274,7 @@ def test_every_room_is_looked_at() -> None:
 
 
 def test_no_files_import_each_other_in_a_circle() -> None:
-    package = ROOT / PACKAGE
-    sources = {path: (package / path).read_text(encoding='utf-8') for path in package_files()}
-    assert circles(sources) == set()
+    assert circles(package_sources()) == set()
 
 
 @pytest.mark.parametrize('path', sorted(LONGER))
@@ -265,9 +290,13 @@ def test_what_is_named_still_is(path: str) -> None:
     assert named(ast.parse((ROOT / PACKAGE / path).read_text(encoding='utf-8'))) == NAMED[path]
 
 
-@pytest.mark.parametrize('path', own_files())
-def test_file_has_the_licence_header(path: str) -> None:
-    assert LICENCE.match((ROOT / path).read_text(encoding='utf-8'))
+def test_every_file_has_the_licence_header() -> None:
+    without = [
+        path
+        for path in own_files()
+        if not LICENCE.match((ROOT / path).read_text(encoding='utf-8'))
+    ]
+    assert without == []
 
 
 def test_rooms_without_ros_load_without_ros() -> None:
@@ -347,6 +376,20 @@ for module in {modules!r}:
         ('node/main.py', 'if model == "sinus_optimal": pass', 'node names sinus_optimal'),
         ('link/rtu.py', 'MODE = "fieldbus.mode"', 'link names fieldbus.mode'),
         ('drive/drive.py', '\n' * 601, '601 lines are too many'),
+        ('simulator/drive.py', "model = 'sinus_g2'", 'drive.py knows sinus_g2'),
+        ('simulator/drive.py', 'class OptimalUnit: ...', 'drive.py knows Optimal'),
+        ('simulator/drive.py', 'def g2_only(): ...', 'drive.py knows g2'),
+        (
+            'simulator/drive.py',
+            'from nfo_sinus_driver.simulator.sinus import variant',
+            'drive.py knows simulator.sinus',
+        ),
+        (
+            'simulator/sinus_g2/family.py',
+            'from nfo_sinus_driver.simulator.sinus_optimal import family',
+            'sinus_g2 imports sinus_optimal',
+        ),
+        ('simulator/drive.py', "key == 'fieldbus.mode'", 'drive.py knows fieldbus.mode'),
         ('shed/tools.py', '', 'shed is no room of the house'),
     ],
 )
@@ -366,6 +409,8 @@ def test_checker_sees(path: str, source: str, complaint: str) -> None:
         ('drive/drive.py', '"""Such as motor.p_nom of a sinus_g2."""\nlog = "motor.log"'),
         ('families/sinus_g2/profile.py', 'MODE = "fieldbus.mode"'),
         ('drive/drive.py', '\n' * 600),
+        ('simulator/drive.py', 'from nfo_sinus_driver.families import USUAL'),
+        ('simulator/sinus_g2/control_unit.py', "class G2:\n    key = 'fieldbus.mode'"),
     ],
 )
 def test_checker_lets_pass(path: str, source: str) -> None:

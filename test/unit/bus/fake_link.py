@@ -28,6 +28,7 @@ from typing import NamedTuple
 from support.addresses import packed
 from support.addresses import register
 
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
@@ -66,7 +67,7 @@ class FakeLink:
     :ivar opening: called when the port is opened; may raise.
     """
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self) -> None:
         self.done: list[Done] = []
@@ -75,7 +76,7 @@ class FakeLink:
         self.closing: Callable[[], None] = lambda: None
         self.opened = 0
         self.closed = 0
-        self.probes: dict[int, tuple[Address, ...]] = {}
+        self.resync_reads: dict[int, tuple[Address, ...]] = {}
         self._condition = threading.Condition()
         self._hold = self._holds = False
 
@@ -132,8 +133,8 @@ class FakeLink:
             self.read(unit, source)
         return self.write(unit, address, data)
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
-        self.probes[unit] = tuple(probes)
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        self.resync_reads[unit] = tuple(addresses)
 
     def _transact(self, done: Done) -> Reply:
         with self._condition:

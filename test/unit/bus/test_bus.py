@@ -217,9 +217,9 @@ def test_nothing_goes_between_a_read_and_the_write_behind_it(
     assert link.numbers == [0, 1, 2, 4, 3]
 
 
-def test_probes_are_passed_to_the_link(bus: Bus, link: FakeLink) -> None:
-    bus.use_probes(3, (register(1), register(2, 2)))
-    wait_until(lambda: link.probes == {3: (register(1), register(2, 2))})
+def test_resync_reads_are_passed_to_the_link(bus: Bus, link: FakeLink) -> None:
+    bus.use_resync_reads(3, (register(1), register(2, 2)))
+    wait_until(lambda: link.resync_reads == {3: (register(1), register(2, 2))})
 
 
 # --- who is next ----------------------------------------------------------------------------------
@@ -574,9 +574,9 @@ def test_link_that_raises_when_it_is_closed(
     assert not bus.alive
 
 
-def test_probes_that_raise(bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link, 'use_probes', raiser(RuntimeError()))
-    bus.use_probes(1, ())
+def test_resync_reads_that_raise(bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link, 'use_resync_reads', raiser(RuntimeError()))
+    bus.use_resync_reads(1, ())
     assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 

@@ -78,8 +78,7 @@ class Bench:
 
     def __init__(self, trace: Path, **options: Any) -> None:
         self._trace = trace
-        options.setdefault('serial_numbers', ['NFO1001', 'NFO1002'])
-        options.setdefault('variant', hardest())
+        options = {'serial_numbers': ['NFO1001', 'NFO1002'], **hardest(), **options}
         self.simulator = Simulator([1, 2], trace=str(trace), boot_time=0.1, **options)
         self.options = ('--port', self.simulator.port, '--response-timeout', '2.0')
         for name in ('protocol', 'model'):
@@ -121,7 +120,7 @@ class Bench:
             drive = self.drive()
             drive.write_raw('fieldbus.mode', _BUS)
             optimal = drive.model.name == 'sinus_optimal'
-            drive.memory.set(drive.runner.setpoint_key, hertz)
+            drive.memory.set(drive.control_unit.setpoint_key, hertz)
             drive.write_raw('fieldbus.smode' if optimal else 'fieldbus.scmd', _RUN)
         # no longer on its ramp, which may bring it to its current limit
         wait_until(lambda: abs(self.state()['frequency'] - hertz) < 0.1)

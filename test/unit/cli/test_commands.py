@@ -99,7 +99,7 @@ def test_stop_of_what_the_control_word_runs(make_bench: MakeBench, way: str) -> 
     bench = make_bench(settings=QUICK, **WAYS[way])
     drive = bench.drive()
     with bench.simulator.lock:
-        drive.memory.set(drive.runner.setpoint_key, 20.0)
+        drive.memory.set(drive.control_unit.setpoint_key, 20.0)
     for word in STEPS[drive.model.name]:
         begun = bench.state()['time']
         with bench.simulator.lock:

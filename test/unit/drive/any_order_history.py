@@ -30,7 +30,7 @@ from typing import Any
 
 from any_order_rig import Rig
 
-from nfo_sinus_driver.simulator.control_source import Source
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
 
 #: How the driver is set.
 POLL_RATE = 5.0
@@ -242,30 +242,30 @@ class History:
     @property
     def by_bus(self) -> bool:
         """The bus controls the drive."""
-        return self._far.runner.source in BUS_SOURCES
+        return self._far.control_unit.source in BUS_SOURCES
 
     @property
     def running(self) -> bool:
         """The drive carries out a run command that came over the bus."""
-        runner = self._far.runner
+        unit = self._far.control_unit
         if self._optimal:
-            return self.by_bus and bool(runner._running)
-        return self.by_bus and runner.state == 'OPERATION_ENABLED'
+            return self.by_bus and bool(unit._running)
+        return self.by_bus and unit.state == 'OPERATION_ENABLED'
 
     @property
     def tuning(self) -> bool:
         """The drive measures its motor, which has current."""
-        return not self._optimal and self._far.runner.tuning is not None
+        return not self._optimal and self._far.control_unit.tuning is not None
 
     @property
     def standing(self) -> bool:
         """A run command that came over the bus stands in it, carried out or not."""
-        runner = self._far.runner
+        unit = self._far.control_unit
         if self._optimal:
-            return self.by_bus and bool(runner.scmd or runner._steps.run)
-        if runner.source is Source.SCMD:
-            return bool(runner.scmd & 1)
-        return self.by_bus and bool(runner.word & SWITCH_ON)
+            return self.by_bus and bool(unit.scmd or unit._steps.run)
+        if unit.source is Source.SCMD:
+            return bool(unit.scmd & 1)
+        return self.by_bus and bool(unit.word & SWITCH_ON)
 
     @property
     def turning(self) -> bool:
@@ -277,8 +277,8 @@ class History:
         """Return what has to stay as it is for the motor to run on."""
         yield not self._far.faults
         yield self.by_bus
-        yield self._far.runner.run_input
-        yield self._far.runner.initialised
+        yield self._far.control_unit.run_input
+        yield self._far.control_unit.initialised
 
     @property
     def _connected(self) -> bool:
@@ -341,8 +341,11 @@ class History:
             self.lose(self.noticed)
         if ended[0]:
             self._faulted_at = self.now
-            by_itself = all(map(self._far.self_restart._has_tries, self._far.faults.codes))
+            by_itself = all(map(self._has_tries, self._far.faults.codes))
             self._ended_by_fault = enabled_at if by_itself and sum(ended) == 1 else None
+
+    def _has_tries(self, code: int) -> bool:
+        return not self._optimal and self._far.control_unit.self_restart._has_tries(code)
 
     def _forgive_fault(self) -> None:
         """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""

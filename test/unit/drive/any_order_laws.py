@@ -44,8 +44,8 @@ from support import trace_laws
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.variant import ALL
-from nfo_sinus_driver.simulator.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.variant import ALL
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
@@ -131,7 +131,7 @@ class Laws(History):
         if not self.watched or self._method == 'monitor':
             return
         self._foreign = self._foreign and standing
-        refuses = self._far.runner.variant.refuses_in_fault != NOTHING
+        refuses = self._far.control_unit.variant.refuses_in_fault != NOTHING
         if refuses and self._method == 'mode_scmd' and self._far.faults:
             # it refuses the stop, so that it may go on until it was seen to
             self._no_run_from = max(self._no_run_from, self.now + self.noticed)
@@ -152,7 +152,8 @@ class Laws(History):
         # one that ran before had no fault to acknowledge
         started = self._running_since is not None and self._running_since > begun
         by_us = started and self.disturbed_at < begun and self.enabled_at is None
-        by_itself = self._far.self_restart.waiting or self._ended_by_fault is not None
+        waits = not self._optimal and self._far.control_unit.self_restart.waiting
+        by_itself = waits or self._ended_by_fault is not None
         if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
             self._turned_from = None
             return
@@ -161,7 +162,7 @@ class Laws(History):
             self._turned_from = frames
         if self._whole_since is None or self._whole_since > begun:
             return
-        if self._far.runner.variant.refuses_in_fault != ALL:
+        if self._far.control_unit.variant.refuses_in_fault != ALL:
             if self.turning:
                 raise Broken('an acknowledgement turns the motor')
         elif frames > self._turned_from + POWERED:
@@ -310,7 +311,7 @@ class Laws(History):
         """Return what is true of the drive now, by the names of what is told of it."""
         far = self._far
         truth = {
-            'code': far.inv_st,
+            'code': far.control_unit.status_code,
             'fault': bool(far.faults),
             'by bus': self.by_bus,
             # nobody says what a tuning shows of it
@@ -319,8 +320,8 @@ class Laws(History):
             'frequency': round(far.motor.frequency, 1),
         }
         if self._optimal:
-            truth['run input missing'] = not far.runner.run_input
-            truth['sleeping'] = bool(far.runner._sleeping)
+            truth['run input missing'] = not far.control_unit.run_input
+            truth['sleeping'] = bool(far.control_unit._sleeping)
         else:
             code = far.memory.raw('control.mode')
             truth['control mode'] = self._control_modes[code]

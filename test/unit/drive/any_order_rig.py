@@ -51,6 +51,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -60,6 +61,7 @@ from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Refused as FarRefusal
 
 #: One byte at 57600 8E1, the silence between frames, and what the drive takes to answer, s.
@@ -150,7 +152,7 @@ class DirectLink:
     :ivar frames: every request, for :mod:`support.trace_laws`.
     """
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -191,7 +193,7 @@ class DirectLink:
     def parts(self, address: Address) -> tuple[Address]:
         return (address,)
 
-    def use_probes(self, unit: int, probes: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         pass
 
     def identify(self, unit: int) -> _Told:
@@ -202,7 +204,9 @@ class DirectLink:
             raise NotReady(self._not_ready_until)
         register, count = address.index, address.size // 2
         request = struct.pack('>BBHH', unit, 3, register, count)
-        words = self._exchange(request, 5 + 2 * count, lambda far: far.read(register, count))
+        words = self._exchange(
+            request, 5 + 2 * count, lambda far: server(far).read(register, count)
+        )
         return Reply(packed(*words), self._rig.clock.now)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
@@ -213,7 +217,7 @@ class DirectLink:
             request = struct.pack('>BBHHB', unit, 16, register, len(words), len(data)) + data
 
         def carry_out(far: SimulatedDrive) -> Words:
-            far.write(register, words)
+            server(far).write(register, words)
             return ()
 
         self._rig.judge(lambda: self._rig.wrote(register, words))
@@ -230,7 +234,7 @@ class DirectLink:
         told = self._exchange(
             request,
             5 + 2 * count,
-            lambda far: far.write_and_read(register, words, source.index, count),
+            lambda far: server(far).write_and_read(register, words, source.index, count),
         )
         return Reply(packed(*told), self._rig.clock.now)
 

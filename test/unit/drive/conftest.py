@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Mapping
 import contextlib
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,6 @@ from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import stop_sequence
 from nfo_sinus_driver.drive import watch as watch_module
-from nfo_sinus_driver.simulator.variant import Variant
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def make_virtual() -> Iterator[MakeVirtual]:
 
     def make(
         parameters: dict[str, Any] | None = None,
-        variant: Variant | None = None,
+        variant: Mapping[str, str] | None = None,
         **settings: Any,
     ) -> VirtualRig:
         end()

@@ -46,6 +46,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import Link
@@ -106,7 +107,7 @@ class Notes:
 class Tap:
     """A link with somebody who sees every transaction just before it is sent."""
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self, link: Link) -> None:
         self._link = link
@@ -114,7 +115,7 @@ class Tap:
         self.open = link.open
         self.close = link.close
         self.parts = link.parts
-        self.use_probes = link.use_probes
+        self.use_resync_reads = link.use_resync_reads
         self.identify = link.identify
 
     def read(self, unit: int, address: Address) -> Reply:
@@ -156,8 +157,7 @@ class Rig:
         **options: Any,
     ) -> None:
         self._trace = trace
-        options.setdefault('boot_time', 0.2)
-        options.setdefault('variant', hardest(settings.model))
+        options = {'boot_time': 0.2, **hardest(settings.model), **options}
         self.simulator = Simulator(
             baud=BAUD,
             trace=str(trace),

@@ -39,6 +39,7 @@ from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 
 _TURNAROUND = 0.002
@@ -135,7 +136,7 @@ class LineRig:
         classic = protocol == 'classic'
         line = LineSettings(baud, _CLASSIC_FORMAT) if classic else LineSettings(baud_rate=baud)
         self.fars = {
-            address: SimulatedDrive(
+            address: simulated_drive(
                 address=address,
                 settings={'control.accel': 0.5, 'control.retard': 0.5, **(parameters or {})},
             )

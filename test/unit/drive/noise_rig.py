@@ -39,7 +39,7 @@ from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link.rtu_link import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.simulator import drive as simulated
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 
 _TURNAROUND = 0.002
@@ -148,7 +148,7 @@ class NoiseRig(Rig):
         # the motor need not be exact here, and the time is long
         self._coarse = mock.patch.object(simulated, '_STEP', 0.05)
         self._coarse.start()
-        far = SimulatedDrive(settings={'control.accel': 0.5, 'control.retard': 0.5})
+        far = simulated_drive(settings={'control.accel': 0.5, 'control.retard': 0.5})
         super().__init__(far, DriveSettings(**settings))
 
     def begin(self) -> None:

@@ -44,20 +44,20 @@ from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
+from support.examples import examples
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.refusal import Refused as Refusal
-from nfo_sinus_driver.simulator.self_restart import TRIES
-from nfo_sinus_driver.simulator.variant import ALL
-from nfo_sinus_driver.simulator.variant import DROPS
-from nfo_sinus_driver.simulator.variant import KEEPS
-from nfo_sinus_driver.simulator.variant import NOTHING
-from nfo_sinus_driver.simulator.variant import REFUSED
-from nfo_sinus_driver.simulator.variant import SCMD
-from nfo_sinus_driver.simulator.variant import TAKEN
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus.variant import ALL
+from nfo_sinus_driver.simulator.sinus.variant import DROPS
+from nfo_sinus_driver.simulator.sinus.variant import KEEPS
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.variant import REFUSED
+from nfo_sinus_driver.simulator.sinus.variant import SCMD
+from nfo_sinus_driver.simulator.sinus.variant import TAKEN
+from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
 WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
@@ -72,7 +72,7 @@ SEED = int(os.environ.get('SEED', '0'))
 _SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
-    max_examples=40,
+    max_examples=examples(80),
     stateful_step_count=30,
     derandomize=True,
     deadline=None,
@@ -149,12 +149,12 @@ class AnyOrder(RuleBasedStateMachine):
         if restart_after is not None and not optimal:
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
-        variant = Variant(
-            run_command_in_fault=KEEPS if keeps else DROPS,
-            refuses_in_fault=refuses,
-            stop_in_tuning=REFUSED if tunes_on else TAKEN,
-        )
-        far = SimulatedDrive(self.model, settings=parameters, variant=variant)
+        variant = {
+            'run_command_in_fault': KEEPS if keeps else DROPS,
+            'refuses_in_fault': refuses,
+            'stop_in_tuning': REFUSED if tunes_on else TAKEN,
+        }
+        far = simulated_drive(self.model, settings=parameters, **variant)
         self.rig = Rig(
             far,
             DriveSettings(
@@ -245,7 +245,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.activate()
         if far.faults:
             self._answered('acknowledge')
-        if not far.runner.run_input:
+        if not far.control_unit.run_input:
             self.run_input_on()
         self._answered('enable')
         self.send(value, wait)
@@ -441,13 +441,13 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.far.end_fault_causes()
         self.rig.far.faults.acknowledge()
         self.rig.far.faults.acknowledge_serial()
-        self.rig.far.set_run_input(self.rig.far.runner.run_input)
+        self.rig.far.set_run_input(self.rig.far.control_unit.run_input)
         self.let(wait)
 
     @rule(key=st.sampled_from(('stop', 'start', 'ext')), wait=WAITS)
     def press(self, key: str, wait: float = 0.4) -> None:
         self.laws.disturbed()
-        getattr(self.rig.far, f'press_{key}')()
+        self.rig.far.control_unit.press(key)
         self.let(wait)
 
     @rule(mode=st.sampled_from((1, 2, 3)), wait=WAITS)
@@ -464,7 +464,7 @@ class AnyOrder(RuleBasedStateMachine):
     def run_by_another(self, wait: float = 1.0) -> None:
         """Let another master run the motor, the way this driver would."""
         self.until_noticed()
-        setpoint = self.rig.far.runner.setpoint_key
+        setpoint = self.rig.far.control_unit.setpoint_key
         if self.method == 'drive_control':
             words = (0xC076, 0xC077, 0xC07F)
             self._by_another(*((_CONTROL, word) for word in words), (setpoint, 100))
@@ -490,7 +490,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.let(wait)
 
     @_whole
-    @precondition(lambda self: not self.rig.far.runner.run_input)
+    @precondition(lambda self: not self.rig.far.control_unit.run_input)
     @rule(wait=WAITS)
     def run_input_on(self, wait: float = 1.0) -> None:
         self.until_noticed()
@@ -652,7 +652,7 @@ def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
             state.end_ride(event, after=0.2, wait=1.0)
             if state.rig.far.faults:
                 state.end_fault(wait=1.0)
-            if not state.rig.far.runner.run_input:
+            if not state.rig.far.control_unit.run_input:
                 state.run_input_on(wait=1.0)
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)

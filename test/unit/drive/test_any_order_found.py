@@ -58,7 +58,7 @@ def test_a_start_that_the_run_input_ends_does_not_wait_for_it() -> None:
     state.begin(delay=1)
     try:
         state.enable(wait=0.4)
-        assert state.rig.far.inv_st_text == 'Wait...'
+        assert state.rig.far.control_unit.status_text == 'Wait...'
         state.run_input_off(wait=0.3)
         assert not state.laws.standing
         state.run_input_on(wait=3.0)
@@ -87,7 +87,7 @@ def timed_out(rig: VirtualRig) -> None:
     rig.ride()
     rig.kill()
     rig.elapse(3.0)
-    assert rig.far.inv_st_text == 'Sio Fail'
+    assert rig.far.control_unit.status_text == 'Sio Fail'
     rig.settings = dataclasses.replace(rig.settings, drive_timeout=1.5)
     rig.begin()
     rig.send(None)

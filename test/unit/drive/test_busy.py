@@ -156,7 +156,7 @@ def test_one_that_was_busy_was_not_switched_off(make_virtual: MakeVirtual) -> No
     rig.be_busy(rig.register('status.frq_set'), 5, writes=True)
     rig.send(10.0)
     rig.pass_time(0.03)
-    rig.far.press_stop()
+    rig.far.control_unit.press('stop')
     rig.pass_time(0.5)
     assert rig.said(Cause.CONTROL_LOST, Severity.WARNING)
     assert not rig.said('did not answer')
@@ -171,7 +171,7 @@ def test_one_that_did_not_answer_a_setpoint_may_have_been(make_virtual: MakeVirt
     def miss(register: int, words: Words | None) -> None:
         if register == setpoint and words is not None:
             rig.before = lambda register, words: None
-            rig.far.press_stop()
+            rig.far.control_unit.press('stop')
             raise NoAnswer('nobody answers')
 
     rig.before = miss

@@ -27,7 +27,7 @@ from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.simulator.control_source import Source
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
 
 _COMMANDS = {'sinus_g2': 'fieldbus.scmd', 'sinus_optimal': 'fieldbus.smode'}
 _SETPOINTS = {'sinus_g2': 'status.frq_set', 'sinus_optimal': 'fieldbus.input_freq_setpoint'}
@@ -51,20 +51,20 @@ class Left:
         model = rig.settings.model
         self.command = rig.register(_COMMANDS[model])
         self.setpoint = rig.register(_SETPOINTS[model])
-        runner = rig.far.runner
-        self._hand_over = runner.take
-        runner.take = self._keep_command
-        runner.scmd = type(runner.scmd)(RUN)
+        unit = rig.far.control_unit
+        self._hand_over = unit.take
+        unit.take = self._keep_command
+        unit.scmd = type(unit.scmd)(RUN)
         rig.far.memory.set(_SETPOINTS[model], 30.0)
         self.driven, self.turned = 0.0, False
         self._looked_at = rig.clock.now
         rig.looked = self._look
 
     def _keep_command(self, source: Source) -> None:
-        runner = self._rig.far.runner
-        standing = runner.scmd
+        unit = self._rig.far.control_unit
+        standing = unit.scmd
         self._hand_over(source)
-        runner.scmd = standing
+        unit.scmd = standing
 
     def _look(self) -> None:
         now, motor = self._rig.clock.now, self._rig.far.motor
@@ -117,7 +117,8 @@ def test_a_drive_that_refuses_set_points_until_it_is_controlled_is_stopped_first
     driven = []
 
     def refuse(register: int, words: Words | None) -> None:
-        if register == left.setpoint and words is not None and rig.far.runner.mode != Mode.BUS:
+        taken = rig.far.control_unit.mode == Mode.BUS
+        if register == left.setpoint and words is not None and not taken:
             raise Refused(4)
         if register == left.command:
             driven.append(left.driven)

@@ -29,7 +29,7 @@ from support.said import said
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.simulator import control_steps
+from nfo_sinus_driver.simulator.sinus_optimal import control_steps
 
 OVERLOAD = 5
 #: Bits of the Optimal's Drive Status [M1].
@@ -220,7 +220,7 @@ def test_each_step_of_the_optimal_is_confirmed_before_the_next(
 
     def note(key: str, raw: int) -> None:
         if key == 'fieldbus.drive_control':
-            confirmed.append((raw, rig.far.runner.status_word & (FROM_BUS | ENABLED)))
+            confirmed.append((raw, rig.far.control_unit.status_word & (FROM_BUS | ENABLED)))
         write(key, raw)
 
     monkeypatch.setattr(rig.far, 'write_raw', note)

@@ -36,6 +36,7 @@ from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.rtu_link import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 
 _TRANSACTIONS = 800
@@ -102,7 +103,7 @@ class Line:
     def _ask(self, data: bytes) -> bytes:
         unit = data[0]
         if unit not in self._drives:
-            self._drives[unit] = SimulatedDrive(address=unit, boot_time=0.0)
+            self._drives[unit] = simulated_drive(address=unit, boot_time=0.0)
             self._drives[unit].advance(1.0)
         request = self._protocol.unwrap(data)
         assert request is not None

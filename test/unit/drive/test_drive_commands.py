@@ -179,7 +179,7 @@ def test_a_ride(rig: Rig) -> None:
     rig.assert_stays_still()
     assert said(rig.drive.stop().result(PATIENCE)) == 'stopped (37 Bus Stby)'
     # control is kept
-    assert rig.far.runner.source.mode is Mode.BUS
+    assert rig.far.control_unit.mode is Mode.BUS
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(7.5)
 
@@ -200,7 +200,7 @@ def test_quick_stop_lets_the_motor_coast(make_rig: MakeRig) -> None:
     assert not rig.far.motor.driven
     assert rig.writes(MODE)[-1] == Mode.STOP
     rig.assert_stays_still()
-    assert rig.far.runner.source.mode is Mode.STOP
+    assert rig.far.control_unit.mode is Mode.STOP
     # and again from there
     rig.far.motor.rotor = 0.0
     assert rig.enable().startswith('enabled')
@@ -278,7 +278,7 @@ def test_run_input_is_missing(make_rig: MakeRig, impatient: None) -> None:
     assert 'DIN1' in message
     assert not rig.drive.armed
     # the run command that waits for RUN is taken back
-    wait_until(lambda: rig.far.runner.scmd == 0)
+    wait_until(lambda: rig.far.control_unit.scmd == 0)
     rig.simulator.inject('run', 'on')
     rig.publish(20)
     rig.assert_stays_still()
@@ -353,7 +353,7 @@ def test_acknowledge(rig: Rig) -> None:
     assert rig.notes.told('fault 5 Overload')
     rig.acknowledged = 1
     assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
-    assert rig.far.ack_reads == 1
+    assert rig.far.control_unit.ack_reads == 1
     rig.assert_stays_still()
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(20.0)
@@ -373,7 +373,7 @@ def test_nothing_to_acknowledge(rig: Rig) -> None:
     rig.connect()
     answer = said(rig.drive.acknowledge().result(PATIENCE))
     assert answer.startswith('nothing to acknowledge (')
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
 
 
 @pytest.mark.parametrize('code', [14, 15])
@@ -413,7 +413,7 @@ def test_monitor_writes_nothing_at_all(make_rig: MakeRig) -> None:
     rig.drive.deactivate().result(PATIENCE)
     assert said(rig.drive.disconnect(1.0).result(PATIENCE)) == 'only watched'
     assert functions(rig) <= ONLY_READ
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
 
 
 # --- set-points -----------------------------------------------------------------------------------
@@ -616,7 +616,7 @@ def test_bus_is_never_silent_for_long(make_rig: MakeRig) -> None:
     rig.drive.stop().result(PATIENCE)
     end = rig.far.time + 3.5
     wait_until(lambda: rig.far.time > end)
-    assert rig.far.runner.source.mode is Mode.BUS
+    assert rig.far.control_unit.mode is Mode.BUS
     assert rig.far.faults.codes == []
 
 
@@ -629,8 +629,8 @@ def test_clean_exit(make_rig: MakeRig) -> None:
     answer = said(rig.drive.disconnect(PATIENCE).result(PATIENCE))
     assert answer == 'stopping: it ramps down; control released'
     assert not rig.far.motor.driven
-    assert rig.far.runner.source.mode is Mode.STOP
-    assert rig.far.mode_ext_writes == 0
+    assert rig.far.control_unit.mode is Mode.STOP
+    assert rig.far.control_unit.mode_ext_writes == 0
     assert not rig.drive.armed
     assert not rig.drive.snapshot.connected
     # nobody talks any more, and no fault comes of it

@@ -78,7 +78,7 @@ def test_fault_that_somebody_else_acknowledges(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.faults.acknowledge()
         rig.far._settle()
-    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP)
+    wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP)
     assert_only_enable_helps(rig)
 
 
@@ -91,7 +91,7 @@ def test_fault_that_ends_while_the_drive_is_polled_seldom(make_rig: MakeRig) -> 
     with rig.simulator.lock:
         rig.far.faults.acknowledge()
         rig.far._settle()
-    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP)
+    wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP)
     rig.wait_until_still()
 
 
@@ -101,7 +101,7 @@ def test_fault_of_which_no_poll_knows(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.trip(OVERLOAD)
         rig.far.faults.acknowledge()
-        rig.far.runner.command(Scmd.STOP)
+        rig.far.control_unit.command(Scmd.STOP)
         rig.far._settle()
     wait_until(lambda: not rig.drive.armed)
     assert_only_enable_helps(rig)
@@ -198,10 +198,10 @@ def test_drive_that_restarts_by_itself(make_rig: MakeRig) -> None:
     rig.wait_for_frequency(20.0)
     rig.simulator.inject('power-cycle')
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.far.runner.source.mode is Mode.EXT)
+    wait_until(lambda: rig.far.control_unit.mode is Mode.EXT)
     rig.next_snapshots(5)
     assert not rig.drive.armed
-    assert rig.far.runner.source.mode is Mode.EXT
+    assert rig.far.control_unit.mode is Mode.EXT
 
 
 def test_line_that_is_dead_for_a_while(make_rig: MakeRig) -> None:
@@ -349,7 +349,7 @@ def test_a_fault_that_holds_a_run_command_keeps_nobody_from_connecting(rig: Rig)
     rig.connect()
     rig.acknowledged = 1
     rig.drive.acknowledge().result(PATIENCE)
-    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP and not rig.drive.stop_unconfirmed)
+    wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP and not rig.drive.stop_unconfirmed)
 
 
 def test_motor_that_somebody_else_starts_is_stopped(rig: Rig) -> None:
@@ -414,7 +414,7 @@ def test_stop_at_any_moment_of_enabling(make_rig: MakeRig, way: str) -> None:
         rig.wait_until_still()
         assert not rig.drive.armed
         # the last word is no run command, and no run command stands
-        assert rig.far.runner.scmd == Scmd.STOP
+        assert rig.far.control_unit.scmd == Scmd.STOP
         commands = rig.writes(SCMD)
         assert not commands or commands[-1] == Scmd.STOP or rig.writes(MODE)[-1] == Mode.STOP
         if way == 'deactivate':
@@ -429,7 +429,7 @@ def test_stop_during_the_start_delay(make_rig: MakeRig) -> None:
     rig = make_rig(parameters={'control.run_dly': 20})
     rig.connect()
     enabling = rig.drive.enable()
-    wait_until(lambda: rig.far.runner.waiting)
+    wait_until(lambda: rig.far.control_unit.inv_st == rig.far.control_unit.delayed)
     rig.publish(20.0)
     rig.drive.stop().result(PATIENCE)
     assert rig.refused(enabling) == 'it was stopped while it was being enabled'

@@ -29,6 +29,7 @@ from support.parameter_ends import Ends
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.link import PROTOCOLS
 
 _ON_CLASSIC = [on_classic(ends, '2.03') for ends in ENDS]
 EVERY = pytest.mark.parametrize('ends', _ON_CLASSIC, ids=[ends.name for ends in ENDS])
@@ -36,7 +37,9 @@ EVERY = pytest.mark.parametrize('ends', _ON_CLASSIC, ids=[ends.name for ends in 
 
 @pytest.fixture(scope='module')
 def registers() -> Registers:
-    bus = SimpleNamespace(space='classic', use_probes=lambda unit, probes: None)
+    bus = SimpleNamespace(
+        protocol=PROTOCOLS['classic'], use_resync_reads=lambda unit, addresses: None
+    )
     return Registers(bus, 1, load_family('sinus_g2'), 0)  # type: ignore[arg-type]
 
 

@@ -33,16 +33,15 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.faults import LogEntry
-from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.runner_g2 import G2Runner
 from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 _TUNING = 28
 #: InvSt when it is finished.
@@ -114,23 +113,24 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 @pytest.fixture
 def strict_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     """While a fault stands, no control word is taken either: [M0 §6.1.5] makes no exception."""
-    write = G2Runner._write_control
+    write = G2ControlUnit._write_control
 
-    def refuse(runner: G2Runner, word: Control) -> None:
-        if runner._faults:
+    def refuse(unit: G2ControlUnit, raw: int) -> None:
+        if unit.faults:
             raise Refused(Reason.STATE, 'a fault stands')
-        write(runner, word)
+        write(unit, raw)
 
-    monkeypatch.setattr(G2Runner, '_write_control', refuse)
+    monkeypatch.setattr(G2ControlUnit, '_write_control', refuse)
 
 
 def test_acknowledging(rig: Rig) -> None:
     rig.trip(5)
     wait_until(lambda: rig.drive.snapshot.text == 'Overload')
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
     assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert not rig.far.faults
-    assert (rig.far.ack_reads, rig.far.sio_err_reads, rig.far.mode_ext_writes) == (1, 0, 0)
+    unit = rig.far.control_unit
+    assert (unit.ack_reads, unit.sio_err_reads, unit.mode_ext_writes) == (1, 0, 0)
     assert 'nothing to acknowledge' in said(rig.drive.acknowledge().result(PATIENCE))
 
 
@@ -163,7 +163,7 @@ def test_a_drive_that_takes_no_word_while_a_fault_stands(
         assert said(rig.drive.acknowledge().result(PATIENCE)) == f'acknowledged {code} {text}'
         assert not rig.far.faults
         # what was refused of the stops before and after it is no fault of its own
-        assert not rig.far.faults.sio_err & ~(SioErr.BLOCKED | SioErr.NOT_PERMITTED)
+        assert not rig.far.faults.sio_err & ~(LineError.BLOCKED | LineError.NOT_PERMITTED)
         wait_until(lambda: not rig.drive.stop_unconfirmed)
         rig.drive.enable().result(PATIENCE)
     finally:
@@ -199,7 +199,7 @@ def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(
         with rig.simulator.lock:
             rig.far.set_run_input(False)
             rig.far.trip(14)
-            rig.far.press_ext()
+            rig.far.control_unit.press('ext')
         if name == 'modbus_rtu':
             # the one way that is left would take it from them
             assert 'keypad or terminals have control' in rig.refused(rig.drive.acknowledge())
@@ -207,7 +207,7 @@ def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(
         else:
             assert 'acknowledged 14 Sio Fail' in said(rig.drive.acknowledge().result(PATIENCE))
             assert not rig.far.faults
-        assert rig.far.runner.mode == Mode.EXT
+        assert rig.far.control_unit.mode == Mode.EXT
     finally:
         rig.stop()
 
@@ -234,7 +234,7 @@ def test_the_reason_of_a_serial_fault_is_told(name: str, method: str) -> None:
 def test_the_error_log(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.faults.log[:] = [LogEntry(1 + n % 12, 1200.0 - n) for n in range(130)]
-        del rig.far.faults.log[rig.far.firmware.log_size :]
+        del rig.far.faults.log[rig.far.faults.log_size :]
     if rig.optimal:
         assert 'not documented' in rig.refused(rig.drive.error_log())
         assert 'is not known of this model' in rig.refused(rig.drive.erase_error_log())
@@ -263,7 +263,7 @@ def test_a_new_entry(rig: Rig) -> None:
     (entry,) = rig.notes.entries
     assert (entry.code, entry.text) == (5, 'Overload')
     assert not math.isnan(entry.at)
-    assert rig.far.ack_reads == rig.far.sio_err_reads == 0
+    assert rig.far.control_unit.ack_reads == rig.far.control_unit.sio_err_reads == 0
 
 
 def test_the_energy(rig: Rig) -> None:
@@ -272,11 +272,11 @@ def test_the_energy(rig: Rig) -> None:
     elif rig.way.name == 'classic_v5':
         message = rig.refused(rig.drive.reset_energy())
         assert 'came with firmware 4.38; this drive has an older one' in message
-        assert rig.far.counters.e_out > 1
+        assert rig.far.counters.energy > 1
     else:
         assert said(rig.drive.reset_energy().result(PATIENCE)) == 'status.e_out: 1.234 -> 0.000 kWh'
-        assert rig.far.counters.e_out == 0
-    assert rig.far.mode_ext_writes == 0
+        assert rig.far.counters.energy == 0
+    assert rig.far.control_unit.mode_ext_writes == 0
     assert not rig.far.faults
 
 
@@ -309,12 +309,12 @@ def test_a_tuning_is_cancelled(rig: Rig) -> None:
     if rig.optimal:
         pytest.skip('nothing to cancel')
     future = rig.drive.tune(Procedure.FULL)
-    wait_until(lambda: rig.far.inv_st == _TUNING)
+    wait_until(lambda: rig.far.control_unit.status_code == _TUNING)
     rig.drive.cancel_tuning().result(PATIENCE)
     result = future.result(PATIENCE)
     assert not result.success and 'was stopped' in said(result.how)
-    assert rig.far.runner.tuning is None
-    assert rig.far.runner.mode == 1
+    assert rig.far.control_unit.tuning is None
+    assert rig.far.control_unit.mode == 1
     assert not rig.far.faults
 
 
@@ -338,7 +338,7 @@ def test_tuning_is_refused_while_the_motor_runs(rig: Rig) -> None:
     rig.drive.stop().result(PATIENCE)
     wait_until(lambda: not rig.far.motor.driven)
     with rig.simulator.lock:
-        rig.far.press_start()
+        rig.far.control_unit.press('start')
     assert 'the motor runs' in rig.refused(rig.drive.tune(Procedure.FULL))
     assert rig.far.motor.driven
 

@@ -123,7 +123,7 @@ def test_erasing(rig: Rig, found: int) -> None:
             rig.far.write_raw('fieldbus.mode', 3)
     assert said(rig.drive.erase_error_log().result(PATIENCE)) == 'the error log is erased'
     assert rig.far.faults.log == []
-    assert rig.far.runner.mode == found
+    assert rig.far.control_unit.mode == found
     assert rig.drive.error_log().result(PATIENCE) == ()
 
 
@@ -144,13 +144,13 @@ def test_a_log_that_is_not_empty_after_all(rig: Rig, monkeypatch: pytest.MonkeyP
 
 def test_the_energy_counter(rig: Rig) -> None:
     rig.connect()
-    assert rig.far.counters.e_out > 1
-    total = rig.far.counters.sigma_e_out
+    assert rig.far.counters.energy > 1
+    total = rig.far.counters.total_energy
     answer = said(rig.drive.reset_energy().result(PATIENCE))
     assert answer == 'status.e_out: 1.234 -> 0.000 kWh'
-    assert rig.far.counters.e_out == 0
-    assert rig.far.counters.sigma_e_out == total
-    assert rig.far.runner.mode == 1
+    assert rig.far.counters.energy == 0
+    assert rig.far.counters.total_energy == total
+    assert rig.far.control_unit.mode == 1
 
 
 def test_older_firmware_cannot_reset_it(make_rig: MakeRig) -> None:
@@ -166,7 +166,7 @@ def test_nothing_is_taken_by_a_driver_that_ends(rig: Rig) -> None:
     rig.drive.stop_for_good(1.0).result(PATIENCE)
     assert 'is ending' in rig.refused(rig.drive.erase_error_log())
     assert 'is ending' in rig.refused(rig.drive.reset_energy())
-    assert rig.far.runner.mode == 1
+    assert rig.far.control_unit.mode == 1
 
 
 @pytest.mark.parametrize('command', ['erase_error_log', 'reset_energy'])

@@ -32,7 +32,7 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.self_restart import TRIES
+from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 OVERLOAD, OVERHEATED, SIO_FAIL = 5, 3, 14
 MODE, CONTROL, MASK = 0x294, 0x254, 0x250
@@ -92,8 +92,8 @@ def test_every_fault(make_rig: MakeRig, model: str, method: str, reference: str)
         assert answer == f'acknowledged {code} {listed.text}'
         assert rig.far.faults.codes == []
         wait_until(lambda: rig.notes.snapshots[-1].kind is Kind.STATUS)
-    assert rig.far.ack_reads == (rig.acknowledged if method == 'mode_scmd' else 0)
-    assert rig.far.sio_err_reads == 0
+    assert rig.far.control_unit.ack_reads == (rig.acknowledged if method == 'mode_scmd' else 0)
+    assert rig.far.control_unit.sio_err_reads == 0
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     assert rig.enable().startswith('enabled')
 
@@ -161,7 +161,7 @@ def test_reading_the_status_with_ack_acknowledges_once(make_rig: MakeRig) -> Non
     rig.simulator.inject('fault', OVERLOAD)
     rig.acknowledged = 1
     rig.drive.acknowledge().result(PATIENCE)
-    assert rig.far.ack_reads == 1
+    assert rig.far.control_unit.ack_reads == 1
     assert rig.writes(MODE) == rig.writes(CONTROL) == []
 
 
@@ -189,7 +189,7 @@ def test_the_reset_bit_of_an_optimal_rises_once(make_rig: MakeRig) -> None:
     words = rig.writes(CONTROL)
     assert rises(words) == 1
     assert not words[-1] & 0x80
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
 
 
 def test_the_reset_bit_of_a_g2_rises_once(make_rig: MakeRig) -> None:
@@ -205,7 +205,7 @@ def test_the_reset_bit_of_a_g2_rises_once(make_rig: MakeRig) -> None:
     ]
     assert [one[2:].hex() for one in masks] == ['0000', '0080', '0000']
     assert not any(int.from_bytes(one[:2], 'big') & 0x80 for one in masks)
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
 
 
 # --- drives that restart by themselves ------------------------------------------------------------
@@ -219,7 +219,7 @@ def test_run_command_is_taken_back_before_the_drive_restarts(make_rig: MakeRig) 
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: not rig.far.runner.word & 1)
+    wait_until(lambda: not rig.far.control_unit.word & 1)
     rig.skip(3.0)
     assert rig.far.faults.codes == []
     rig.assert_stays_still()
@@ -236,13 +236,13 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: rig.drive.blocked_by_fault)
-    assert rig.far.runner.scmd == Scmd.FIELDBUS
+    assert rig.far.control_unit.scmd == Scmd.FIELDBUS
     # its 2 s are over, and it runs again by itself
     with rig.simulator.lock:
         rig.skip(2.1)
         assert rig.far.motor.driven
         before = len(rig.notes.snapshots)
-    wait_until(lambda: rig.far.runner.scmd == Scmd.STOP)
+    wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP)
     assert len(rig.notes.snapshots) - before <= 2
     rig.assert_stays_still()
     assert not rig.notes.told(Cause.CANNOT_STOP)
@@ -298,4 +298,4 @@ def test_a_fault_whose_cause_lasts_is_named_by_a_drive_that_refuses_everything(
     wait_until(lambda: not rig.drive.armed)
     rig.acknowledged = 1
     assert '3 Temp Hi is still active' in rig.refused(rig.drive.acknowledge())
-    assert rig.far.ack_reads == 1
+    assert rig.far.control_unit.ack_reads == 1

@@ -78,7 +78,7 @@ def test_the_entry_of_a_fault_is_told(make_rig: MakeRig, method: str) -> None:
     assert rig.drive.error_log().result(PATIENCE)[0].at == entry.at
     rig.next_snapshots(20)
     assert rig.notes.entries == [entry]
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
     if method == 'monitor':
         assert rig.far.command_writes == {} == rig.far.writes
 
@@ -128,7 +128,7 @@ def test_a_fault_that_no_poll_saw(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> 
     began = time.monotonic()
     with rig.simulator.lock:
         for code in (7, 8):
-            rig.far.faults.trip(code, rig.far.counters.op_time, cause_present=False)
+            rig.far.faults.trip(code, rig.far.counters.operating_time, cause_present=False)
         rig.far.faults.acknowledge()
     entries = told(rig, 2)
     # the older one first
@@ -181,7 +181,7 @@ def test_what_came_while_the_drive_was_not_reached(
         rig.far.power_cycle(3600.0)
         rig.far.faults.log.insert(0, LogEntry(7, HOURS))
         # a day later, of which the drive knows nothing
-        rig.far.counters.op_time += 0.001
+        rig.far.counters.operating_time += 0.001
     rig.set_response_timeout(0.05)
     wait_until(lambda: not rig.drive.snapshot.connected)
     rig.set_response_timeout(2.0)

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import itertools
 import os
 import random
@@ -30,21 +31,20 @@ from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.variant import ALL
-from nfo_sinus_driver.simulator.variant import DROPS
-from nfo_sinus_driver.simulator.variant import KEEPS
-from nfo_sinus_driver.simulator.variant import NOTHING
-from nfo_sinus_driver.simulator.variant import SCMD as SCMD_ONLY
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus.variant import ALL
+from nfo_sinus_driver.simulator.sinus.variant import DROPS
+from nfo_sinus_driver.simulator.sinus.variant import KEEPS
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.variant import SCMD as SCMD_ONLY
 
 #: How many acknowledgements each kind of drive goes through; a campaign has a thousand.
 ACKNOWLEDGEMENTS = int(os.environ.get('ACKNOWLEDGEMENTS', '20'))
 KINDS = (
-    Variant(run_command_in_fault=KEEPS, refuses_in_fault=NOTHING),
-    Variant(run_command_in_fault=KEEPS, refuses_in_fault=SCMD_ONLY),
-    Variant(run_command_in_fault=DROPS, refuses_in_fault=ALL),
+    {'run_command_in_fault': KEEPS, 'refuses_in_fault': NOTHING},
+    {'run_command_in_fault': KEEPS, 'refuses_in_fault': SCMD_ONLY},
+    {'run_command_in_fault': DROPS, 'refuses_in_fault': ALL},
 )
-_WORST = Variant(run_command_in_fault=KEEPS, refuses_in_fault=ALL)
+_WORST = {'run_command_in_fault': KEEPS, 'refuses_in_fault': ALL}
 #: InvSt with acknowledging, and without [M0 table 5].
 _WITH_ACK, _WITHOUT = 0x02A4, 0x02A5
 _OVERLOAD = 5
@@ -120,7 +120,7 @@ def fall_still(rig: VirtualRig) -> None:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize('kind', KINDS)
-def test_no_turn_at_an_acknowledgement(make_virtual: MakeVirtual, kind: Variant) -> None:
+def test_no_turn_at_an_acknowledgement(make_virtual: MakeVirtual, kind: Mapping[str, str]) -> None:
     rig = make_virtual(variant=kind)
     rig.connect()
     watch = Watch(rig)
@@ -174,7 +174,7 @@ def test_the_stop_that_everything_depends_on_is_repeated_until_it_is_heard(
 
 @pytest.mark.parametrize('variant', [*KINDS, _WORST])
 def test_everything_is_removed_before_the_acknowledgement(
-    make_virtual: MakeVirtual, variant: Variant
+    make_virtual: MakeVirtual, variant: Mapping[str, str]
 ) -> None:
     rig = make_virtual(variant=variant)
     rig.ride()
@@ -207,11 +207,11 @@ def test_a_serial_fault_is_acknowledged_by_mode_stop_alone(make_virtual: MakeVir
 
 @pytest.mark.parametrize('variant', [*KINDS, _WORST])
 def test_control_of_the_terminals_is_left_to_them(
-    make_virtual: MakeVirtual, variant: Variant
+    make_virtual: MakeVirtual, variant: Mapping[str, str]
 ) -> None:
     rig = make_virtual(variant=variant)
     rig.connect()
-    rig.far.press_ext()
+    rig.far.control_unit.press('ext')
     rig.pass_time(0.5)
     rig.far.trip(_OVERLOAD)
     rig.pass_time(0.5)
@@ -219,12 +219,12 @@ def test_control_of_the_terminals_is_left_to_them(
     assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
     rig.pass_time(0.5)
     assert not [frame for frame in rig.link.frames[frames:] if frame['hex'][2:4] == '06']
-    assert rig.far.runner.mode == Mode.EXT
+    assert rig.far.control_unit.mode == Mode.EXT
 
 
-@pytest.mark.parametrize('kind', [kind for kind in KINDS if kind.refuses_in_fault != ALL])
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if kind['refuses_in_fault'] != ALL])
 def test_a_fault_that_ends_by_itself_turns_nothing(
-    make_virtual: MakeVirtual, kind: Variant
+    make_virtual: MakeVirtual, kind: Mapping[str, str]
 ) -> None:
     rig = make_virtual(variant=kind)
     rig.ride()

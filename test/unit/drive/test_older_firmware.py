@@ -32,11 +32,10 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.open import line_settings
-from nfo_sinus_driver.simulator.classic import Classic
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.simulator.sinus_g2.classic import Server
 
 
 def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
@@ -98,7 +97,7 @@ def show(far: Simulator, monkeypatch: pytest.MonkeyPatch, code: int | None) -> N
     """Have the drive say this of itself, whatever it does; ``None``: what it does."""
     monkeypatch.undo()
     if code is not None:
-        monkeypatch.setattr(type(far.drives[1].runner), 'inv_st', property(lambda _: code))
+        monkeypatch.setattr(type(far.drives[1].control_unit), 'inv_st', property(lambda _: code))
 
 
 def turning(far: Simulator, drive: Drive) -> None:
@@ -132,7 +131,7 @@ def test_a_chopper_and_a_current_limit_are_nobody_elses_take_over(
     assert drive.armed, notes.events
 
 
-@pytest.mark.parametrize('press', ['press_start', 'press_ext', 'press_stop'])
+@pytest.mark.parametrize('press', ['start', 'ext', 'stop'])
 def test_a_take_over_behind_a_current_limit_is_noticed(
     far: Simulator, drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch, press: str
 ) -> None:
@@ -141,7 +140,7 @@ def test_a_take_over_behind_a_current_limit_is_noticed(
     wait_until(lambda: drive.snapshot.status.code == 27)
     assert drive.armed
     with far.lock:
-        getattr(far.drives[1], press)()
+        far.drives[1].control_unit.press(press)
     wait_until(lambda: not drive.armed)
     assert notes.told('keypad or terminals have control now and run the motor (27 Cur Limt)')
 
@@ -149,9 +148,9 @@ def test_a_take_over_behind_a_current_limit_is_noticed(
 def test_a_motor_that_starts_against_its_current_limit(
     far: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code = type(far.drives[1].runner).inv_st
-    limited = property(lambda runner: 27 if runner._motor.driven else code.fget(runner))
-    monkeypatch.setattr(type(far.drives[1].runner), 'inv_st', limited)
+    code = type(far.drives[1].control_unit).inv_st
+    limited = property(lambda unit: 27 if unit.motor.driven else code.fget(unit))
+    monkeypatch.setattr(type(far.drives[1].control_unit), 'inv_st', limited)
     assert 'enabled' in said(drive.enable().result(PATIENCE))
     assert drive.armed
 
@@ -160,10 +159,10 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(
     far: Simulator, drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     turning(far, drive)
-    runner = type(far.drives[1].runner)
-    monkeypatch.setattr(runner, 'command', lambda self, scmd: None)
+    unit = type(far.drives[1].control_unit)
+    monkeypatch.setattr(unit, 'command', lambda self, scmd: None)
     show_only = property(lambda _: 27)
-    monkeypatch.setattr(runner, 'inv_st', show_only)
+    monkeypatch.setattr(unit, 'inv_st', show_only)
     with raises(Cause.STOP_UNCONFIRMED):
         drive.stop().result(PATIENCE)
     monkeypatch.undo()
@@ -171,12 +170,12 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(
     wait_until(lambda: not far.drives[1].motor.driven)
 
 
-@pytest.mark.parametrize('press', ['press_start', 'press_ext'])
+@pytest.mark.parametrize('press', ['start', 'ext'])
 def test_a_motor_that_others_run_is_seen_to_run(
     far: Simulator, drive: Drive, notes: Notes, press: str
 ) -> None:
     with far.lock:
-        getattr(far.drives[1], press)()
+        far.drives[1].control_unit.press(press)
     wait_until(lambda: drive.snapshot.status.driven)
     with raises(Cause.RUN_BY_OTHERS):
         drive.stop().result(PATIENCE)
@@ -191,14 +190,14 @@ def test_a_motor_that_others_run_is_seen_to_run(
 def test_counters_have_24_bits_over_classic(
     drive: Drive, notes: Notes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    enquiry = Classic._enquiry
+    enquiry = Server.enquiry
 
-    def filled(self: Classic, simulated: SimulatedDrive, number: int) -> int:
-        word = enquiry(self, simulated, number)
+    def filled(self: Server, number: int) -> int:
+        word = enquiry(self, number)
         # nobody says what the rest of the second word of a counter has [C26]
         return word | 0xA500 if number in (0x0127, 0x0128, 0x00DE) else word
 
-    monkeypatch.setattr(Classic, '_enquiry', filled)
+    monkeypatch.setattr(Server, 'enquiry', filled)
     before = len(notes.telemetry)
     wait_until(lambda: len(notes.telemetry) > before + 8)
     values = notes.telemetry[-1].values

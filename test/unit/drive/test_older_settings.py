@@ -42,8 +42,8 @@ from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.faults import SioErr
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -68,7 +68,7 @@ class Rig:
         self.simulator = Simulator(protocol='classic', dialect=dialect, boot_time=0.2, **options)
         self.far: SimulatedDrive = self.simulator.drives[1]
         self.modes: list[int] = []
-        self.flags = SioErr(0)
+        self.flags = LineError(0)
         self.energised = False
         self._listen()
         stack.enter_context(self.simulator)
@@ -78,14 +78,14 @@ class Rig:
 
     def _listen(self) -> None:
         far = self.far
-        write, fail, energise = far.write_raw, far.serial_error, far.motor.energise
+        write, fail, energise = far.write_raw, far.control_unit.serial_error, far.motor.energise
 
         def note_write(key: str, raw: int) -> None:
             write(key, raw)
             if key == 'fieldbus.mode':
                 self.modes.append(raw)
 
-        def note_error(what: SioErr) -> None:
+        def note_error(what: LineError) -> None:
             self.flags |= what
             fail(what)
 
@@ -93,7 +93,8 @@ class Rig:
             self.energised = True
             energise()
 
-        far.write_raw, far.serial_error = note_write, note_error  # type: ignore[method-assign]
+        far.write_raw = note_write  # type: ignore[method-assign]
+        far.control_unit.serial_error = note_error  # type: ignore[method-assign]
         far.motor.energise = note_energy  # type: ignore[method-assign]
 
     def driver(self, **settings: Any) -> Drive:
@@ -127,10 +128,10 @@ class Rig:
 
     def why_not(self, **values: Any) -> str:
         """Return why parameters are not changed; nothing may have been written."""
-        before = (dict(self.far.writes), list(self.modes), self.far.inv_st)
+        before = (dict(self.far.writes), list(self.modes), self.far.control_unit.status_code)
         with pytest.raises(DriveError) as error:
             self.change(**values)
-        assert (dict(self.far.writes), self.modes, self.far.inv_st) == before
+        assert (dict(self.far.writes), self.modes, self.far.control_unit.status_code) == before
         return said(error.value)
 
 
@@ -155,7 +156,7 @@ def test_settings_are_written_under_control_that_is_given_back(rig: Rig) -> None
     assert rig.modes == [BUS, STOP]
     assert not rig.energised
     assert not rig.flags
-    assert rig.far.inv_st == 24
+    assert rig.far.control_unit.status_code == 24
     assert rig.far.command_writes.get('status.frq_set'), 'no old set-point may stand'
 
 
@@ -186,14 +187,14 @@ def test_what_else_has_control_keeps_it(rig: Rig) -> None:
     rig.connect()
     with rig.simulator.lock:
         rig.far.set_run_input(False)
-        rig.far.press_ext()
+        rig.far.control_unit.press('ext')
     assert 'giving it back to them could start the motor: press STOP' in rig.why_not(accel=6.0)
     with rig.simulator.lock:
         rig.far.set_run_input(True)
     wait_until(lambda: rig.far.motor.driven)
     assert 'the motor runs' in rig.why_not(accel=6.0)
     with rig.simulator.lock:
-        rig.far.press_stop()
+        rig.far.control_unit.press('stop')
     wait_until(lambda: not rig.far.motor.driven)
     rig.change(accel=6.0)
     assert rig.far.peek('control.accel') == 6.0
@@ -212,7 +213,7 @@ def test_not_while_a_fault_is_active(rig: Rig) -> None:
 
 def test_not_while_it_is_tuned_by_others(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     rig.connect()
-    monkeypatch.setattr(type(rig.far.runner), 'mode', property(lambda _: 0))
+    monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
     assert 'MODE is Inhibit' in rig.why_not(accel=6.0)
 
 
@@ -247,7 +248,7 @@ def test_a_value_that_is_refused_puts_all_back(rig: Rig, monkeypatch: pytest.Mon
         rig.change(accel=6.0, retard=7.0)
     assert 'put back: control.accel' in said(error.value)
     assert rig.far.peek('control.accel') == pytest.approx(0.3)
-    wait_until(lambda: rig.far.runner.mode == STOP)
+    wait_until(lambda: rig.far.control_unit.mode == STOP)
     assert not rig.energised
 
 
@@ -265,14 +266,14 @@ def test_an_enable_waits_until_settings_are_written(rig: Rig) -> None:
 def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Rig) -> None:
     # no manual says that MODE = Stop ends it
     rig.connect()
-    take = rig.far.runner.take
+    take = rig.far.control_unit.take
 
     def keeps(source: Any) -> None:
         take(source)
         if source.value == 'scmd':
-            rig.far.runner.scmd = Scmd.FIELDBUS
+            rig.far.control_unit.scmd = Scmd.FIELDBUS
 
-    rig.far.runner.take = keeps  # type: ignore[method-assign]
+    rig.far.control_unit.take = keeps  # type: ignore[method-assign]
     with rig.simulator.lock:
         rig.far.memory.set('status.frq_set', 20.0)
     rig.change(accel=6.0)
@@ -296,13 +297,13 @@ def test_the_drives_time_out_is_set(rig: Rig) -> None:
 
 def test_the_drives_time_out_is_set_when_the_bus_gets_control(rig: Rig) -> None:
     with rig.simulator.lock:
-        rig.far.press_ext()
+        rig.far.control_unit.press('ext')
     rig.connect(drive_timeout=4.0)
     assert rig.notes.told(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
     assert rig.far.peek('serial.sio_tot') == 0
-    assert rig.far.runner.mode == EXT
+    assert rig.far.control_unit.mode == EXT
     with rig.simulator.lock:
-        rig.far.press_stop()
+        rig.far.control_unit.press('stop')
     wait_until(lambda: not rig.far.motor.turning)
     rig.turn()
     assert (rig.far.peek('serial.sio_tot'), rig.far.peek('serial.auto_stop')) == (4.0, True)
@@ -340,11 +341,11 @@ def test_a_driver_that_is_begun_while_the_motor_turns(rig: Rig, control_method: 
     rig.bus.close()
     rig.connect(classic_dialect='', control_method=control_method)
     assert rig.flags == 0
-    assert rig.far.inv_st != SIO_FAIL
+    assert rig.far.control_unit.status_code != SIO_FAIL
     assert rig.notes.told('the bus has control', Severity.WARNING)
     if control_method == 'mode_scmd':
         wait_until(lambda: not rig.far.motor.driven)
-        assert rig.far.inv_st == 37
+        assert rig.far.control_unit.status_code == 37
     else:
         assert rig.far.motor.driven
 
@@ -358,8 +359,8 @@ def test_the_firmware_is_asked_for_while_the_bus_has_no_control(
     assert drive.identity is not None
     assert firmware in str(drive.identity)
     assert bool(firmware) == (drive.snapshot.status.word is not None)
-    assert rig.flags == (SioErr(0) if firmware else SioErr.UNKNOWN)
-    assert rig.far.inv_st == 24
+    assert rig.flags == (LineError(0) if firmware else LineError.UNKNOWN)
+    assert rig.far.control_unit.status_code == 24
 
 
 def test_a_drive_that_was_asked_once_is_known_when_it_comes_back_under_control(
@@ -414,7 +415,7 @@ def test_nothing_at_all_is_asked_that_it_does_not_know(rig: Rig) -> None:
     rig.change(accel=0.5)
     drive.set_drive_timeout(5.0).result(PATIENCE)
     drive.error_log(40).result(PATIENCE)
-    assert SioErr.UNKNOWN not in rig.flags
+    assert LineError.UNKNOWN not in rig.flags
     drive.stop().result(PATIENCE)
     beside()
     rig.simulator.inject('heal')
@@ -422,5 +423,5 @@ def test_nothing_at_all_is_asked_that_it_does_not_know(rig: Rig) -> None:
     wait_until(lambda: drive.snapshot.status and drive.snapshot.status.faulted)
     drive.acknowledge().result(PATIENCE)
     drive.disconnect(5.0).result(PATIENCE)
-    unasked = SioErr.UNKNOWN | SioErr.PREFIX | SioErr.UNREADABLE | SioErr.UNWRITABLE
+    unasked = LineError.UNKNOWN | LineError.PREFIX | LineError.UNREADABLE | LineError.UNWRITABLE
     assert not rig.flags & unasked

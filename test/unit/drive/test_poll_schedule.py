@@ -29,8 +29,7 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.variant import NOTHING
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 
 STATUS, INV_ST, FREQUENCY, SPEED, TORQUE = 0x258, 0x2A5, 0x400, 0x264, 0x40C
 OVERLOAD = 5
@@ -67,7 +66,7 @@ def reads(rig: VirtualRig, begun: int = 0) -> Counter[int]:
 def fast(make_virtual: MakeVirtual, **settings: object) -> VirtualRig:
     """A drive that is polled as fast as the line allows."""
     return make_virtual(
-        variant=Variant(refuses_in_fault=NOTHING),
+        variant={'refuses_in_fault': NOTHING},
         poll_rate=0.0,
         telemetry_rate=0.0,
         **settings,
@@ -296,7 +295,7 @@ def test_a_changed_inverter_status_that_the_word_does_not_show_is_told_soon(
     # from speeding up to slowing down, under the same status word
     before = rig.drive.snapshot.status
     assert before is not None
-    assert before.code == rig.far.inv_st
+    assert before.code == rig.far.control_unit.status_code
 
 
 def polls(rig: VirtualRig, seconds: float) -> int:
@@ -333,7 +332,7 @@ def test_a_motor_that_ramps_or_that_somebody_else_runs_is_not_idle(
     assert polls(rig, 2.0) > 30
     rig.pass_time(30.0)
     assert polls(rig, 5.0) < 7
-    rig.far.press_start()
+    rig.far.control_unit.press('start')
     rig.pass_time(1.2)
     assert polls(rig, 2.0) > 30
 

@@ -25,8 +25,8 @@ from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.simulator.variant import NOTHING
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.modbus import server
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 
 SETPOINT, STATUS, INV_ST, SCMD = 0x3FC, 0x258, 0x2A5, 0x298
 OVERLOAD = 5
@@ -58,7 +58,7 @@ def in_one(rig: VirtualRig) -> list[tuple[int, Words | None, tuple[int, int] | N
 def quiet(make_virtual: MakeVirtual, **settings: object) -> VirtualRig:
     """A motor that turns, so seldom polled that nothing waits for the line."""
     rig = make_virtual(
-        variant=Variant(refuses_in_fault=NOTHING), poll_rate=1.0, telemetry_rate=0.0, **settings
+        variant={'refuses_in_fault': NOTHING}, poll_rate=1.0, telemetry_rate=0.0, **settings
     )
     rig.ride(20.0)
     rig.send(None)
@@ -205,7 +205,7 @@ def test_a_lost_run_input_that_is_told_with_a_set_point_stops_at_once(
     make_virtual: MakeVirtual,
 ) -> None:
     rig = quiet(make_virtual)
-    rig.far.runner.run_input = False
+    rig.far.control_unit.run_input = False
     rig.far.advance(0.01)
     begun = len(rig.link.frames)
     rig.drive.set_setpoint(30.0)
@@ -219,13 +219,13 @@ def test_an_impossible_status_that_is_told_with_a_set_point_stops_nothing(
     make_virtual: MakeVirtual,
 ) -> None:
     rig = quiet(make_virtual)
-    whole = rig.far.write_and_read
+    whole = server(rig.far).write_and_read
 
     def spoil(register: int, words: Words, source: int, count: int) -> Words:
         whole(register, words, source, count)
         return (0xFFFF, 0)
 
-    rig.far.write_and_read = spoil  # type: ignore[method-assign]
+    server(rig.far).write_and_read = spoil  # type: ignore[method-assign]
     rig.drive.set_setpoint(25.0)
     rig.pass_time(1.5)
     assert rig.drive.armed
@@ -276,6 +276,6 @@ def test_an_unchanged_set_point_is_written_no_more_often_than_needed(
 def test_a_set_point_that_somebody_else_changed_is_written_again(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     rig.ride(20.0)
-    rig.far.write(SETPOINT, (300,))
+    server(rig.far).write(SETPOINT, (300,))
     rig.pass_time(6.0)
     assert abs(rig.far.motor.frequency - 20.0) < 0.2

@@ -43,7 +43,7 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.simulator import runner_g2
+from nfo_sinus_driver.simulator.sinus_g2 import control_unit
 
 WAYS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
@@ -65,13 +65,13 @@ def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[Any]]:
     """Have a drive tune that refuses everything until it is over; its status word is this."""
 
     def refuse(register: int, words: Words | None) -> None:
-        if rig.far.runner.tuning is not None and words is not None:
+        if rig.far.control_unit.tuning is not None and words is not None:
             raise Refused(Refused.DEVICE_FAILURE)
 
-    with mock.patch.object(runner_g2, '_TUNING_STATUS', word):
+    with mock.patch.object(control_unit, '_TUNING_STATUS', word):
         rig.connect()
         future = rig.drive.tune(Procedure.FULL)
-        while rig.far.runner.tuning is None:
+        while rig.far.control_unit.tuning is None:
             rig.pass_time(0.01)
         rig.before = refuse
         yield future
@@ -94,10 +94,10 @@ def test_a_stop_of_a_tuning_that_is_refused_is_no_success(
     with tuning(rig, word) as tuned:
         stop = WAYS[way](rig.drive)
         success = answered(rig, stop)
-        assert success == (rig.far.runner.tuning is None)
+        assert success == (rig.far.control_unit.tuning is None)
         assert not success
         assert 'NOT confirmed' in said(stop.exception()) and '28 Tuning' in said(stop.exception())
-        while rig.far.runner.tuning is not None:
+        while rig.far.control_unit.tuning is not None:
             rig.pass_time(0.01)
         # it was tried until it was over
         rig.pass_time(0.5)
@@ -110,7 +110,7 @@ def test_an_exit_waits_for_the_end_of_a_tuning(make_virtual: MakeVirtual, word: 
     rig = make_virtual()
     with tuning(rig, word):
         assert answered(rig, rig.drive.stop_for_good(30.0))
-        assert rig.far.runner.tuning is None
+        assert rig.far.control_unit.tuning is None
         assert not rig.far.motor.driven
 
 
@@ -121,7 +121,7 @@ def test_a_tuning_of_a_driver_before_is_stopped_by_an_exit_too(make_virtual: Mak
         rig.begin()
         assert 'firmware' in rig.connect()
         assert not answered(rig, rig.drive.stop_for_good(1.0))
-        assert rig.far.runner.tuning is not None
+        assert rig.far.control_unit.tuning is not None
 
 
 def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
@@ -140,7 +140,7 @@ def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
         rig.pass_time(0.5)
         assert not rig.drive.armed
         assert not rig.far.motor.driven
-        assert rig.far.runner.scmd == Scmd.STOP
+        assert rig.far.control_unit.scmd == Scmd.STOP
         rig.send(None)
 
 
@@ -238,7 +238,7 @@ def test_a_stop_that_the_drive_is_too_busy_for_is_written_again_soon(
     rig.be_busy(SCMD, 3, writes=True)
     asked_at = rig.clock.now
     stop = rig.drive.stop()
-    while rig.far.runner.scmd != Scmd.STOP:
+    while rig.far.control_unit.scmd != Scmd.STOP:
         rig.pass_time(0.005)
     assert rig.clock.now - asked_at < 0.15
     assert answered(rig, stop)

@@ -37,10 +37,10 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.simulator import motor as motor_module
-from nfo_sinus_driver.simulator.runner_g2 import G2Runner
-from nfo_sinus_driver.simulator.state_machine import Conditions
-from nfo_sinus_driver.simulator.state_machine import Phase
-from nfo_sinus_driver.simulator.state_machine import StateMachine
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
 
 OVERLOAD = 5
 STATUS = 0x258
@@ -74,14 +74,14 @@ def exits(monkeypatch: pytest.MonkeyPatch) -> Exits:
     return seen
 
 
-def runner(rig: Rig) -> G2Runner:
-    far = rig.far.runner
-    assert isinstance(far, G2Runner)
+def unit(rig: Rig) -> G2ControlUnit:
+    far = rig.far.control_unit
+    assert isinstance(far, G2ControlUnit)
     return far
 
 
 def phase(rig: Rig) -> Phase:
-    return runner(rig).machine.phase
+    return unit(rig).machine.phase
 
 
 def shown(rig: Rig) -> State:
@@ -100,7 +100,7 @@ def command(rig: Rig, *words: Control) -> None:
 def self_test(rig: Rig) -> None:
     """Begin anew as after power-on, but answering."""
     with rig.simulator.lock:
-        rig.far.runner.restart()
+        rig.far.control_unit.restart()
         rig.far.motor.release(at_once=True)
         rig.far._settle()
         assert phase(rig) is Phase.NOT_READY_TO_SWITCH_ON
@@ -109,7 +109,7 @@ def self_test(rig: Rig) -> None:
 def initialise(rig: Rig) -> None:
     """End the self-test."""
     with rig.simulator.lock:
-        rig.far.runner.initialised = True
+        rig.far.control_unit.initialised = True
         rig.far._settle()
 
 
@@ -117,12 +117,12 @@ def assert_it_can_be_enabled(rig: Rig) -> None:
     """It stands, no run command does, and the motor turns as soon as somebody enables it."""
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.wait_until_still()
-    assert not runner(rig).word & Control.SWITCH_ON
+    assert not unit(rig).word & Control.SWITCH_ON
     assert rig.enable().startswith('enabled')
     rig.publish(10.0)
     rig.wait_for_frequency(10.0)
-    assert runner(rig).word & FORWARD == FORWARD
-    assert not runner(rig).word & Control.ENABLE_REV_OP
+    assert unit(rig).word & FORWARD == FORWARD
+    assert not unit(rig).word & Control.ENABLE_REV_OP
 
 
 def assert_disarmed(rig: Rig, cause: str) -> None:
@@ -133,7 +133,7 @@ def assert_disarmed(rig: Rig, cause: str) -> None:
     with rig.simulator.lock:
         rig.far.memory.set('control.retard', 0.2)
     rig.wait_until_still()
-    assert not runner(rig).word & Control.SWITCH_ON
+    assert not unit(rig).word & Control.SWITCH_ON
 
 
 # --- what the driver leads it through -------------------------------------------------------------
@@ -418,7 +418,7 @@ def test_table_16_idle(make_rig: MakeRig, exits: Exits, words, wanted, cause: st
     assert not rig.far.motor.driven
     assert rig.enable().startswith('enabled')
     assert rig.drive.armed
-    assert runner(rig).word & (FORWARD | REVERSE | Control.EVENT_TRIGGERED_OP) == FORWARD
+    assert unit(rig).word & (FORWARD | REVERSE | Control.EVENT_TRIGGERED_OP) == FORWARD
 
 
 def test_table_16_switched_on_that_is_left_while_it_is_being_enabled(
@@ -480,7 +480,7 @@ def test_table_16_fault(make_rig: MakeRig, exits: Exits, state: Phase) -> None:
         initialise(rig)
     assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert (F, D) in exits
-    assert rig.far.ack_reads == 0
+    assert rig.far.control_unit.ack_reads == 0
     assert_it_can_be_enabled(rig)
 
 

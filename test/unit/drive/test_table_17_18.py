@@ -76,14 +76,14 @@ def run(rig: Rig, reference: str, code: int, frequency: float) -> None:
     """Enable, and see that the drive follows this reference and no other; stop."""
     rig.connect()
     with rig.simulator.lock:
-        rig.far.memory.put(rig.far.runner.setpoint_key, 333)
+        rig.far.memory.put(rig.far.control_unit.setpoint_key, 333)
     assert rig.enable().startswith('enabled')
     assert rig.writes(MODE) == [Mode.BUS]
     # nothing that stood there from before, and then this
     assert rig.writes(SCMD) == [Scmd.STOP, code]
     if reference == 'fieldbus':
         # what stood there before does not count
-        assert rig.far.memory.raw(rig.far.runner.setpoint_key) == 0
+        assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == 0
         rig.publish(12.5)
     else:
         with raises(Cause.OWN_REFERENCE):
@@ -113,8 +113,8 @@ def test_scmd_000_stops_and_control_is_kept(make_rig: MakeRig, model: str) -> No
     rig.turn()
     rig.drive.stop().result(PATIENCE)
     assert rig.writes(SCMD)[-1] == 0
-    wait_until(lambda: rig.far.inv_st == 37)
-    assert rig.far.runner.mode == Mode.BUS
+    wait_until(lambda: rig.far.control_unit.status_code == 37)
+    assert rig.far.control_unit.mode == Mode.BUS
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_scmd_000_stops_and_control_is_kept(make_rig: MakeRig, model: str) -> No
 def test_scmd_tunes(rig: Rig, procedure: Procedure) -> None:
     rig.connect()
     tuning = rig.drive.tune(procedure)
-    wait_until(lambda: rig.far.runner.mode == Mode.INHIBIT)
+    wait_until(lambda: rig.far.control_unit.mode == Mode.INHIBIT)
     rig.skip(10.0)
     result = tuning.result(PATIENCE)
     code, shown = TUNES[procedure]
@@ -145,7 +145,7 @@ def test_scmd_900_resets_the_kwh_counter(rig: Rig) -> None:
     rig.connect()
     rig.drive.reset_energy().result(PATIENCE)
     assert 0x900 in rig.writes(SCMD)
-    assert rig.far.counters.e_out == 0
+    assert rig.far.counters.energy == 0
 
 
 def test_no_code_of_scmd_is_left_out() -> None:
@@ -177,7 +177,7 @@ def test_mode_1_stop_releases_the_motor_and_gives_control_back(rig: Rig) -> None
     rig.turn()
     rig.drive.quick_stop().result(PATIENCE)
     assert rig.writes(MODE)[-1] == Mode.STOP
-    assert (rig.far.motor.driven, rig.far.runner.mode) == (False, Mode.STOP)
+    assert (rig.far.motor.driven, rig.far.control_unit.mode) == (False, Mode.STOP)
 
 
 @pytest.mark.parametrize('model', ['sinus_g2', 'sinus_optimal'])
@@ -187,7 +187,7 @@ def test_mode_1_gives_control_back_when_the_motor_stands(make_rig: MakeRig, mode
     answer = said(rig.drive.disconnect(PATIENCE).result(PATIENCE))
     assert answer.endswith('; control released')
     assert rig.writes(MODE) == [Mode.BUS, 1]
-    assert (rig.far.motor.driven, rig.far.runner.mode) == (False, 1)
+    assert (rig.far.motor.driven, rig.far.control_unit.mode) == (False, 1)
 
 
 @pytest.mark.parametrize('model', ['sinus_g2', 'sinus_optimal'])
@@ -197,12 +197,12 @@ def test_mode_2_is_read_from_the_terminals_and_never_written(make_rig: MakeRig, 
     rig.simulator.inject('keypad', 'ext')
     wait_until(lambda: not rig.drive.armed)
     rig.next_snapshots(2)
-    assert (rig.far.motor.driven, rig.far.runner.mode) == (True, 2)
+    assert (rig.far.motor.driven, rig.far.control_unit.mode) == (True, 2)
     assert rig.notes.told(Cause.TERMINALS_IN_CONTROL)
     # somebody who enables it takes it from them
     assert rig.enable().startswith('enabled')
     rig.drive.disconnect(PATIENCE).result(PATIENCE)
-    assert rig.far.mode_ext_writes == 0
+    assert rig.far.control_unit.mode_ext_writes == 0
 
 
 @pytest.mark.parametrize('model', ['sinus_g2', 'sinus_optimal'])
@@ -216,4 +216,4 @@ def test_mode_3_takes_control_and_stops_what_runs(make_rig: MakeRig, model: str)
     assert rig.writes(MODE) == [Mode.BUS]
     # with no set-point yet it goes to 0
     rig.wait_for_frequency(0.0)
-    assert rig.far.runner.mode == Mode.BUS
+    assert rig.far.control_unit.mode == Mode.BUS

@@ -52,7 +52,7 @@ COMMANDS = {
 def begin(rig: Rig, procedure: Procedure = Procedure.FULL):
     """Have the drive tune, and wait until it does."""
     future = rig.drive.tune(procedure)
-    wait_until(lambda: rig.far.inv_st == 28)
+    wait_until(lambda: rig.far.control_unit.status_code == 28)
     return future
 
 
@@ -64,7 +64,7 @@ def finish(rig: Rig, future) -> Tuned:
 
 def mode(rig: Rig) -> int:
     with rig.simulator.lock:
-        return rig.far.runner.mode
+        return rig.far.control_unit.mode
 
 
 @pytest.mark.parametrize('procedure', COMMANDS)
@@ -92,7 +92,7 @@ def test_control_is_given_back_as_it_was_found(rig: Rig) -> None:
     assert finish(rig, begin(rig, Procedure.CALCULATE)).success
     assert mode(rig) == 3
     # and nothing stands that would keep the motor from being enabled
-    assert rig.far.inv_st == 37
+    assert rig.far.control_unit.status_code == 37
     rig.enable()
 
 
@@ -154,7 +154,7 @@ def test_cancelling_stops_it(rig: Rig) -> None:
     rig.connect()
     future = begin(rig)
     rig.drive.cancel_tuning().result(PATIENCE)
-    assert rig.far.inv_st != 28
+    assert rig.far.control_unit.status_code != 28
     result = future.result(PATIENCE)
     assert not result.success
     assert 'was stopped' in said(result.how)
@@ -174,23 +174,23 @@ def test_every_way_out_ends_it(rig: Rig, way: str) -> None:
         assert 'NOT confirmed' in rig.answer(rig.drive.quick_stop())
     else:
         rig.answer(rig.drive.disconnect(1.0) if way == 'disconnect' else getattr(rig.drive, way)())
-    wait_until(lambda: rig.far.inv_st != 28)
+    wait_until(lambda: rig.far.control_unit.status_code != 28)
     rig.answer(future)
-    assert rig.far.runner.tuning is None
+    assert rig.far.control_unit.tuning is None
     assert not rig.far.motor.driven
 
 
 def test_a_drive_that_takes_no_stop_meanwhile_is_told_of(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = rig.far.runner._write_scmd
+    write = rig.far.control_unit._write_scmd
 
     def stubborn(raw: int) -> None:
-        if rig.far.runner.tuning is not None:
+        if rig.far.control_unit.tuning is not None:
             raise Refused(Reason.STATE, 'tuning')
         write(raw)
 
-    monkeypatch.setattr(rig.far.runner, '_write_scmd', stubborn)
+    monkeypatch.setattr(rig.far.control_unit, '_write_scmd', stubborn)
     rig.connect()
     future = begin(rig)
     message = rig.refused(rig.drive.stop())
@@ -205,7 +205,7 @@ def test_the_keypad_ends_it(rig: Rig) -> None:
     rig.connect()
     future = begin(rig)
     with rig.simulator.lock:
-        rig.far.press_stop()
+        rig.far.control_unit.press('stop')
     result = future.result(PATIENCE)
     assert not result.success and '24 Stop' in said(result.how)
     assert mode(rig) == 1
@@ -236,16 +236,16 @@ def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back(
     rig.connect()
     future = begin(rig)
     with rig.simulator.lock:
-        rig.far.runner.tuning.left = 3600.0
+        rig.far.control_unit.tuning.left = 3600.0
     rig.set_response_timeout(0.02)
     rig.simulator.inject('silence', 3600.0)
     assert 'did not answer' in rig.refused(future)
     wait_until(lambda: not rig.drive.snapshot.connected)
     rig.set_response_timeout(2.0)
     with rig.simulator.lock:
-        assert rig.far.inv_st == 28, 'it should still be at it'
+        assert rig.far.control_unit.status_code == 28, 'it should still be at it'
         rig.far._silent_left = 0.0
-    wait_until(lambda: rig.far.inv_st != 28 and not rig.drive.stop_unconfirmed)
+    wait_until(lambda: rig.far.control_unit.status_code != 28 and not rig.drive.stop_unconfirmed)
     assert not rig.drive.armed
 
 
@@ -283,7 +283,7 @@ def test_refused_while_the_terminals_have_control(rig: Rig) -> None:
     rig.connect()
     with rig.simulator.lock:
         rig.far.set_run_input(False)
-        rig.far.press_ext()
+        rig.far.control_unit.press('ext')
     assert 'press STOP at the drive first' in rig.refused(rig.drive.tune(Procedure.FULL))
     assert rig.writes(MODE) == []
 
@@ -339,7 +339,7 @@ def test_over_classic(dialect: str) -> None:
             tuned = drive.tune(Procedure.CALCULATE).result(PATIENCE)
             assert tuned.success and '47 ParClcOK' in said(tuned.how)
             assert tuned.changes
-            assert simulator.drives[1].runner.mode == 1
+            assert simulator.drives[1].control_unit.mode == 1
             assert not simulator.drives[1].faults
         finally:
             bus.close()

@@ -63,7 +63,7 @@ def tuned_until_stopped(rig: VirtualRig, way: str, moment: int) -> bool:
     # what only waits for the line by then is kept off it
     assert rig.written(SCMD).count(Scmd.FULL_TUNING) == had_begun
     assert 'stopped' in rig.answer(tuning, 0.1)
-    assert rig.far.inv_st_text != 'Tuning'
+    assert rig.far.control_unit.status_text != 'Tuning'
     return had_begun
 
 

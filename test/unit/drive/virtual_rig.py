@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 import any_order_rig
@@ -32,8 +33,7 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.family import simulated_drive
 
 #: What a drive takes to say that it is busy, s.
 _BUSY_TIME = 0.004
@@ -51,13 +51,14 @@ class VirtualRig(any_order_rig.Rig):
     def __init__(
         self,
         parameters: dict[str, Any] | None = None,
-        variant: Variant | None = None,
+        variant: Mapping[str, str] | None = None,
         **settings: Any,
     ) -> None:
         parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
         settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
         model = settings.setdefault('model', 'sinus_g2')
-        far = SimulatedDrive(model, settings=parameters, variant=variant or hardest(model))
+        options = hardest(model) if variant is None else variant
+        far = simulated_drive(model, settings=parameters, **options)
         super().__init__(far, DriveSettings(**settings))
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         self.before_both: Callable[[int, Words], None] = lambda *what: self.before(*what)

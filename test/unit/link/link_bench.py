@@ -35,7 +35,7 @@ from nfo_sinus_driver.link.settings import LineSettings
 TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
 UNIT = 1
-#: Probes of one word and of two, as a drive has them.
+#: Resync reads of one word and of two, as a drive has them.
 ONE = register(0x2A5)
 TWO = register(0x258, 2)
 A = register(0x400)
@@ -59,16 +59,19 @@ class Bench:
         self,
         fates: list[Fate] | None = None,
         settings: LineSettings = SETTINGS,
-        probes: tuple[Address, ...] = (ONE, TWO),
+        resync: tuple[Address, ...] = (ONE, TWO),
+        *,
+        trusted: bool = False,
     ) -> None:
         self.wire = self.wire_class(settings)
         self.slave = Slave(self.wire, iter(fates or []))
         self.link = self.link_class(self.wire, settings)
         with self.wire.time():
             self.link.open()
-            # as behind a line that has told something twice before
-            self.link.distrust()
-        self.link.use_probes(UNIT, probes)
+            if not trusted:
+                # as behind a line that has told something twice before
+                self.link._late.heard_unasked(self.wire.now)
+        self.link.use_resync_reads(UNIT, resync)
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
         with self.wire.time():

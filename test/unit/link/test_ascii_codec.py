@@ -27,7 +27,7 @@ from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.modbus_ascii import PAUSE
+from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT
 from nfo_sinus_driver.link.modbus_ascii import AsciiReader
 from nfo_sinus_driver.link.modbus_ascii import encode
 from nfo_sinus_driver.link.modbus_ascii import length
@@ -83,8 +83,8 @@ def pieces(draw: st.DrawFn, data: bytes) -> list[bytes]:
 def outcome(reader: AsciiReader[Any], data: list[bytes]) -> object:
     """What comes of bytes: an answer, a refusal, or nothing; anything else raises."""
     for piece in data:
-        assert reader.missing >= 1
-        assert 0 < reader.patience <= PAUSE
+        assert reader.bytes_needed >= 1
+        assert 0 < reader.inter_byte_timeout <= INTER_BYTE_TIMEOUT
         try:
             answer = reader.feed(piece)
         except Refused as refusal:
@@ -253,9 +253,9 @@ def test_never_more_is_waited_for_than_comes(data: st.DataObject, request: Reque
     reader = AsciiReader(request)
     come = data.draw(st.integers(0, len(frame) - 1))
     assert reader.feed(frame[:come]) is None
-    assert 1 <= reader.missing <= len(frame) - come
+    assert 1 <= reader.bytes_needed <= len(frame) - come
     # a frame that has begun may pause
-    assert (reader.patience == PAUSE) == (come > 0)
+    assert (reader.inter_byte_timeout == INTER_BYTE_TIMEOUT) == (come > 0)
 
 
 # --- what else comes over a line ------------------------------------------------------------------
@@ -379,4 +379,4 @@ def test_any_bytes_at_all(data: st.DataObject, request: Request[Any], stream: by
 def test_only_an_answer_that_has_begun_may_pause(come: bytes, may_pause: bool) -> None:
     reader = AsciiReader(Read(1, 0x2A5, 1))
     assert reader.feed(come) is None
-    assert (reader.patience == PAUSE) == may_pause
+    assert (reader.inter_byte_timeout == INTER_BYTE_TIMEOUT) == may_pause

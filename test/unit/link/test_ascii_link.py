@@ -30,24 +30,24 @@ from support.addresses import packed
 
 # what holds for RTU holds for ASCII, unless it is about the silence between frames
 from test_rtu_link import test_babbling_line_is_no_reason_to_hang  # noqa: F401
-from test_rtu_link import test_closing_forgets_all_doubts  # noqa: F401
+from test_rtu_link import test_closing_ends_every_quarantine  # noqa: F401
 from test_rtu_link import test_damaged_answer  # noqa: F401
 from test_rtu_link import test_doubled_answer_is_noticed  # noqa: F401
-from test_rtu_link import test_doubt_of_one_unit_is_not_that_of_another  # noqa: F401
 from test_rtu_link import test_every_answer_belongs_to_its_request  # noqa: F401
 from test_rtu_link import test_late_answer_before_a_write_is_passed_over  # noqa: F401
 from test_rtu_link import test_late_answer_is_not_taken_for_the_next_one  # noqa: F401
-from test_rtu_link import test_late_answer_to_a_write_does_not_end_the_doubt  # noqa: F401
+from test_rtu_link import test_late_answer_to_a_write_does_not_end_the_quarantine  # noqa: F401
 from test_rtu_link import test_line_that_begins_to_babble_is_no_reason_to_hang  # noqa: F401
 from test_rtu_link import test_lost_port_is_passed_on  # noqa: F401
-from test_rtu_link import test_probe_has_another_shape  # noqa: F401
+from test_rtu_link import test_quarantine_of_one_unit_is_not_that_of_another  # noqa: F401
 from test_rtu_link import test_read_and_write  # noqa: F401
 from test_rtu_link import test_refusal  # noqa: F401
 from test_rtu_link import test_refusal_is_not_taken_for_that_of_another_request  # noqa: F401
-from test_rtu_link import test_refusal_of_another_function_is_believed_in_doubt  # noqa: F401
-from test_rtu_link import test_refused_probe_is_an_answer  # noqa: F401
+from test_rtu_link import test_refusal_of_another_function_is_believed_in_quarantine  # noqa: F401
+from test_rtu_link import test_refused_resync_read_is_an_answer  # noqa: F401
 from test_rtu_link import test_reply_says_when_its_last_byte_came  # noqa: F401
-from test_rtu_link import test_write_goes_out_at_once_even_in_doubt  # noqa: F401
+from test_rtu_link import test_resync_read_has_another_shape  # noqa: F401
+from test_rtu_link import test_write_goes_out_at_once_even_in_quarantine  # noqa: F401
 from virtual_wire import AsciiWire
 from virtual_wire import Fate
 

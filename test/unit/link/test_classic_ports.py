@@ -29,15 +29,14 @@ import pytest
 from support.addresses import classic_id
 from support.addresses import packed
 
-from nfo_sinus_driver.link.classic_link import CHAR_FORMATS
+from nfo_sinus_driver.link import line_settings
+from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.open import line_settings
-from nfo_sinus_driver.link.open import open_link
 
 #: Longer than any drive here takes to answer, on any machine, s.
 PATIENT = 10.0
@@ -170,7 +169,7 @@ def test_read_and_write(drive: PtyDrive, link: ClassicLink, unit: int) -> None:
     assert drive.asked[-3:] == [(0x127, None), (0x27, None), (0x127, None)]
 
 
-@pytest.mark.parametrize('char_format', CHAR_FORMATS)
+@pytest.mark.parametrize('char_format', ClassicLink.protocol.char_formats)
 def test_every_format(drive: PtyDrive, char_format: str) -> None:
     link = connect(drive, char_format=char_format)
     assert link.read(1, SPEED).data == packed(1450)

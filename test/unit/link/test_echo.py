@@ -47,6 +47,7 @@ from virtual_wire import Fate
 from virtual_wire import Slave
 from virtual_wire import Wire
 
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.ascii_link import AsciiLink
 from nfo_sinus_driver.link.echo import Echo
@@ -55,7 +56,6 @@ from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.open import line_settings
 from nfo_sinus_driver.link.rtu_link import RtuLink
 
 KINDS = {'rtu': (RtuLink, Wire), 'ascii': (AsciiLink, AsciiWire)}
@@ -77,7 +77,7 @@ def test_nothing_is_stripped_before_an_echo_was_heard() -> None:
     echo = Echo()
     echo.sent(b'abc')
     assert echo.strip(b'abcd') == b'abcd'
-    assert echo.missing == 0
+    assert echo.bytes_needed == 0
 
 
 @given(st.data(), st.binary(min_size=1, max_size=8), st.binary(max_size=20))
@@ -88,7 +88,7 @@ def test_echo_is_stripped_in_any_pieces(data: st.DataObject, frame: bytes, answe
     stream = frame + answer
     cut = data.draw(st.integers(0, len(stream)))
     assert echo.strip(stream[:cut]) + echo.strip(stream[cut:]) == answer
-    assert echo.missing == 0
+    assert echo.bytes_needed == 0
     assert echo.before == b''
 
 
@@ -131,7 +131,7 @@ def test_reads_and_writes_with_an_echo() -> None:
         assert bench.read(C).data == bench.answer_of(len(bench.asked) - 1)
         assert bench.write(A, 5).data == b''
         assert bench.write(C, 5, 6).data == b''
-    # nothing had to be probed
+    # nothing had to be resynchronised
     assert bench.asked == [0x400, 0x3EC, 0x400, 0x3EC] * 2
     bench.wire.check_gaps()
 
@@ -262,7 +262,7 @@ def test_second_answer_is_said() -> None:
     assert bench.asked == [0x400, 0x264, 0x258, 0x264]
 
 
-def test_same_words_twice_are_believed_after_a_probe() -> None:
+def test_same_words_twice_are_believed_after_a_resync_read() -> None:
     bench = Bench()
     bench.slave = SameWords(bench.wire)
     for address in (A, B, C, D, A):
@@ -292,7 +292,7 @@ def test_same_words_after_a_while_are_believed_at_once() -> None:
     assert bench.asked == [0x400, 0x264]
 
 
-def test_same_answer_to_a_write_needs_no_probe() -> None:
+def test_same_answer_to_a_write_needs_no_resync_read() -> None:
     # it names what was written
     bench = Bench()
     bench.write(A, 5)
@@ -315,7 +315,7 @@ class SameRefusal(Slave):
         return Refused.ILLEGAL_ADDRESS
 
 
-def test_same_refusals_are_believed_even_where_the_probes_are_refused() -> None:
+def test_same_refusals_are_believed_even_where_resync_reads_are_refused() -> None:
     bench = Bench()
     bench.slave = SameRefusal(bench.wire, iter([Fate(what='refuse')] * 9))
     for address in (A, B, C):
@@ -330,7 +330,7 @@ def test_refusal_behind_the_same_question_twice_is_believed() -> None:
     bench.expect(Refused, lambda: bench.read(C))
 
 
-def test_second_refusal_is_noticed_even_where_the_probes_are_refused() -> None:
+def test_second_refusal_is_noticed_even_where_resync_reads_are_refused() -> None:
     bench = Bench()
     fates = [Fate(what='refuse twice', again=0.2), Fate(), *[Fate(what='refuse')] * 9]
     bench.slave = SameRefusal(bench.wire, iter(fates))
@@ -338,8 +338,8 @@ def test_second_refusal_is_noticed_even_where_the_probes_are_refused() -> None:
     bench.expect(DamagedAnswer, lambda: bench.read(B))
 
 
-def test_same_words_of_a_unit_without_probes_are_believed_when_it_was_asked_who_it_is() -> None:
-    bench = Bench(probes=())
+def test_same_words_without_resync_reads_are_believed_when_it_was_asked_who_it_is() -> None:
+    bench = Bench(resync=())
     bench.slave = SameWords(bench.wire)
     for address in (A, B, A):
         bench.read(address)

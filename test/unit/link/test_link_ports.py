@@ -36,7 +36,6 @@ import pytest
 from support.addresses import packed
 from support.addresses import register
 
-from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link import serial_port
 from nfo_sinus_driver.link.errors import PortError
@@ -489,28 +488,9 @@ def test_a_device_without_its_folder_is_told_the_whole_path() -> None:
         SerialPort('ttyNone', LineSettings()).open()
 
 
-def test_no_port_and_seven_data_bits_can_never_work() -> None:
+def test_no_port() -> None:
     with pytest.raises(ValueError, match='port is empty'):
         open_link('modbus_rtu', '', LineSettings())
-    with pytest.raises(ValueError, match=r"char_format '7O1': modbus_rtu has 8 data bits.* 8O1"):
-        open_link('modbus_rtu', '/dev/x', LineSettings(char_format='7O1'))
-    with pytest.raises(ValueError, match=r"char_format '8N2': modbus_ascii has 7 data bits.* 7N2"):
-        open_link('modbus_ascii', '/dev/x', LineSettings(char_format='8N2'))
-
-
-@pytest.mark.parametrize(
-    ('protocol', 'baud_rate', 'char_format'),
-    [('modbus_rtu', 19200, '8E1'), ('modbus_ascii', 19200, '7E1')],
-)
-def test_factory_settings(protocol: str, baud_rate: int, char_format: str) -> None:
-    # [M0 §6.2.2]
-    line = line_settings(protocol)
-    assert (line.baud_rate, line.char_format) == (baud_rate, char_format)
-    open_link(protocol, '/dev/x', line)
-    asked = line_settings(protocol, baud_rate=9600, char_format=f'{char_format[0]}N2')
-    assert (asked.baud_rate, asked.char_format) == (9600, f'{char_format[0]}N2')
-    with pytest.raises(ValueError, match='unknown protocol'):
-        line_settings('profibus')
 
 
 def test_device_server_that_goes_away(server: Server) -> None:
@@ -572,53 +552,3 @@ def test_link_over_tcp(server: Server) -> None:
     assert link.read(1, register(0x2A5)).data == packed(37)
     drive.join()
     link.close()
-
-
-def test_unknown_protocol() -> None:
-    with pytest.raises(ValueError, match="unknown protocol 'profibus': choose one of modbus_rtu"):
-        open_link('profibus', '/dev/null', LineSettings())
-
-
-# --- settings -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ('char_format', 'bits', 'parity', 'stop', 'char_bits'),
-    [
-        ('8E1', 8, 'E', 1, 11),
-        ('8N2', 8, 'N', 2, 11),
-        ('7O1', 7, 'O', 1, 10),
-        ('8N1', 8, 'N', 1, 10),
-    ],
-)
-def test_line_settings(
-    char_format: str, bits: int, parity: str, stop: int, char_bits: int
-) -> None:
-    line = LineSettings(baud_rate=9600, char_format=char_format)
-    assert (line.data_bits, line.parity, line.stop_bits) == (bits, parity, stop)
-    assert line.char_time == pytest.approx(char_bits / 9600)
-
-
-@pytest.mark.parametrize('baud', BAUD_RATES)
-def test_silence_between_two_frames(baud: int) -> None:
-    # [MODBUS over Serial Line V1.02, 2.5.1.1]: 3.5 characters of 11 bits, fixed above 19200
-    gap = LineSettings(baud_rate=baud).frame_gap
-    assert gap == pytest.approx(38.5 / baud if baud <= 19200 else 0.00175)
-
-
-@pytest.mark.parametrize(
-    ('setting', 'message'),
-    [
-        ({'baud_rate': 115200}, 'the drive knows 1200, 2400'),
-        ({'baud_rate': 0}, 'the drive knows'),
-        ({'char_format': '8e1'}, 'write data bits, parity and stop bits'),
-        ({'char_format': '9N1'}, 'such as 8E1'),
-        ({'char_format': '8E1 '}, 'such as 8E1'),
-        ({'response_timeout': 0.0}, '0.01 to 10 s'),
-        ({'response_timeout': 10.1}, '0.01 to 10 s'),
-        ({'response_timeout': float('nan')}, '0.01 to 10 s'),
-    ],
-)
-def test_settings_that_no_drive_has(setting: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        LineSettings(**setting)  # type: ignore[arg-type]

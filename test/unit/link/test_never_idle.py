@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A line that is never left unused in doubt, and a write that nothing holds back."""
+"""A line that is never left unused in quarantine, and a write that nothing holds back."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ import heapq
 
 from classic_far_end import FarEnd
 from classic_far_end import Fate as ClassicFate
+from classic_link_bench import Bench as ClassicBench
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -41,7 +42,6 @@ import pytest
 from support.addresses import classic_id
 from support.addresses import packed
 from support.addresses import register
-from test_classic_link import Bench as ClassicBench
 from test_read_then_write import AsciiBench
 from test_rtu_link import FATES
 from test_rtu_link import STEPS
@@ -91,7 +91,7 @@ def modbus_bench(
     return bench
 
 
-# --- questions that are never in doubt all together -----------------------------------------------
+# --- questions that are never in quarantine all together ------------------------------------------
 
 
 @pytest.mark.parametrize('unit', ['G2', 'Optimal'])
@@ -104,21 +104,21 @@ def test_however_many_answers_are_lost_something_is_asked_at_once(
         before = bench.wire.now
         bench.expect(NoAnswer, lambda: bench.read(A))
         assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
-    # what was read last, then two questions of other kinds, and none is asked in doubt
+    # what was read last, then two questions of other kinds, and none is asked in quarantine
     assert [function for _, function, _, _ in bench.slave.requests[:6]] == [3, 3, 17, 43, 3, 3]
     assert bench.asked[:2] == [A.index, TWO.index]
     assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
 def test_a_unit_of_which_nothing_is_known_is_asked_who_it_is() -> None:
-    bench = Bench([LOST], probes=())
+    bench = Bench([LOST], resync=())
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(B).data == bench.answer_of(2)
     assert [function for _, function, _, _ in bench.slave.requests] == [3, 17, 3]
 
 
 def test_a_unit_of_which_nothing_is_known_is_left_alone_for_one_time_out_at_most() -> None:
-    bench = Bench([LOST] * 3, probes=())
+    bench = Bench([LOST] * 3, resync=())
     for _ in range(3):
         bench.expect(NoAnswer, lambda: bench.read(A))
     error = bench.expect(NotReady, lambda: bench.read(A))
@@ -128,7 +128,7 @@ def test_a_unit_of_which_nothing_is_known_is_left_alone_for_one_time_out_at_most
     assert bench.read(A).data == bench.answer_of(3)
 
 
-def test_what_cannot_be_confused_needs_no_probe() -> None:
+def test_what_cannot_be_confused_needs_no_resync_read() -> None:
     bench = Bench([Fate(1.5)])
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(C).data == bench.answer_of(1)
@@ -345,7 +345,7 @@ def test_a_write_and_read_goes_out_at_once_on_a_line_that_is_never_silent() -> N
 
 
 @pytest.mark.parametrize('lost', range(6))
-def test_a_write_goes_out_at_once_whatever_is_in_doubt(lost: int) -> None:
+def test_a_write_goes_out_at_once_whatever_is_in_quarantine(lost: int) -> None:
     bench = Bench([LOST] * lost)
     for _ in range(lost):
         bench.expect(NoAnswer, lambda: bench.read(A))

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from classic_far_end import Fate as ClassicFate
+from classic_link_bench import Bench as ClassicBench
 from link_bench import ONE
 from link_bench import TIMEOUT
 from link_bench import TWO
@@ -29,7 +30,6 @@ from link_bench import Bench
 import pytest
 from support.addresses import packed
 from support.addresses import register
-from test_classic_link import Bench as ClassicBench
 from test_echo import SameWords
 from virtual_wire import AsciiWire
 from virtual_wire import Fate
@@ -106,7 +106,7 @@ def test_nothing_is_listened_for_behind_an_answer_that_was_told_before(
     assert bench.wire.sent[-1][0] - heard <= max(_SOON, bench.wire.gap + 1e-9)
 
 
-def test_no_probe_goes_first_on_a_line_in_doubt(modbus: Callable[..., Bench]) -> None:
+def test_no_resync_read_goes_first_on_a_line_in_quarantine(modbus: Callable[..., Bench]) -> None:
     bench = modbus([Fate(what='drop'), Fate(what='drop')])
     for _ in range(2):
         bench.expect(NoAnswer, lambda: bench.read(A))
@@ -117,7 +117,7 @@ def test_no_probe_goes_first_on_a_line_in_doubt(modbus: Callable[..., Bench]) ->
     assert bench.wire.sent[asked][0] - began <= bench.wire.gap + 1e-9
 
 
-def test_the_answer_that_did_not_come_stays_in_doubt(modbus: Callable[..., Bench]) -> None:
+def test_the_answer_that_did_not_come_stays_in_quarantine(modbus: Callable[..., Bench]) -> None:
     bench = modbus([Fate(1.5), Fate(what='drop')])
     failing(bench)
     asked = len(bench.asked)
@@ -192,7 +192,7 @@ def test_classic_a_refused_acknowledgement_keeps_no_stop(what: str) -> None:
     assert bench.wire.sent[-1][0] - heard <= _SOON
 
 
-def test_classic_no_probe_goes_first_on_a_line_in_doubt() -> None:
+def test_classic_no_resync_read_goes_first_on_a_line_in_quarantine() -> None:
     bench = ClassicBench(*[ClassicFate(what='drop')] * 3)
     for address in (INV_ST, register(0x29), INV_ST_ACK):
         with pytest.raises(NoAnswer):

@@ -170,7 +170,7 @@ def test_refusal() -> None:
     assert len(bench.asked) == 3
 
 
-def test_closing_forgets_all_doubts() -> None:
+def test_closing_ends_every_quarantine() -> None:
     bench = Bench([Fate(what='drop')])
     bench.expect(NoAnswer, lambda: bench.read(A))
     bench.link.close()
@@ -193,7 +193,7 @@ def test_lost_port_is_passed_on() -> None:
     bench.expect(PortError, lambda: bench.read(A))
 
 
-# --- doubt ----------------------------------------------------------------------------------------
+# --- quarantine -----------------------------------------------------------------------------------
 
 
 def test_late_answer_is_not_taken_for_the_next_one() -> None:
@@ -206,15 +206,15 @@ def test_late_answer_is_not_taken_for_the_next_one() -> None:
     assert len(bench.asked) == 4
 
 
-@pytest.mark.parametrize(('first', 'probe', 'second'), [(A, TWO, B), (C, ONE, D)])
-def test_probe_has_another_shape(first: Address, probe: Address, second: Address) -> None:
+@pytest.mark.parametrize(('first', 'resync', 'second'), [(A, TWO, B), (C, ONE, D)])
+def test_resync_read_has_another_shape(first: Address, resync: Address, second: Address) -> None:
     bench = Bench([Fate(what='drop')])
     bench.expect(NoAnswer, lambda: bench.read(first))
     assert bench.read(second).data == bench.answer_of(2)
-    assert bench.asked[1] == probe.index
+    assert bench.asked[1] == resync.index
 
 
-def test_write_goes_out_at_once_even_in_doubt() -> None:
+def test_write_goes_out_at_once_even_in_quarantine() -> None:
     bench = Bench([Fate(what='drop'), Fate(what='drop')])
     bench.expect(NoAnswer, lambda: bench.read(A))
     bench.expect(NoAnswer, lambda: bench.read(A))
@@ -228,12 +228,12 @@ def test_late_answer_before_a_write_is_passed_over() -> None:
     bench = Bench([Fate(1.2)])
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.write(B, 5).data == b''
-    # units answer in order, so the doubt is over
+    # units answer in order, so the quarantine is over
     assert bench.read(A).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 
 
-def test_late_answer_to_a_write_does_not_end_the_doubt() -> None:
+def test_late_answer_to_a_write_does_not_end_the_quarantine() -> None:
     # found by the property below: the first write's answer is taken for the second one's, and
     # the answer to the read between them is still to come
     bench = Bench([Fate(2.9), Fate(2.5)])
@@ -282,7 +282,7 @@ def test_several_late_refusals_at_once() -> None:
     assert bench.write(D, 5).data == b''
 
 
-def test_refusal_of_another_function_is_believed_in_doubt() -> None:
+def test_refusal_of_another_function_is_believed_in_quarantine() -> None:
     bench = Bench([Fate(what='drop'), Fate(what='refuse')])
     bench.expect(NoAnswer, lambda: bench.read(A))
     error = bench.expect(Refused, lambda: bench.write(A, 5))
@@ -302,9 +302,9 @@ def test_refusals_that_nobody_can_tell_apart_keep_no_reads_out() -> None:
     bench.expect(Refused, lambda: bench.write(B, 0))
 
 
-def test_refused_probe_is_an_answer() -> None:
+def test_refused_resync_read_is_an_answer() -> None:
     # it says that the line can be believed, and nothing about the request behind it
-    bench = Bench([Fate(what='drop'), Fate(what='refuse'), Fate()], probes=())
+    bench = Bench([Fate(what='drop'), Fate(what='refuse'), Fate()], resync=())
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(B).data == bench.answer_of(2)
     assert len(bench.asked) == 3
@@ -318,7 +318,7 @@ def test_doubled_answer_is_noticed(lump: bool) -> None:
     assert bench.asked == [0x400, 0x258, 0x264]
 
 
-def test_bytes_that_nobody_asked_for_raise_doubt() -> None:
+def test_bytes_that_nobody_asked_for_put_reads_in_quarantine() -> None:
     bench = Bench()
     bench.read(A)
     bench.wire.arrive(bench.wire.now, opinion.read_answer(UNIT, [99]))
@@ -334,9 +334,9 @@ def test_bytes_before_the_first_request_are_nothing() -> None:
     bench.wire.check_gaps()
 
 
-def test_doubt_of_one_unit_is_not_that_of_another() -> None:
+def test_quarantine_of_one_unit_is_not_that_of_another() -> None:
     bench = Bench([Fate(1.5)])
-    bench.link.use_probes(2, (ONE, TWO))
+    bench.link.use_resync_reads(2, (ONE, TWO))
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(B, unit=2).data == bench.answer_of(1)
     assert [request[0] for request in bench.slave.requests] == [1, 2]

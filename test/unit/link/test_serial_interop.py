@@ -28,8 +28,8 @@ from support.addresses import register
 from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.open import line_settings
 
 ONE = register(0x2A5)
 TWO = register(0x258, 2)
@@ -40,7 +40,7 @@ def link(request: pytest.FixtureRequest) -> Iterator[Link]:
     protocol = f'modbus_{request.param}'
     with serial_server(request.param) as path:
         link = open_link(protocol, path, line_settings(protocol, response_timeout=5.0))
-        link.use_probes(1, (ONE, TWO))
+        link.use_resync_reads(1, (ONE, TWO))
         link.open()
         yield link
         link.close()

@@ -26,14 +26,12 @@ from test_echo import SameWords
 from virtual_wire import Fate
 
 from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import serial_link
+from nfo_sinus_driver.link.late_replies import DISTRUST
 
 
 def trusting(fates: list[Fate] | None = None) -> Bench:
     """Return a bench whose link has heard nothing twice yet."""
-    bench = Bench(fates)
-    bench.link._distrust_until = 0.0
-    return bench
+    return Bench(fates, trusted=True)
 
 
 def test_same_words_cost_no_request_and_hardly_any_time() -> None:
@@ -70,7 +68,7 @@ def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
     bench.read(A)
     bench.read(B)
     assert bench.asked[-1] not in (A.index, B.index), 'nothing confirmed it'
-    bench.wire.now += serial_link.DISTRUST + 1.0
+    bench.wire.now += DISTRUST + 1.0
     bench.read(A)
     bench.read(B)
     assert bench.asked[-2:] == [A.index, B.index]
@@ -79,7 +77,7 @@ def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
 def test_one_slow_answer_does_not_slow_the_others_for_ever() -> None:
     bench = trusting([Fate(delay=0.9)])
     bench.read(D)
-    slow = bench.link._slowest[UNIT]
+    slow = bench.link._late.longest(UNIT)
     for _ in range(60):
         bench.read(D)
-    assert bench.link._slowest[UNIT] < slow / 10
+    assert bench.link._late.longest(UNIT) < slow / 10

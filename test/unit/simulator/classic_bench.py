@@ -15,7 +15,7 @@
 """A Classic master on the bench: frames by hand, answers in plain view."""
 
 from nfo_sinus_driver.simulator.classic import Classic
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 
 #: SWVer of a drive that each manual describes.
 SW_VER = {'2.03': 4.38, '5.0': 4.21}
@@ -55,7 +55,7 @@ class ClassicBench:
             'serial.bus_type': 'NFO',
             **options.pop('settings', {}),
         }
-        self.drive = SimulatedDrive(settings=settings, **options)
+        self.drive = simulated_drive(settings=settings, **options)
         self.protocol = Classic()
 
     def say(self, frame):

@@ -26,7 +26,8 @@ from support.addresses import packed
 from support.addresses import words_of
 
 from nfo_sinus_driver.simulator import pymodbus_compat
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Refused
 
 
@@ -34,17 +35,18 @@ class Bench:
     """A drive on the bench: commands by name, and time that passes when told."""
 
     def __init__(self, **options):
-        self.drive = SimulatedDrive(**options)
+        self.drive = simulated_drive(**options)
 
     def write(self, key, value):
         parameter = self.drive.model[key]
         words = words_of(parameter.encode(value))
-        self.drive.write(parameter.at('modbus').index, words)
+        server(self.drive).write(parameter.at('modbus').index, words)
 
     def read(self, key):
         parameter = self.drive.model[key]
         place = parameter.at('modbus')
-        return parameter.decode(packed(*self.drive.read(place.index, place.codec.size // 2)))
+        words = server(self.drive).read(place.index, place.codec.size // 2)
+        return parameter.decode(packed(*words))
 
     def mode(self, code):
         self.write('fieldbus.mode', code)
@@ -68,7 +70,7 @@ class Bench:
 
     @property
     def state(self):
-        return self.drive.runner.state
+        return self.drive.control_unit.state
 
     @property
     def inv_st(self):

@@ -17,8 +17,8 @@
 
 import struct
 
-from nfo_sinus_driver.simulator import modbus
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
 
 STATOR_FREQUENCY = 0x0400
 CONTROL_FREQUENCY = 0x0518
@@ -56,10 +56,10 @@ class OptimalBench:
     """One drive; time passes when told."""
 
     def __init__(self, **options):
-        self.drive = SimulatedDrive('sinus_optimal', **options)
+        self.drive = simulated_drive('sinus_optimal', **options)
 
     def ask(self, pdu):
-        return modbus.answer(self.drive, bytes.fromhex(pdu) if isinstance(pdu, str) else pdu)
+        return server(self.drive).answer(bytes.fromhex(pdu) if isinstance(pdu, str) else pdu)
 
     def read(self, register):
         """Read one register, signed."""

@@ -26,9 +26,9 @@ from support.examples import examples
 
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic import Classic
+from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.classic_frames import Message
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.faults import SioErr
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.receiver import Receiver
 
 #: "A SELECT message to address 1 which gives parameter 25 the value of 100" ([M0 §6.1.3], [M2 §5]).
@@ -61,16 +61,16 @@ def test_answers():
 @pytest.mark.parametrize(
     ('frame', 'wrong'),
     [
-        (EXAMPLE[:-1] + b'\x72', SioErr.CHECK_SUM),
-        (EXAMPLE.replace(b'0064', b'0065'), SioErr.CHECK_SUM),
-        (EXAMPLE.replace(b'=', b'-'), SioErr.STRUCTURE),
-        (EXAMPLE.replace(b'\x03', b'\x17'), SioErr.STRUCTURE),
-        (EXAMPLE.replace(b'0064', b'00G4'), SioErr.STRUCTURE),
-        (EXAMPLE[:-2], SioErr.STRUCTURE),
-        (b'\x04!E0019\x06', SioErr.STRUCTURE),
-        (b'\x04!E001\x05', SioErr.STRUCTURE),
-        (b'\x04!F0019\x05', SioErr.PREFIX),
-        (b'\x04!\x02F0019=0064\x03' + bcc(b'F0019=0064\x03'), SioErr.PREFIX),
+        (EXAMPLE[:-1] + b'\x72', LineError.CHECK_SUM),
+        (EXAMPLE.replace(b'0064', b'0065'), LineError.CHECK_SUM),
+        (EXAMPLE.replace(b'=', b'-'), LineError.STRUCTURE),
+        (EXAMPLE.replace(b'\x03', b'\x17'), LineError.STRUCTURE),
+        (EXAMPLE.replace(b'0064', b'00G4'), LineError.STRUCTURE),
+        (EXAMPLE[:-2], LineError.STRUCTURE),
+        (b'\x04!E0019\x06', LineError.STRUCTURE),
+        (b'\x04!E001\x05', LineError.STRUCTURE),
+        (b'\x04!F0019\x05', LineError.PREFIX),
+        (b'\x04!\x02F0019=0064\x03' + bcc(b'F0019=0064\x03'), LineError.PREFIX),
     ],
 )
 def test_what_is_wrong_with_it(frame, wrong):
@@ -80,7 +80,7 @@ def test_what_is_wrong_with_it(frame, wrong):
 def test_small_letters_are_read_where_they_are_known():
     frame = b'\x04!E00e9\x05'
     assert classic_frames.parse(frame, small_letters=True).id == 0xE9
-    assert classic_frames.parse(frame, small_letters=False).wrong is SioErr.STRUCTURE
+    assert classic_frames.parse(frame, small_letters=False).wrong is LineError.STRUCTURE
 
 
 @pytest.mark.parametrize('frame', [b'', b'\x04', b'\x04\x1f', b'\x04\x80', b'!E0019\x05'])
@@ -143,7 +143,7 @@ def test_no_byte_is_lost_and_a_message_after_silence_is_found(chunks):
 @given(st.binary(max_size=30), st.sampled_from([4.21, 4.38]))
 @settings(max_examples=examples(500))
 def test_whatever_comes_the_answer_is_one_of_the_three(data, sw_ver):
-    drive = SimulatedDrive(settings={'fieldbus.sw_ver': sw_ver})
+    drive = simulated_drive(settings={'fieldbus.sw_ver': sw_ver})
     protocol = Classic()
     frame = b'\x04 ' + data
     request = protocol.unwrap(frame)

@@ -16,6 +16,8 @@
 
 import pytest
 
+from nfo_sinus_driver.simulator.modbus import server
+
 POWER = 0x4006
 READY_TO_RUN = 0xC077  # NetRef, NetCtrl, ramp generator, switched on
 
@@ -75,9 +77,9 @@ def test_the_bits_of_the_ramp_generator(bench, bit, frequency):
 
 def test_the_write_mask(bench):
     bench.write('fieldbus.drive_control', POWER)
-    bench.drive.write(0x250, [0xFFFF, 0x0001])  # AND, OR
+    server(bench.drive).write(0x250, [0xFFFF, 0x0001])  # AND, OR
     assert bench.read('fieldbus.drive_control') == POWER | 1
-    bench.drive.write(0x250, [0xFFFE, 0x0000])
+    server(bench.drive).write(0x250, [0xFFFE, 0x0000])
     assert bench.read('fieldbus.drive_control') == POWER
 
 

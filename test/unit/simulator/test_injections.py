@@ -24,6 +24,7 @@ import pytest
 from nfo_sinus_driver.simulator.control import Client
 from nfo_sinus_driver.simulator.control import ControlError
 from nfo_sinus_driver.simulator.injections import VERBS
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 READ_MODE = bytes.fromhex('0302940001')
@@ -101,11 +102,11 @@ def test_a_standing_cause_goes_on_request(served):
     simulator, client = served
     client.inject('fault', 3, standing=True, address=1)
     with simulator.lock:
-        simulator.drives[1].read(0x2A4, 1)
+        server(simulator.drives[1]).read(0x2A4, 1)
     assert client.state(1)['fault'] == 3
     client.inject('ack-cause-gone', address=1)
     with simulator.lock:
-        simulator.drives[1].read(0x2A4, 1)
+        server(simulator.drives[1]).read(0x2A4, 1)
     assert client.state(1)['fault'] == 0
 
 

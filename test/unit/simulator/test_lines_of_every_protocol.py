@@ -22,13 +22,14 @@ from classic_bench import enquiry
 from classic_bench import reply
 import pytest
 
-from nfo_sinus_driver.simulator.doors import door
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.endpoints import endpoint
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
-from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.sinus.serial_side import BAUD_CODES
+from nfo_sinus_driver.simulator.sinus.serial_side import BUS_TYPES
 from nfo_sinus_driver.simulator.trace import Trace
 
 READ = bytes.fromhex('0302940001')
@@ -81,12 +82,12 @@ class Rig:
 
     def __init__(self, protocol, *, addresses=(1,), wait=0.25, set_to_it=True, **options):
         self.now = 100.0
-        way = door(protocol, **{key: options.pop(key) for key in ('baud',) if key in options})
+        way = endpoint(protocol, **{key: options.pop(key) for key in ('baud',) if key in options})
         self.timing = way.timing
-        self.drives = [SimulatedDrive(address=address) for address in addresses]
+        self.drives = [simulated_drive(address=address) for address in addresses]
         if set_to_it:
             for drive in self.drives:
-                drive.memory.put('serial.bus_type', way.bus_type)
+                drive.memory.put('serial.bus_type', BUS_TYPES[way.spoken])
                 drive.memory.put('serial.si_baud', BAUD_CODES[self.timing.baud])
                 drive.memory.put('serial.si_prot', {'8E1': 4, '7E1': 0}[self.timing.char_format])
                 drive.power_cycle(0.0)
@@ -323,7 +324,7 @@ def test_a_gateway_does_not_answer_for_everybody():
     rig.ask(ModbusTcp.wrap(7, 0, bytes.fromhex('0602940003')))
     rig.wait(2)
     assert rig.heard == b''
-    assert rig.drives[0].runner.mode == 3
+    assert rig.drives[0].control_unit.mode == 3
 
 
 @pytest.mark.parametrize(
@@ -335,7 +336,7 @@ def test_a_gateway_keeps_a_spoilt_answer_to_itself(what, note):
     rig.ask(ModbusTcp.wrap(7, 1, bytes.fromhex('0602940003')))
     rig.wait(2)
     assert rig.port.sent == [(pytest.approx(100.25), NO_ANSWER.replace(b'\x83', b'\x86'))]
-    assert rig.drives[0].runner.mode == 3, 'it is carried out'
+    assert rig.drives[0].control_unit.mode == 3, 'it is carried out'
     assert rig.notes == ['', note]
 
 
@@ -350,7 +351,7 @@ def test_a_late_or_double_answer_of_a_gateway_keeps_its_number():
 
 def test_a_gateway_answers_for_a_drive_that_keeps_silent_about_a_function():
     rig = Rig('modbus_tcp')
-    rig.drives[0].newer_functions = 'silent'
+    rig.drives[0].control_unit.newer_functions = 'silent'
     rig.ask(ModbusTcp.wrap(7, 1, b'\x11'))
     rig.wait(2)
     assert rig.heard == NO_ANSWER.replace(b'\x83', b'\x91')
@@ -376,7 +377,7 @@ def test_a_stop_to_all():
     rig.ask(b'\x04\x7f\x02E0029=0001\x03q')
     rig.wait(1)
     assert rig.heard == b''
-    assert [drive.runner.mode for drive in rig.drives] == [1, 1]
+    assert [drive.control_unit.mode for drive in rig.drives] == [1, 1]
 
 
 def test_a_damaged_message_is_written_down_as_rubbish():

@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
 from nfo_sinus_driver.simulator.protocol import Request
@@ -47,7 +47,7 @@ def test_ascii_frames():
     assert ASCII.unwrap(READ) == Request(1, bytes.fromhex('0302940001'))
     # the standard's example of an LRC: 02 07 has F7
     assert ASCII.wrap(2, b'\x07') == b':0207F7\r\n'
-    assert ASCII.answer(SimulatedDrive(), ASCII.unwrap(READ)) == b':0103020001F9\r\n'
+    assert ASCII.answer(simulated_drive(), ASCII.unwrap(READ)) == b':0103020001F9\r\n'
     assert ASCII.wrap(1, b'\x83\x02') == b':0183027A\r\n'
 
 
@@ -111,7 +111,7 @@ def test_no_byte_is_lost_and_a_frame_after_silence_is_found(protocol, chunks):
 def test_tcp_frames():
     request = TCP.unwrap(READ_TCP)
     assert request.address == 1
-    answer = TCP.answer(SimulatedDrive(), request)
+    answer = TCP.answer(simulated_drive(), request)
     assert answer == bytes.fromhex('1234 0000 0005 01 03 02 0001')
 
 
@@ -132,11 +132,11 @@ def test_cutting_tcp():
 
 
 def test_a_write_to_everybody():
-    drive = SimulatedDrive(address=9)
+    drive = simulated_drive(address=9)
     write = TCP.unwrap(bytes.fromhex('0001 0000 0006 00 06 0294 0003'))
     assert TCP.concerns(drive, write)
     assert TCP.answer(drive, write) == b''
-    assert drive.runner.mode == 3
+    assert drive.control_unit.mode == 3
     read = TCP.unwrap(bytes.fromhex('0001 0000 0006 00 03 0294 0001'))
     assert not TCP.concerns(drive, read)
     assert TCP.instead(read, False) is None

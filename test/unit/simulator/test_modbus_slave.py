@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 import pytest
 from support.examples import examples
 
-from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator import pymodbus_compat
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.receiver import Receiver
@@ -75,14 +75,14 @@ RTU = ModbusRtu()
     ],
 )
 def test_answer(request_, answer):
-    pdu = modbus.answer(SimulatedDrive(), bytes.fromhex(request_))
+    pdu = server(simulated_drive()).answer(bytes.fromhex(request_))
     assert pdu == bytes.fromhex(answer)
 
 
 @given(st.binary(max_size=40))
 @settings(max_examples=examples(500))
 def test_any_pdu_is_answered(pdu):
-    answer = modbus.answer(SimulatedDrive(), pdu)
+    answer = server(simulated_drive()).answer(pdu)
     assert 2 <= len(answer) <= 253
     assert answer[0] & 0x7F == (pdu[0] & 0x7F if pdu else 0)
 
@@ -102,7 +102,7 @@ def test_requests_that_are_nearly_right_are_answered(function, register, count, 
         data += count.to_bytes(2, 'big')
     if function == 16:
         data += bytes([2 * len(words)]) + b''.join(word.to_bytes(2, 'big') for word in words)
-    answer = modbus.answer(SimulatedDrive(), data)
+    answer = server(simulated_drive()).answer(data)
     assert answer[0] == function or (answer[0] == function | 0x80 and 1 <= answer[1] <= 4)
 
 
@@ -125,7 +125,7 @@ def test_a_flipped_bit_is_noticed(body, data):
 
 
 def test_only_writes_are_obeyed_by_everybody():
-    drive = SimulatedDrive(address=7)
+    drive = simulated_drive(address=7)
     assert RTU.concerns(drive, Request(0, b'\x06'))
     assert RTU.concerns(drive, Request(0, b'\x10'))
     assert not RTU.concerns(drive, Request(0, b'\x03'))

@@ -291,7 +291,7 @@ def test_a_master_that_sets_seven_bits_and_parity_is_heard():
         ({'char_format': '8N1'}, '8N2'),
         ({'dialect': '4.0'}, '2.03, 5.0'),
         ({'dialect': '5.0', 'settings': {'fieldbus.sw_ver': 4.38}}, 'not that of firmware'),
-        ({'dialect': '5.0', 'model': 'sinus_optimal'}, 'no dialects'),
+        ({'dialect': '5.0', 'model': 'sinus_optimal'}, 'no option dialect'),
         ({'also': ['profinet']}, 'choose one of modbus_rtu'),
         ({'also': ['modbus_tcp:/tmp/x']}, 'needs a TCP port'),
         ({'also': ['modbus_tcp:70000']}, '65535'),

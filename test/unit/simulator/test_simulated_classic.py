@@ -26,7 +26,7 @@ from classic_bench import select
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.modbus import server
 
 BLOCKED, CHECK_SUM, STRUCTURE, TIMEOUT, PREFIX = 0x1, 0x4, 0x8, 0x10, 0x20
 NOT_PERMITTED, UNKNOWN, UNREADABLE, UNWRITABLE, OUT_OF_RANGE = 0x40, 0x80, 0x100, 0x200, 0x400
@@ -44,7 +44,7 @@ def test_its_own_address_and_no_other(dialect):
     for other in (1, 6, 8, 94):
         assert bench.say(enquiry('E0029', other)) == b''
         assert bench.say(select('E0029', 3, other)) == b''
-    assert bench.drive.runner.mode == 1
+    assert bench.drive.control_unit.mode == 1
 
 
 def test_the_answer_to_address_0_comes_from_there_or_from_the_drives_own():
@@ -60,7 +60,7 @@ def test_the_answer_to_address_0_comes_from_there_or_from_the_drives_own():
 def test_a_select_to_all_is_obeyed_and_not_answered(dialect):
     bench = ClassicBench(dialect, address=7)
     assert bench.say(select('E0029', 3, 95)) == b''
-    assert bench.drive.runner.mode == 3
+    assert bench.drive.control_unit.mode == 3
     assert bench.say(select('EFFFF', 3, 95)) == b''
     assert bench.say(enquiry('E0029', 95)) == b''
     assert bench.flags & UNKNOWN
@@ -138,7 +138,7 @@ def test_what_is_measured_is_as_fine_as_classic_is():
     bench = ClassicBench()
     bench.drive.motor.dc_link = 543.21
     assert bench.read('E0014') == 5432
-    assert bench.drive.read(0x3F8, 1) == (543,)
+    assert server(bench.drive).read(0x3F8, 1) == (543,)
 
 
 def test_what_does_not_fit_is_the_most_that_does():
@@ -156,13 +156,13 @@ def test_firmware():
 
 def test_a_counter_is_two_parameters():
     bench = ClassicBench()
-    bench.drive.counters.op_time = 20000.05
+    bench.drive.counters.operating_time = 20000.05
     assert (bench.read('E0027'), bench.read('E0127')) == (200000 & 0xFFFF, 200000 >> 16)
 
 
 def test_its_halves_can_be_torn():
     bench = ClassicBench()
-    bench.drive.counters.op_time = 6553.5
+    bench.drive.counters.operating_time = 6553.5
     low = bench.read('E0027')
     bench.drive.advance(400)
     assert (low, bench.read('E0127')) == (0xFFFF, 1)
@@ -175,20 +175,20 @@ def test_its_halves_can_be_torn():
 def test_they_are_torn_on_request(low, high):
     bench = ClassicBench()
     true = bench.read(high) << 16 | bench.read(low)
-    bench.drive.tears = 1
+    bench.drive.servers['classic'].tears = 1
     first, torn, second = bench.read(high), bench.read(low), bench.read(high)
     assert (first, torn, second) == (true >> 16, 0, (true >> 16) + 1)
     assert bench.read(high) == second, 'once was asked for'
-    bench.drive.tears = 1
+    bench.drive.servers['classic'].tears = 1
     bench.read('E0029')
     bench.read('E00E2')
-    assert bench.drive.tears == 1, 'only counters go on'
+    assert bench.drive.servers['classic'].tears == 1, 'only counters go on'
 
 
 def test_older_firmware_counts_in_24_bits():
     new, old = ClassicBench('2.03'), ClassicBench('5.0')
     for bench in (new, old):
-        bench.drive.counters.op_time = 0x1234567 / 10
+        bench.drive.counters.operating_time = 0x1234567 / 10
     assert (new.read('E0127'), old.read('E0127')) == (0x123, 0x23)
 
 
@@ -228,10 +228,10 @@ def test_a_refusal_has_its_reason(dialect, frame, flag):
         flag = NOT_PERMITTED
     assert bench.say(frame) == NAK
     assert bench.flags == flag
-    assert bench.drive.inv_st == 24, 'nobody has control, so it is no fault'
+    assert bench.drive.control_unit.status_code == 24, 'nobody has control, so it is no fault'
     assert bench.read('E00AC') == flag
     assert bench.read('E00AC') == 0
-    assert bench.drive.sio_err_reads == 2
+    assert bench.drive.control_unit.sio_err_reads == 2
 
 
 def test_older_firmware_changes_nothing_but_mode_before_the_bus_has_control():
@@ -239,7 +239,7 @@ def test_older_firmware_changes_nothing_but_mode_before_the_bus_has_control():
     for frame in [select('E001D', 20), select('E001E', 0), select('E00AD', 0)]:
         assert bench.say(frame) == NAK
         assert bench.read('E00AC') == NOT_PERMITTED
-    assert bench.drive.inv_st == 24, 'nobody has control, so it is no fault'
+    assert bench.drive.control_unit.status_code == 24, 'nobody has control, so it is no fault'
     assert not bench.drive.writes
     for mode in (2, 1, 3):
         assert bench.write('E0029', mode) == ACK
@@ -266,22 +266,23 @@ def test_while_it_tunes_mode_and_every_command_but_stop_are_refused(dialect):
         assert bench.write(id_, value) == NAK
     assert bench.write('E001D', 20) == (NAK if dialect == '5.0' else ACK)
     assert bench.flags == NOT_PERMITTED
-    assert bench.drive.inv_st == 28, 'no serial fault: the bus does not control the motor'
+    code = bench.drive.control_unit.status_code
+    assert code == 28, 'no serial fault: the bus does not control the motor'
     assert bench.write('E00AD', 0) == ACK
-    assert bench.drive.inv_st == 37
+    assert bench.drive.control_unit.status_code == 37
 
 
 @both
 def test_a_drive_that_refuses_a_stop_while_it_tunes(dialect):
-    bench = ClassicBench(dialect, variant=Variant(stop_in_tuning='refused'))
+    bench = ClassicBench(dialect, stop_in_tuning='refused')
     bench.write('E0029', 3)
     bench.write('E00AD', 0x201)
     assert bench.write('E00AD', 0) == NAK
     assert bench.flags == NOT_PERMITTED
-    assert bench.drive.inv_st == 28
+    assert bench.drive.control_unit.status_code == 28
     bench.drive.advance(10)
     assert bench.write('E00AD', 0) == ACK
-    assert bench.drive.inv_st == 37
+    assert bench.drive.control_unit.status_code == 37
 
 
 def test_not_while_it_runs():
@@ -299,7 +300,7 @@ def test_a_damaged_message(dialect):
     answer = bench.say(select('E0029', 3)[:-1] + b'\x00')
     assert answer == {'2.03': b'', '5.0': NAK}[dialect]
     assert bench.flags == CHECK_SUM
-    assert bench.drive.runner.mode == 1
+    assert bench.drive.control_unit.mode == 1
     assert bench.say(b'\x04!E0029\x06') == b''
     assert bench.flags == CHECK_SUM | STRUCTURE
     assert bench.say(select('E0029', 3, 95)[:-1] + b'\x00') == b''
@@ -316,16 +317,16 @@ def test_a_damaged_message_to_another_is_not_its_business():
 
 @pytest.mark.parametrize('refused', ['all', 'scmd', 'nothing'])
 def test_a_fault_blocks_every_select_and_no_enquiry(refused):
-    bench = ClassicBench(variant=Variant(refuses_in_fault=refused))
+    bench = ClassicBench(refuses_in_fault=refused)
     bench.run()
     bench.drive.trip(5)
     for frame in [select('E0029', 1), select('E0029', 3), select('E00AD', 0), select('E001D', 20)]:
         assert bench.say(frame) == NAK
     assert bench.flags == BLOCKED
     assert bench.read('E00E9') == 5
-    assert bench.drive.ack_reads == 0
+    assert bench.drive.control_unit.ack_reads == 0
     assert bench.read('E00E8') == 5
-    assert bench.drive.ack_reads == 1
+    assert bench.drive.control_unit.ack_reads == 1
     assert bench.read('E00E9') not in (5, SIO_FAIL)
     assert bench.write('E0029', 1) == ACK
 
@@ -435,7 +436,7 @@ def test_a_damaged_message_does_not_count_as_heard():
 def test_the_keypad_takes_over():
     bench = ClassicBench()
     bench.run()
-    bench.drive.press_stop()
+    bench.drive.control_unit.press('stop')
     assert bench.read('E0029') == 1
     assert bench.write('E00AD', RUN) == NAK
     assert bench.flags == NOT_PERMITTED
@@ -494,7 +495,7 @@ def test_a_ride(dialect):
     assert bench.write('E00AD', 0) == ACK
     bench.drive.advance(10)
     assert bench.read('E00E9') == 37
-    assert bench.drive.inv_st_text == {'2.03': 'Bus Stby', '5.0': 'Sio Stby'}[dialect]
+    assert bench.drive.control_unit.status_text == {'2.03': 'Bus Stby', '5.0': 'Sio Stby'}[dialect]
     assert bench.write('E0029', 1) == ACK
     assert bench.read('E00E9') == 24
 
@@ -507,8 +508,8 @@ def test_older_firmware_takes_every_even_command_for_stop():
             bench.drive.advance(1)
         assert new.write('E00AD', command) == NAK
         assert old.write('E00AD', command) == ACK
-        assert new.drive.runner.scmd == RUN
-        assert old.drive.runner.scmd == 0
+        assert new.drive.control_unit.scmd == RUN
+        assert old.drive.control_unit.scmd == 0
 
 
 def test_the_energy_counter_is_reset_by_newer_firmware():
@@ -563,8 +564,9 @@ def test_line_settings_of_older_firmware():
     ]:
         assert new.say(select(id_, code, 0)) == of_new.replace(b'!', b' ')
         assert old.say(select(id_, code, 0))[1:] == of_old[1:]
-    assert (new.drive.address, new.drive.serial.baud, new.drive.serial.char_format) == (1, 256, 4)
-    assert (old.drive.address, old.drive.serial.baud, old.drive.serial.char_format) == (94, 64, 1)
+    for bench, effective in [(new, (1, 256, 4)), (old, (94, 64, 1))]:
+        side = bench.drive.control_unit.serial
+        assert (side.address, side.baud, side.char_format) == effective
 
 
 def test_the_answer_to_a_new_address_comes_from_the_old_one():
@@ -576,12 +578,12 @@ def test_the_answer_to_a_new_address_comes_from_the_old_one():
 
 def test_who_controls_an_older_drive():
     bench = ClassicBench('5.0')
-    bench.drive.write(0x294, [3])
+    server(bench.drive).write(0x294, [3])
     assert bench.read('E00E9') == 41
-    assert bench.drive.inv_st_text == 'Bus Stby'
+    assert bench.drive.control_unit.status_text == 'Bus Stby'
     bench.write('E0029', 3)
     assert bench.read('E00E9') == 37
-    assert bench.drive.inv_st_text == 'Sio Stby'
+    assert bench.drive.control_unit.status_text == 'Sio Stby'
 
 
 # ---- error log ----
@@ -594,7 +596,7 @@ def test_the_error_log(dialect):
     for code in (7, 5):
         bench.drive.trip(code)
         bench.read('E00E8')
-    bench.drive.counters.op_time = 0x1ABCD / 10
+    bench.drive.counters.operating_time = 0x1ABCD / 10
     bench.drive.trip(8)
     assert (bench.read('E0200'), bench.read('E0201')) == (0xABCD, 0x0801)
     assert [bench.read(f'E{0x201 + 2 * entry:04X}') >> 8 for entry in range(4)] == [8, 5, 7, 0]
@@ -605,7 +607,7 @@ def test_the_error_log(dialect):
 
 def test_the_same_log_over_modbus():
     bench = ClassicBench()
-    bench.drive.counters.op_time = 0x1ABCD / 10
+    bench.drive.counters.operating_time = 0x1ABCD / 10
     bench.drive.trip(8)
-    assert bench.drive.read(0xC000, 2) == (0xABCD, 0x0801)
-    assert bench.drive.read(0xC07C, 2) == (0, 0)
+    assert server(bench.drive).read(0xC000, 2) == (0xABCD, 0x0801)
+    assert server(bench.drive).read(0xC07C, 2) == (0, 0)

@@ -160,7 +160,7 @@ def test_optimal_mode_1_manual_leaves_a_running_motor_to_the_keypad(optimal):
     optimal.run(20, 5)
     optimal.write(MODE, 1)
     assert (optimal.running, optimal.read(MODE)) == (True, 1)
-    optimal.drive.press_stop()
+    optimal.drive.control_unit.press('stop')
     optimal.wait(6)
     assert (optimal.running, optimal.text) == (False, 'Stop')
 

@@ -17,8 +17,9 @@
 import pytest
 
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.sinus_g2.commands import RUN_COMMANDS
 
 # ---- MODE ----
 
@@ -44,7 +45,7 @@ def test_mode_bus_stops_a_running_motor_and_forgets_the_command(bench):
     bench.drive.advance(10)
     assert not bench.drive.motor.turning
     assert bench.inv_st == 37
-    assert bench.drive.runner.scmd is Scmd.STOP
+    assert bench.drive.control_unit.scmd == Scmd.STOP
 
 
 def test_mode_stop_releases_the_motor(bench):
@@ -62,7 +63,7 @@ def test_mode_stop_releases_the_motor(bench):
 
 def test_mode_ext_starts_the_motor_when_run_is_active(bench):
     bench.mode(2)
-    assert bench.drive.mode_ext_writes == 1
+    assert bench.drive.control_unit.mode_ext_writes == 1
     assert bench.read('fieldbus.mode') == 2
     assert bench.running
     assert bench.inv_st == 35
@@ -115,7 +116,7 @@ def test_scmd_takes_no_other_code(bench, code):
 
 def test_scmd_cannot_be_read(bench):
     with bench.refuses(Reason.ADDRESS):
-        bench.drive.read(0x298, 1)
+        server(bench.drive).read(0x298, 1)
 
 
 def test_all_run_commands_are_known():
@@ -229,7 +230,7 @@ def test_overload_shows_the_current_limit(bench):
 def test_hard_braking_shows_the_chopper_and_counts_it(bench):
     bench.drive.motor.load = 0.05
     bench.run(50, 8)
-    before = bench.drive.counters.br_time
+    before = bench.drive.counters.brake_time
     bench.write('control.retard', 0.4)
     bench.write('status.frq_set', 0)
     seen = set()
@@ -237,7 +238,7 @@ def test_hard_braking_shows_the_chopper_and_counts_it(bench):
         bench.drive.advance(0.005)
         seen.add(bench.inv_st)
     assert 26 in seen
-    assert 0 < bench.drive.counters.br_time - before < 0.5
+    assert 0 < bench.drive.counters.brake_time - before < 0.5
 
 
 def test_start_delay(bench):

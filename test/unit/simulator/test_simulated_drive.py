@@ -18,7 +18,8 @@ import pytest
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.report import describe
 
@@ -60,16 +61,16 @@ def test_every_register_of_the_catalog_answers_as_its_access_says(bench, paramet
     count = place.codec.size // 2
     if parameter.access is Access.WRITE:
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.read(place.index, count)
+            server(bench.drive).read(place.index, count)
         return
-    words = bench.drive.read(place.index, count)
+    words = server(bench.drive).read(place.index, count)
     assert len(words) == count
     if parameter.access is not Access.READ_WRITE:
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.write(place.index, words)
+            server(bench.drive).write(place.index, words)
     elif not parameter.key.startswith('fieldbus.'):
-        bench.drive.write(place.index, words)
-        assert bench.drive.read(place.index, count) == words
+        server(bench.drive).write(place.index, words)
+        assert server(bench.drive).read(place.index, count) == words
 
 
 @pytest.mark.parametrize('parameter', ON_MODBUS, ids=lambda p: p.key)
@@ -84,9 +85,9 @@ def test_a_parameter_is_read_and_written_whole_or_not_at_all(bench, parameter):
         if register == 0x2A5 and count == 1:
             continue  # the other InvSt begins here
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.read(register, count)
+            server(bench.drive).read(register, count)
         with bench.refuses(Reason.ADDRESS):
-            bench.drive.write(register, [0] * count)
+            server(bench.drive).write(register, [0] * count)
 
 
 def test_factory_values_are_ones_that_the_drive_would_take(bench):
@@ -116,7 +117,7 @@ def test_factory_values_are_ones_that_the_drive_would_take(bench):
 def test_a_value_that_the_manual_forbids_is_refused(bench, register, words):
     before = describe(bench.drive)['parameters']
     with bench.refuses(Reason.VALUE):
-        bench.drive.write(register, words)
+        server(bench.drive).write(register, words)
     assert describe(bench.drive)['parameters'] == before
 
 
@@ -125,7 +126,7 @@ def test_writes_are_counted_and_settings_apart_from_commands(bench):
     bench.write('control.accel', 7.0)
     bench.run(10)
     with bench.refuses(Reason.VALUE):
-        bench.drive.write(0x27E, [0, 0])
+        server(bench.drive).write(0x27E, [0, 0])
     assert bench.drive.writes == {'control.accel': 2}
     assert bench.drive.command_writes == {
         'fieldbus.mode': 1,
@@ -191,7 +192,7 @@ def test_catching_up_with_a_clock(bench):
 )
 def test_impossible_drives(options):
     with pytest.raises(ValueError, match=r'sinus_g2|range'):
-        SimulatedDrive(**options)
+        simulated_drive(**options)
 
 
 def test_the_setpoint_of_classic_goes_where_the_mode_says(bench):

@@ -19,14 +19,14 @@ import pytest
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.self_restart import TRIES
-from nfo_sinus_driver.simulator.variant import CHOICES
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus.variant import CHOICES
+from nfo_sinus_driver.simulator.sinus.variant import Variant
+from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 MODEL = load_family('sinus_g2')
 FAULTS = [code for code in range(48) if MODEL.status_code(code).kind is Kind.FAULT]
 SERIAL = {14, 15}
-KEEPS = Variant(run_command_in_fault='keeps')
+KEEPS = {'run_command_in_fault': 'keeps'}
 
 
 def acknowledge(bench):
@@ -78,7 +78,7 @@ def test_the_run_command_is_dropped_with_the_last_fault(bench):
     bench.drive.trip(5)
     bench.drive.trip(3, cause_present=True)
     acknowledge(bench)
-    assert bench.drive.runner.scmd == 0x101
+    assert bench.drive.control_unit.scmd == 0x101
     bench.drive.end_fault_causes()
     acknowledge(bench)
     assert not bench.running
@@ -92,7 +92,7 @@ def test_the_acknowledging_read_drops_nothing_without_a_fault(bench):
 
 
 def test_a_run_of_the_keypad_is_dropped_too(bench):
-    bench.drive.press_start()
+    bench.drive.control_unit.press('start')
     bench.drive.advance(1)
     assert bench.running
     bench.drive.trip(5)
@@ -103,8 +103,8 @@ def test_a_run_of_the_keypad_is_dropped_too(bench):
 
 
 def test_reading_sio_err_drops_what_was_commanded_in_a_serial_fault(make_bench):
-    for variant, runs in [(Variant(), False), (KEEPS, True)]:
-        bench = make_bench(variant=variant)
+    for variant, runs in [({}, False), (KEEPS, True)]:
+        bench = make_bench(**variant)
         bench.drive.trip(14)
         bench.mode(3)
         bench.scmd(0x101)
@@ -115,18 +115,18 @@ def test_reading_sio_err_drops_what_was_commanded_in_a_serial_fault(make_bench):
 
 @pytest.mark.parametrize('code', [code for code in FAULTS if code not in SERIAL])
 def test_an_acknowledged_fault_lets_the_standing_command_run_again(make_bench, code):
-    bench = make_bench(variant=KEEPS)
+    bench = make_bench(**KEEPS)
     bench.run(20, 5)
     bench.drive.trip(code)
     bench.drive.advance(20)
     assert acknowledge(bench) == code
-    assert bench.drive.ack_reads == 1
+    assert bench.drive.control_unit.ack_reads == 1
     assert bench.running
     assert bench.inv_st == 39
 
 
 def test_the_start_delay_runs_again_after_a_fault(make_bench):
-    bench = make_bench(variant=KEEPS)
+    bench = make_bench(**KEEPS)
     bench.write('control.run_dly', 3)
     bench.run(20, 10)
     bench.drive.trip(5)
@@ -138,7 +138,7 @@ def test_the_start_delay_runs_again_after_a_fault(make_bench):
 
 
 def test_a_drive_that_refuses_every_write_while_a_fault_is_active(make_bench):
-    bench = make_bench(variant=Variant(refuses_in_fault='all'))
+    bench = make_bench(refuses_in_fault='all')
     bench.run(20, 5)
     bench.drive.trip(5)
     for key, value in [
@@ -154,7 +154,7 @@ def test_a_drive_that_refuses_every_write_while_a_fault_is_active(make_bench):
 
 
 def test_a_drive_that_refuses_only_the_run_command_while_a_fault_is_active(make_bench):
-    bench = make_bench(variant=Variant(run_command_in_fault='keeps', refuses_in_fault='scmd'))
+    bench = make_bench(run_command_in_fault='keeps', refuses_in_fault='scmd')
     bench.run(20, 5)
     bench.drive.trip(5)
     for command in (0, 0x101):
@@ -170,7 +170,7 @@ def test_a_drive_that_refuses_only_the_run_command_while_a_fault_is_active(make_
 
 
 def test_a_drive_that_takes_every_write_in_spite_of_a_fault(make_bench):
-    bench = make_bench(variant=KEEPS)
+    bench = make_bench(**KEEPS)
     bench.run(20, 5)
     bench.drive.trip(5)
     bench.write('status.frq_set', 0)
@@ -197,23 +197,23 @@ def test_a_fault_whose_cause_lasts_is_not_acknowledged(bench):
     assert bench.inv_st == 3
     assert acknowledge(bench) == 3
     assert bench.inv_st == 24
-    assert bench.drive.ack_reads == 2
+    assert bench.drive.control_unit.ack_reads == 2
 
 
 def test_reading_without_ack_acknowledges_nothing(bench):
     bench.drive.trip(3)
     for _ in range(3):
         assert bench.read('fieldbus.inv_st') == 3
-    assert bench.drive.ack_reads == 0
+    assert bench.drive.control_unit.ack_reads == 0
 
 
 def test_reading_with_ack_is_counted_even_without_a_fault(bench):
     assert acknowledge(bench) == 24
-    assert bench.drive.ack_reads == 1
+    assert bench.drive.control_unit.ack_reads == 1
 
 
 def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):
-    bench = make_bench(variant=Variant(refuses_in_fault='all'))
+    bench = make_bench(refuses_in_fault='all')
     bench.run(20, 5)
     bench.drive.trip(14)
     bench.drive.advance(20)
@@ -395,7 +395,7 @@ def test_a_fault_with_tries_ends_by_itself_and_the_motor_runs_again(bench, code)
     bench.drive.advance(0.3)
     assert bench.running
     assert bench.inv_st == 39
-    assert bench.drive.ack_reads == 0
+    assert bench.drive.control_unit.ack_reads == 0
     assert [entry.code for entry in bench.drive.faults.log] == [code]
 
 

@@ -18,10 +18,11 @@ from __future__ import annotations
 
 import pytest
 
-from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.identification import NEWER_FUNCTIONS
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.main import main
+from nfo_sinus_driver.simulator.modbus import TREATMENTS
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.simulator import Simulator
 
@@ -39,7 +40,7 @@ OBJECTS = (
 
 
 def ask(drive: SimulatedDrive, request: str) -> bytes:
-    return modbus.answer(drive, bytes.fromhex(request))
+    return server(drive).answer(bytes.fromhex(request))
 
 
 def objects(*numbers: int) -> bytes:
@@ -61,7 +62,7 @@ def objects(*numbers: int) -> bytes:
     ],
 )
 def test_device_identification(request_: str, head: str, numbers: tuple[int, ...]) -> None:
-    assert ask(SimulatedDrive(), request_) == bytes.fromhex(head) + objects(*numbers)
+    assert ask(simulated_drive(), request_) == bytes.fromhex(head) + objects(*numbers)
 
 
 @pytest.mark.parametrize(
@@ -79,11 +80,11 @@ def test_device_identification(request_: str, head: str, numbers: tuple[int, ...
     ],
 )
 def test_identification_refused(request_: str, refusal: str) -> None:
-    assert ask(SimulatedDrive(), request_) == bytes.fromhex(refusal)
+    assert ask(simulated_drive(), request_) == bytes.fromhex(refusal)
 
 
 def test_the_longest_answer_fits_into_a_frame() -> None:
-    frame = ModbusRtu.wrap(1, ask(SimulatedDrive(), '2B 0E 02 00'))
+    frame = ModbusRtu.wrap(1, ask(simulated_drive(), '2B 0E 02 00'))
     assert len(frame) == 10 + 7 * 2 + sum(map(len, OBJECTS)) <= 256
 
 
@@ -97,25 +98,25 @@ def test_the_longest_answer_fits_into_a_frame() -> None:
     ],
 )
 def test_model_is_power_and_voltage(power: float, voltage: int, model: bytes) -> None:
-    drive = SimulatedDrive(settings={'motor.p_nom': power, 'motor.u_nom': voltage})
-    assert drive.identification[5] == model
+    drive = simulated_drive(settings={'motor.p_nom': power, 'motor.u_nom': voltage})
+    assert server(drive).device_objects()[5] == model
 
 
 def test_revision_is_the_firmware_in_17_characters() -> None:
-    drive = SimulatedDrive(settings={'fieldbus.sw_ver': 4.3, 'fieldbus.nfo_ver': 4018})
-    assert drive.identification[2] == b' 4.30 / 4018     '
-    assert len(drive.identification[2]) == 17
+    drive = simulated_drive(settings={'fieldbus.sw_ver': 4.3, 'fieldbus.nfo_ver': 4018})
+    assert server(drive).device_objects()[2] == b' 4.30 / 4018     '
+    assert len(server(drive).device_objects()[2]) == 17
 
 
 def test_serial_number_is_all_that_is_reported() -> None:
     # 16 characters and no run indicator [C94]
-    drive = SimulatedDrive(serial_number=SERIAL)
+    drive = simulated_drive(serial_number=SERIAL)
     assert ask(drive, '11') == b'\x11\x10' + SERIAL.encode()
-    assert ask(SimulatedDrive(serial_number='7'), '11') == b'\x11\x107' + b' ' * 15
+    assert ask(simulated_drive(serial_number='7'), '11') == b'\x11\x107' + b' ' * 15
 
 
 def test_every_drive_has_its_own_serial_number() -> None:
-    numbers = {ask(SimulatedDrive(address=address), '11')[2:] for address in range(1, 248)}
+    numbers = {ask(simulated_drive(address=address), '11')[2:] for address in range(1, 248)}
     assert len(numbers) == 247
     assert {len(number) for number in numbers} == {16}
 
@@ -123,15 +124,15 @@ def test_every_drive_has_its_own_serial_number() -> None:
 @pytest.mark.parametrize('number', ['0123456789ABCDEFG', 'Ä', 'a\nb'])
 def test_no_serial_number(number: str) -> None:
     with pytest.raises(ValueError, match='serial number'):
-        SimulatedDrive(serial_number=number)
+        simulated_drive(serial_number=number)
 
 
 @pytest.mark.parametrize('request_', ['11', '2B 0E 02 00', '17 0294 0001 0294 0001 02 0003'])
 def test_functions_that_older_drives_do_not_have(request_: str) -> None:
-    refuses = SimulatedDrive(newer_functions='refused')
+    refuses = simulated_drive(newer_functions='refused')
     function = int(request_[:2], 16)
     assert ask(refuses, request_) == bytes((function | 0x80, 1))
-    silent = SimulatedDrive(newer_functions='silent')
+    silent = simulated_drive(newer_functions='silent')
     assert ask(silent, request_) == b''
     for drive in (refuses, silent):
         assert ask(drive, '03 0294 0001') == bytes.fromhex('03 02 0001')
@@ -169,11 +170,11 @@ def test_functions_that_older_drives_do_not_have(request_: str) -> None:
     ],
 )
 def test_write_and_read(request_: str, answer: str) -> None:
-    assert ask(SimulatedDrive(), request_) == bytes.fromhex(answer)
+    assert ask(simulated_drive(), request_) == bytes.fromhex(answer)
 
 
 def test_nothing_is_written_when_there_is_nothing_to_read() -> None:
-    drive = SimulatedDrive()
+    drive = simulated_drive()
     assert ask(drive, '17 0000 0001 027E 0002 04 1170 0001') == bytes.fromhex('97 02')
     assert not drive.writes
     assert ask(drive, '17 0294 0001 027E 0002 04 1170 0001')[0] == 0x17
@@ -205,7 +206,7 @@ def test_a_silent_one_says_nothing_and_is_there(open_master) -> None:
 def test_options_that_cannot_be() -> None:
     with pytest.raises(ValueError, match='2 serial numbers for 1 drives'):
         Simulator(serial_numbers=['1', '2'])
-    with pytest.raises(ValueError, match=', '.join(NEWER_FUNCTIONS)):
+    with pytest.raises(ValueError, match=', '.join(TREATMENTS)):
         Simulator(newer_functions='unknown')
 
 

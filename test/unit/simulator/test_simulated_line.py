@@ -19,10 +19,10 @@ import json
 
 import pytest
 
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
-from nfo_sinus_driver.simulator.timing import BAUD_CODES
+from nfo_sinus_driver.simulator.sinus.serial_side import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.trace import Trace
 
@@ -66,7 +66,7 @@ class Rig:
     def __init__(self, *, addresses=(1,), baud=19200, **options):
         self.now = 100.0
         settings = {'serial.si_baud': f'{baud}bps'} if baud == 19200 else {}
-        self.drives = [SimulatedDrive(address=address, settings=settings) for address in addresses]
+        self.drives = [simulated_drive(address=address, settings=settings) for address in addresses]
         self.port = FakePort(lambda: self.now)
         self.stream = io.StringIO()
         self.timing = Timing(baud)
@@ -186,7 +186,7 @@ def test_everybody_obeys_a_broadcast_and_nobody_answers():
     rig.ask(0, bytes.fromhex('06 0294 0003'))
     rig.wait(1)
     assert not rig.answers
-    assert [drive.runner.source.mode for drive in rig.drives] == [3, 3]
+    assert [drive.control_unit.mode for drive in rig.drives] == [3, 3]
 
 
 def test_a_broadcast_read_does_nothing():
@@ -194,7 +194,7 @@ def test_a_broadcast_read_does_nothing():
     rig.ask(0, bytes.fromhex('03 02A4 0001'))
     rig.wait(1)
     assert not rig.answers
-    assert rig.drives[0].ack_reads == 0
+    assert rig.drives[0].control_unit.ack_reads == 0
 
 
 def test_a_drive_set_to_another_speed_or_protocol_or_address_is_deaf():
@@ -224,14 +224,14 @@ def test_only_what_the_drive_hears_keeps_it_from_timing_out():
     for _ in range(4):
         rig.wait(0.6)
         rig.ask(1, bytes.fromhex('03 0000 0001'))  # refused, and yet heard
-    assert drive.inv_st == 37
+    assert drive.control_unit.status_code == 37
     for _ in range(2):
         rig.wait(0.6)
         rig.ask(2)
         rig.send(RTU.wrap(1, READ_MODE)[:-1] + b'\x00')
     rig.wait(0.1)
     rig.ask()
-    assert drive.inv_st == 14
+    assert drive.control_unit.status_code == 14
 
 
 # ---- faults ----
@@ -283,7 +283,7 @@ def test_no_answer_of_a_drive_overtakes_an_earlier_one(paced):
     rig.ask(1, bytes.fromhex('06 0294 0003'))
     rig.wait(0.2)
     assert not b''.join(rig.answers)
-    assert rig.drives[0].runner.source.mode == 3, 'only the answer waits'
+    assert rig.drives[0].control_unit.mode == 3, 'only the answer waits'
     rig.wait(1)
     taken = RTU.wrap(1, bytes.fromhex('06 0294 0003'))
     assert b''.join(rig.answers) == MODE_IS_STOP + taken
@@ -301,7 +301,7 @@ def test_a_dropped_answer_is_still_an_obeyed_request():
     rig.ask(1, bytes.fromhex('06 0294 0003'))
     rig.wait(1)
     assert not rig.answers
-    assert rig.drives[0].runner.source.mode == 3
+    assert rig.drives[0].control_unit.mode == 3
 
 
 def test_an_answer_may_come_twice():
@@ -344,7 +344,7 @@ def test_a_dead_line_carries_nothing_either_way():
     rig.ask(1, bytes.fromhex('06 0294 0003'))
     rig.wait(3.9)
     assert not rig.answers
-    assert rig.drives[0].runner.source.mode == 1
+    assert rig.drives[0].control_unit.mode == 1
     assert [one['note'] for one in rig.trace] == ['', 'lost', 'lost']
     rig.wait(0.2)
     rig.ask()
@@ -360,7 +360,7 @@ def test_a_silent_drive_does_not_even_obey():
     rig.ask(1, bytes.fromhex('06 0294 0003'))
     rig.ask(2)
     assert [answer[0] for answer in rig.answers] == [2]
-    assert rig.drives[0].runner.source.mode == 1
+    assert rig.drives[0].control_unit.mode == 1
     rig.wait(5.1)
     rig.ask(1)
     assert rig.answers[-1] == MODE_IS_STOP

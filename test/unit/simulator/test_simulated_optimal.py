@@ -170,7 +170,7 @@ def test_mode_auto_starts_the_motor_when_run_is_active(optimal):
     assert optimal.text == 'Ext Ret'
     optimal.wait(6)
     assert optimal.text == 'Ext Stby'
-    assert optimal.drive.mode_ext_writes == 1
+    assert optimal.drive.control_unit.mode_ext_writes == 1
 
 
 def test_mode_auto_waits_for_run():
@@ -202,7 +202,7 @@ def test_mode_manual_is_no_stop(optimal):
     assert optimal.text == 'Decel', 'towards the reference of the keypad'
     optimal.wait(10)
     assert (optimal.text, optimal.running) == ('Final Freq', True)
-    optimal.drive.press_stop()
+    optimal.drive.control_unit.press('stop')
     assert optimal.text == 'Stop'
     optimal.wait(10)
     assert not optimal.drive.motor.turning
@@ -217,11 +217,11 @@ def test_mode_manual_leaves_a_standing_motor_alone(optimal):
 
 
 def test_texts_of_manual_mode(optimal):
-    optimal.drive.press_start()
+    optimal.drive.control_unit.press('start')
     assert (optimal.text, optimal.read(MODE)) == ('Accel', MANUAL)
     optimal.wait(6)
     assert optimal.text == 'Final Freq'
-    optimal.drive.press_ext()
+    optimal.drive.control_unit.press('ext')
     assert optimal.read(MODE) == AUTO
 
 

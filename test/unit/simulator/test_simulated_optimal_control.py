@@ -38,8 +38,6 @@ from optimal_bench import SWITCHED_ON
 from optimal_bench import OptimalBench
 import pytest
 
-from nfo_sinus_driver.simulator.variant import Variant
-
 CONTROL = 0x4000
 ENABLE = CONTROL | 0x0008
 ON = ENABLE | 0x0001
@@ -207,7 +205,7 @@ def test_the_run_command_stands_through_a_fault(optimal):
 
 
 def test_a_variant_drops_the_run_command_by_a_fault():
-    optimal = OptimalBench(variant=Variant(run_command_in_fault='drops'))
+    optimal = OptimalBench(run_command_in_fault='drops')
     optimal.switch_on(5)
     optimal.drive.trip(5)
     optimal.wait(10)
@@ -226,6 +224,15 @@ def test_a_variant_drops_the_run_command_by_a_fault():
     assert not optimal.running
 
 
+def test_what_else_is_chosen_leaves_the_run_command_as_is_usual():
+    optimal = OptimalBench(refuses_in_fault='scmd')
+    optimal.switch_on(5)
+    optimal.drive.trip(5)
+    optimal.wait(10)
+    optimal.write(DRIVE_CONTROL, ON | 0x80)
+    assert optimal.running
+
+
 @pytest.mark.parametrize('mode', [MANUAL, AUTO])
 def test_who_takes_control_away_ends_the_commands(optimal, mode):
     optimal.write(DRIVE_CONTROL, CONTROL)
@@ -239,7 +246,7 @@ def test_who_takes_control_away_ends_the_commands(optimal, mode):
 
 def test_stop_on_the_keypad(optimal):
     optimal.switch_on(5)
-    optimal.drive.press_stop()
+    optimal.drive.control_unit.press('stop')
     assert optimal.bits & STOPPING
     optimal.wait(10)
     assert (optimal.text, optimal.read(MODE)) == ('Stop', MANUAL)

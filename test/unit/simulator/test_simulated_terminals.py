@@ -55,7 +55,7 @@ def test_a_stop_while_run_is_lost_is_a_stop(bench):
 
 def test_the_stop_key_releases_the_motor_and_takes_the_control_away(bench):
     bench.run(20, 5)
-    bench.drive.press_stop()
+    bench.drive.control_unit.press('stop')
     assert not bench.running
     assert bench.read('fieldbus.mode') == 1
     assert bench.inv_st == 24
@@ -67,19 +67,19 @@ def test_the_stop_key_releases_the_motor_and_takes_the_control_away(bench):
 
 
 def test_the_ext_key_starts_from_the_terminals(bench):
-    bench.drive.press_ext()
+    bench.drive.control_unit.press('ext')
     assert bench.read('fieldbus.mode') == 2
     assert bench.running
 
 
 def test_running_from_the_keypad(make_bench):
     bench = make_bench(run_input=False)
-    bench.drive.press_start()
+    bench.drive.control_unit.press('start')
     assert bench.read('fieldbus.mode') == 2
     assert bench.inv_st == 31
     bench.drive.advance(5)
     assert bench.inv_st == 30
-    bench.drive.press_stop()
+    bench.drive.control_unit.press('stop')
     assert bench.inv_st == 24
 
 
@@ -96,7 +96,7 @@ def test_a_change_at_the_keypad_is_no_write_of_the_bus(bench):
 def test_a_power_cycle(bench):
     bench.write('control.accel', 7.0)
     bench.run(20, 10)
-    hours = bench.drive.counters.op_time
+    hours = bench.drive.counters.operating_time
     bench.drive.power_cycle()
     assert not bench.drive.listening
     assert bench.state == 'NOT_READY_TO_SWITCH_ON'
@@ -110,7 +110,7 @@ def test_a_power_cycle(bench):
     assert bench.inv_st == 24
     assert bench.read('status.frq_set') == 20
     assert bench.read('control.accel') == 7.0
-    assert bench.drive.counters.op_time >= hours
+    assert bench.drive.counters.operating_time >= hours
     bench.mode(3)
     bench.drive.advance(10)
     assert not bench.running

@@ -19,8 +19,7 @@ import pytest
 
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.tuning import PROCEDURES
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
 
 
 def settings(bench):
@@ -55,7 +54,7 @@ def test_each_takes_its_time_and_changes_its_parameters(bench, code, shown):
 @pytest.mark.parametrize('code', [16, 17])
 def test_a_failure_is_a_fault_and_changes_nothing(bench, code):
     before = settings(bench)
-    bench.drive.runner.fail_tuning(code)
+    bench.drive.control_unit.fail_tuning(code)
     begin(bench)
     bench.drive.advance(10)
     assert bench.inv_st == code
@@ -70,7 +69,7 @@ def test_a_failure_is_a_fault_and_changes_nothing(bench, code):
 
 def test_it_fails_with_no_other_code(bench):
     with pytest.raises(ValueError, match=r'16, 17'):
-        bench.drive.runner.fail_tuning(5)
+        bench.drive.control_unit.fail_tuning(5)
 
 
 def test_nothing_but_a_stop_is_taken_meanwhile(bench):
@@ -89,7 +88,7 @@ def test_nothing_but_a_stop_is_taken_meanwhile(bench):
 
 
 def test_a_drive_that_refuses_a_stop_until_it_is_over(make_bench):
-    bench = make_bench(variant=Variant(stop_in_tuning='refused'))
+    bench = make_bench(stop_in_tuning='refused')
     begin(bench)
     with bench.refuses(Reason.STATE):
         bench.scmd(Scmd.STOP)
@@ -117,7 +116,7 @@ def test_what_else_ends_it(bench, what):
     drive = bench.drive
     {
         'run': lambda: drive.set_run_input(False),
-        'keypad': drive.press_stop,
+        'keypad': lambda: drive.control_unit.press('stop'),
         'fault': lambda: drive.trip(5),
         'power': drive.power_cycle,
     }[what]()

@@ -22,9 +22,9 @@ from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.families.sinus_g2.words import state_of
-from nfo_sinus_driver.simulator.state_machine import Conditions
-from nfo_sinus_driver.simulator.state_machine import Phase
-from nfo_sinus_driver.simulator.state_machine import StateMachine
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
 
 POWER = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
 ON = POWER | Control.SWITCH_ON

@@ -21,26 +21,23 @@ from dataclasses import dataclass
 from dataclasses import field
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.timing import FORMAT_CODES
-from nfo_sinus_driver.simulator.timing import OLD_FORMAT_CODES
+from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 
 SW_VER = 'fieldbus.sw_ver'
+#: Its codes of SiProt [C5].
+_OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
 
 
 @dataclass(frozen=True)
 class Firmware:
     """
-    One firmware's way.
+    One firmware's way; by default that of the newer one.
 
     :ivar manual: the manual that describes it.
     :ivar sw_ver: the SWVer of a drive that has it.
     :ivar log_size: entries that the error log holds [C4].
-    :ivar formats: character formats by their names, and their codes of SiProt [C5].
-    :ivar most_baud: the highest baud rate [C6].
-    :ivar at_once: settings of the serial interface count as soon as they are written [C7].
+    :ivar classic_line: how it takes its line on Classic ([C5], [C6], [C7]).
     :ivar naks_damage: a message with a wrong check sum is answered by NAK; else not at all [C8].
     :ivar obeys_stop: MODE = Stop is obeyed by the one addressed in spite of a serial fault; else
         only when it goes to all [C9].
@@ -58,49 +55,32 @@ class Firmware:
 
     manual: str
     sw_ver: float
-    log_size: int
-    formats: Mapping[str, int]
-    most_baud: int
-    at_once: bool
-    naks_damage: bool
-    obeys_stop: bool
-    most_address: int
-    sets_references: bool
-    short_counters: bool
-    even_stops: bool
-    own_address: bool
-    lower_case: bool
-    bus_only: bool
-    own_bus_codes: bool
+    log_size: int = 32
+    classic_line: LineRules = field(default_factory=LineRules)
+    naks_damage: bool = False
+    obeys_stop: bool = True
+    most_address: int = 94
+    sets_references: bool = True
+    short_counters: bool = False
+    even_stops: bool = False
+    own_address: bool = False
+    lower_case: bool = False
+    bus_only: bool = False
+    own_bus_codes: bool = False
     lacks: frozenset[str] = frozenset()
     codes: Mapping[str, frozenset[int]] = field(default_factory=dict)
 
+    def line_rules(self, protocol: str) -> LineRules:
+        """Return how it takes its line by a protocol; older firmware knows nothing but Classic."""
+        return self.classic_line if protocol == 'classic' else LineRules()
 
-NEW = Firmware(
-    manual='2.03',
-    sw_ver=4.38,
-    log_size=32,
-    formats=FORMAT_CODES,
-    most_baud=57600,
-    at_once=False,
-    naks_damage=False,
-    obeys_stop=True,
-    most_address=94,
-    sets_references=True,
-    short_counters=False,
-    even_stops=False,
-    own_address=False,
-    lower_case=False,
-    bus_only=False,
-    own_bus_codes=False,
-)
+
+NEW = Firmware(manual='2.03', sw_ver=4.38)
 OLD = Firmware(
     manual='5.0',
     sw_ver=4.21,
     log_size=128,
-    formats=OLD_FORMAT_CODES,
-    most_baud=9600,
-    at_once=True,
+    classic_line=LineRules(_OLD_FORMAT_CODES, most_baud=9600, at_once=True),
     naks_damage=True,
     obeys_stop=False,
     most_address=95,
@@ -128,7 +108,7 @@ OLD = Firmware(
     ),
     codes={
         'serial.si_baud': frozenset({16, 32, 64, 128}),
-        'serial.si_prot': frozenset(OLD_FORMAT_CODES.values()),
+        'serial.si_prot': frozenset(_OLD_FORMAT_CODES.values()),
         'pi_reg.unit': frozenset(range(12)),
     },
 )
@@ -138,34 +118,20 @@ DIALECTS: Mapping[str, Firmware] = {firmware.manual: firmware for firmware in (N
 _FIRST_NEW = Fraction('4.28')
 
 
-def version(memory: Memory) -> Fraction | None:
-    """Return SWVer; ``None`` of a drive that does not tell it."""
-    if SW_VER not in memory.model:
-        return None
-    return Fraction(memory.raw(SW_VER), 100)
-
-
-def firmware_of(memory: Memory) -> Firmware:
-    """Return which of the two a drive has, by its SWVer."""
-    number = version(memory)
-    return OLD if number is not None and number < _FIRST_NEW else NEW
-
-
-def with_firmware(
-    model: Family, settings: Mapping[str, Value], dialect: str | None
-) -> dict[str, Value]:
+def firmware_of(memory: Memory, dialect: str | None = None) -> Firmware:
     """
-    Return settings with the firmware that a manual describes.
+    Return which of the two a drive has, by its SWVer, or by the manual that describes it.
 
-    :raises ValueError: there is no such manual, or the settings name another firmware.
+    :raises ValueError: there is no such manual, or SWVer was given and is of the other firmware.
     """
-    if dialect is None:
-        return dict(settings)
-    if dialect not in DIALECTS:
-        raise ValueError(f'unknown dialect {dialect!r}: choose one of {", ".join(DIALECTS)}')
-    if SW_VER not in model:
-        raise ValueError(f'{model.name} has no dialects')
-    known = {SW_VER: DIALECTS[dialect].sw_ver, **settings}
-    if firmware_of(Memory(model, known)) is not DIALECTS[dialect]:
-        raise ValueError(f'dialect {dialect} is not that of firmware {known[SW_VER]}')
-    return known
+    if dialect is not None:
+        if dialect not in DIALECTS:
+            raise ValueError(f'unknown dialect {dialect!r}: choose one of {", ".join(DIALECTS)}')
+        if SW_VER not in memory.given:
+            memory.set(SW_VER, DIALECTS[dialect].sw_ver)
+    version = memory.version
+    assert version is not None
+    firmware = OLD if version < _FIRST_NEW else NEW
+    if dialect not in (None, firmware.manual):
+        raise ValueError(f'dialect {dialect} is not that of firmware {float(version)}')
+    return firmware

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ways in to simulated drives: which protocol is served where, how fast, in what format."""
+"""
+The ends of simulated lines: which protocol is served where, how fast, in what format.
+
+A protocol is a file, and a row of :data:`PROTOCOLS`.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +26,6 @@ from dataclasses import dataclass
 
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
-from nfo_sinus_driver.simulator.firmware import NEW
-from nfo_sinus_driver.simulator.firmware import Firmware
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
@@ -31,7 +33,6 @@ from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PtyPort
 from nfo_sinus_driver.simulator.ports import TcpPort
 from nfo_sinus_driver.simulator.protocol import Protocol
-from nfo_sinus_driver.simulator.timing import FORMAT_CODES
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long a gateway waits for a drive by default (s).
@@ -39,34 +40,35 @@ GATEWAY_TIMEOUT = 0.1
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _Row:
     """
     A protocol and its defaults ([M0 §6.1.2, §6.2.2]).
 
     :ivar make: makes it; it gets the time that a gateway waits.
+    :ivar tables: its name in the tables of the families, by which a drive has a server for it.
     :ivar data_bits: those it can do with.
     """
 
     make: Callable[[float], Protocol]
+    tables: str
     baud: int
     char_format: str
     data_bits: str
     addresses: range = range(1, 248)
 
 
-_KINDS: Mapping[str, _Kind] = {
-    ModbusRtu.name: _Kind(lambda _: ModbusRtu(), 19200, '8E1', '8'),
-    ModbusAscii.name: _Kind(lambda _: ModbusAscii(), 19200, '7E1', '7'),
-    ModbusTcp.name: _Kind(ModbusTcp, 19200, '8E1', '8'),
-    Classic.name: _Kind(lambda _: Classic(), 9600, '7E1', '78', range(1, BROADCAST)),
+PROTOCOLS: Mapping[str, _Row] = {
+    ModbusRtu.name: _Row(lambda _: ModbusRtu(), 'modbus', 19200, '8E1', '8'),
+    ModbusAscii.name: _Row(lambda _: ModbusAscii(), 'modbus', 19200, '7E1', '7'),
+    ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
+    Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
 }
-PROTOCOLS = tuple(_KINDS)
 
 
 @dataclass(frozen=True)
-class Door:
+class Endpoint:
     """
-    One way in.
+    One end of a line.
 
     :ivar protocol: the name of its protocol.
     :ivar timing: speed and format; of :class:`ModbusTcp` those of the line behind the gateway.
@@ -80,18 +82,18 @@ class Door:
     tcp: int | None = None
 
     @property
-    def bus_type(self) -> int:
-        """BusType of a drive that is meant to be reached this way."""
-        return self.make(0.0).bus_type
+    def tables(self) -> str:
+        """The name of its protocol in the tables of the families."""
+        return PROTOCOLS[self.protocol].tables
 
-    def format_code(self, firmware: Firmware) -> int:
-        """Return the code of SiProt for its format."""
-        formats = firmware.formats if self.protocol == Classic.name else FORMAT_CODES
-        return formats[self.timing.char_format]
+    @property
+    def spoken(self) -> str:
+        """The protocol that the drives themselves speak."""
+        return self.make(0.0).spoken
 
     def make(self, gateway_timeout: float) -> Protocol:
         """Return the protocol; a gateway waits so long for a drive (s)."""
-        return _KINDS[self.protocol].make(gateway_timeout)
+        return PROTOCOLS[self.protocol].make(gateway_timeout)
 
     def open(self) -> Port:
         """
@@ -101,57 +103,49 @@ class Door:
         """
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
 
-    def check(self, model: str, address: int) -> None:
+    def check(self, address: int) -> None:
         """
-        Look whether a drive can be reached this way.
+        Look whether an address is one of the protocol.
 
-        :raises ValueError: its model does not speak the protocol, or its address is none of it.
+        :raises ValueError: it is not.
         """
-        if self.protocol == Classic.name and model != 'sinus_g2':
-            raise ValueError(f'{model} does not speak {self.protocol}')
-        possible = _KINDS[self.protocol].addresses
+        possible = PROTOCOLS[self.protocol].addresses
         if address not in possible:
             span = f'{possible.start} to {possible.stop - 1}'
             raise ValueError(f'address {address} is not possible: {span} over {self.protocol}')
 
 
-def door(
+def endpoint(
     protocol: str,
     *,
     link: str | None = None,
     tcp: int | None = None,
     baud: int | None = None,
     char_format: str | None = None,
-    firmware: Firmware = NEW,
-) -> Door:
+) -> Endpoint:
     """
-    Return a way in; what is not given is the protocol's default.
+    Return an end of a line; what is not given is the protocol's default.
 
     :raises ValueError: an unknown protocol, or one that does not go with the rest.
     """
-    if protocol not in _KINDS:
-        raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(_KINDS)}')
+    if protocol not in PROTOCOLS:
+        raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
         raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
     if protocol == ModbusTcp.name:
         if link is not None:
             raise ValueError(f'{protocol} needs a TCP port, not a link')
         tcp = tcp or 0
-    kind = _KINDS[protocol]
-    timing = Timing(kind.baud if baud is None else baud, char_format or kind.char_format)
-    if timing.char_format[0] not in kind.data_bits:
-        raise ValueError(f'{protocol} has {kind.data_bits} data bits, {timing.char_format} has not')
-    formats = firmware.formats if protocol == Classic.name else FORMAT_CODES
-    if timing.char_format not in formats:
-        raise ValueError(f'{timing.char_format}: this drive has {", ".join(formats)} on {protocol}')
-    if protocol == Classic.name and timing.baud > firmware.most_baud:
-        raise ValueError(f'{timing.baud} baud: this drive has {firmware.most_baud} at most')
-    return Door(protocol, timing, link, tcp)
+    row = PROTOCOLS[protocol]
+    timing = Timing(row.baud if baud is None else baud, char_format or row.char_format)
+    if timing.char_format[0] not in row.data_bits:
+        raise ValueError(f'{protocol} has {row.data_bits} data bits, {timing.char_format} has not')
+    return Endpoint(protocol, timing, link, tcp)
 
 
-def parse_door(text: str, firmware: Firmware = NEW) -> Door:
+def parse_endpoint(text: str) -> Endpoint:
     """
-    Return the way in that was typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``.
+    Return the end that was typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``.
 
     :raises ValueError: it is none.
     """
@@ -159,5 +153,5 @@ def parse_door(text: str, firmware: Firmware = NEW) -> Door:
     if place.isascii() and place.isdigit():
         if int(place) > 65535:
             raise ValueError(f'TCP port {place} is not possible: 0 (any free one) to 65535')
-        return door(protocol, tcp=int(place), firmware=firmware)
-    return door(protocol, link=place or None, firmware=firmware)
+        return endpoint(protocol, tcp=int(place))
+    return endpoint(protocol, link=place or None)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the manuals leave open of a drive, so that a simulated one can do it this way or that."""
+"""What the manuals leave open of a Sinus, so that a simulated one can do it this way or that."""
 
 from __future__ import annotations
 

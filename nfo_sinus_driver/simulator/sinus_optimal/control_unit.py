@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 How a Sinus Optimal is commanded and what it shows of it [M1].
 
@@ -21,13 +20,14 @@ does not expect it:
 
 * MODE = Manual is no stop: a running motor goes on, now as the keypad's.
 * Both control methods at once, which [M1] forbids: what one has started the other does not stop.
-* A run command is taken while a fault stands, and holds when it is acknowledged; a variant can
+* A run command is taken while a fault is active, and holds when it is acknowledged; a variant can
   drop it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 from typing import ClassVar
 
 from nfo_sinus_driver.families.sinus_optimal.words import Control
@@ -35,19 +35,19 @@ from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.families.sinus_optimal.words import Status
 from nfo_sinus_driver.families.sinus_optimal.words import state_of
-from nfo_sinus_driver.simulator.control_source import TERMINAL_SHARE
-from nfo_sinus_driver.simulator.control_source import Source
-from nfo_sinus_driver.simulator.control_steps import ControlSteps
-from nfo_sinus_driver.simulator.faults import Faults
-from nfo_sinus_driver.simulator.measured import Counters
+from nfo_sinus_driver.simulator.measured import nearest
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.motor import Motor
+from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.runner import Runner
-from nfo_sinus_driver.simulator.variant import KEEPS
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
+from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.sinus.faults import SinusFaults
+from nfo_sinus_driver.simulator.sinus.variant import KEEPS
+from nfo_sinus_driver.simulator.sinus.variant import Variant
+from nfo_sinus_driver.simulator.sinus_optimal.control_steps import ControlSteps
 
 #: Codes of the setting control.mode.
 _FREQUENCY, _SPEED = 0, 3
@@ -55,21 +55,26 @@ _FREQUENCY, _SPEED = 0, 3
 _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
 
-class OptimalRunner(Runner):
-    """Runs the motor of an Optimal."""
+class OptimalControlUnit(SinusControlUnit):
+    """
+    Runs the motor of an Optimal.
+
+    :param options: those of every Sinus.
+    """
 
     setpoint_of: ClassVar[Mapping[int, str]] = {
         _FREQUENCY: 'fieldbus.input_freq_setpoint',
         _SPEED: 'fieldbus.input_speed_setpoint',
     }
+    setpoints = frozenset(setpoint_of.values())
     delayed = 54
     # [M1] knows no refusal in a fault, and no table that ends a run command
     usual = Variant(run_command_in_fault=KEEPS)
     run_command = 'fieldbus.smode'
+    run_codes = frozenset(Smode)
 
-    def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
-        super().__init__(memory, motor, faults, counters)
-        self.scmd = Smode.STOP
+    def __init__(self, memory: Memory, address: int, **options: Any) -> None:
+        super().__init__(memory, address, SinusFaults(memory.model), **options)
         self._steps = ControlSteps()
         self._running = False
         self._sleeping = False
@@ -77,7 +82,7 @@ class OptimalRunner(Runner):
     @property
     def mode(self) -> int:
         """What MODE reads [M1]: whatever is neither bus nor terminals is Manual."""
-        if self._bus:
+        if self.on_bus:
             return Mode.BUS
         return Mode.AUTO if self.source is Source.EXT else Mode.MANUAL
 
@@ -94,95 +99,75 @@ class OptimalRunner(Runner):
 
     def take(self, source: Source) -> None:
         """Hand control over; a run command that stood is forgotten."""
-        self.source = source
-        self.scmd = Smode.STOP
-        self._delay_left = None
-        if not self._bus:
+        super().take(source)
+        if not self.on_bus:
             self._steps.give_up()
 
-    def write(self, key: str, raw: int) -> bool:
-        """Carry out MODE, SMODE or Drive Control."""
-        if key == 'fieldbus.mode':
-            self._write_mode(raw)
-        elif key == 'fieldbus.smode':
-            self._write_smode(raw)
-        elif key == 'fieldbus.drive_control':
-            self._write_control(Control(raw))
-        else:
-            return False
-        return True
-
     def show(self, key: str) -> int | None:
-        """Return the raw number of MODE, Drive Control or Drive Status."""
-        if key == 'fieldbus.mode':
-            return self.mode
-        if key == 'fieldbus.drive_control':
-            return int(self.control_word)
-        if key == 'fieldbus.drive_status':
-            return int(self.status_word)
-        return None
+        """Return the raw number of what is neither stored nor measured."""
+        # the reference that is followed, nothing while the motor is off
+        motor = self.motor
+        demand = motor.demand if motor.driven else 0.0
+        if key == 'status.control_freq':
+            return self._nearest(key, demand)
+        if key == 'status.control_speed':
+            return self._nearest(key, 60 * demand / motor.plate.pole_pairs)
+        return super().show(key)
+
+    def _nearest(self, key: str, value: float) -> int:
+        parameter = self.memory.model[key]
+        return nearest(parameter, value, home(parameter))
 
     def _write_mode(self, raw: int) -> None:
         if raw not in set(Mode):
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
-        self.refuse_when_faulted('fieldbus.mode')
+        self.admit('fieldbus.mode')
         if raw == Mode.MANUAL:
             self.take(Source.KEYPAD if self._running else Source.STOP)
         else:
             self.take(Source.EXT if raw == Mode.AUTO else Source.SCMD)
 
-    def _write_smode(self, raw: int) -> None:
-        if raw not in set(Smode):
-            raise Refused(Reason.VALUE, f'SMODE has no code {raw:#x}')
-        self.refuse_when_faulted('fieldbus.smode')
-        if not self._bus:
-            raise Refused(Reason.STATE, 'SMODE needs MODE = Bus')
+    def _command(self, raw: int) -> None:
         self.scmd = Smode(raw)
 
-    def _write_control(self, word: Control) -> None:
+    def _write_control(self, raw: int) -> None:
+        word = Control(raw)
         shown = self.status_word
-        faulted = bool(self._faults)
+        faulted = bool(self.faults)
         if word & ~self.control_word & Control.FAULT_ACK:
-            self._faults.acknowledge()
+            self.faults.acknowledge()
         self._steps.write(word, shown)
-        if faulted and not self._faults:
+        if faulted and not self.faults:
             self.acknowledged()
         if self.source is Source.CONTROL_WORD and not self._steps.has_control:
             self.take(Source.STOP)
 
     def _drop_run_command(self) -> None:
-        self.scmd = Smode.STOP
+        super()._drop_run_command()
         self._steps.drop_run()
-        if self.source is Source.KEYPAD:
-            self.take(Source.STOP)
 
     def wait(self, dt: float) -> None:
         """Let the start delay run, and the drive respond to Drive Control."""
         super().wait(dt)
         self._steps.wait(dt)
-        if self._steps.has_control and not self._bus:
+        if self._steps.has_control and not self.on_bus:
             self.take(Source.CONTROL_WORD)
 
     @property
-    def waiting(self) -> bool:
-        """Whether a start delay runs or a control word has not had its effect yet."""
-        return self._steps.waiting or super().waiting
-
-    @property
     def settled(self) -> bool:
-        """Whether it stays as it is as long as nothing new comes."""
-        return not self.stopping
+        """Whether all stays as it is: no stop goes on, and the control word has had its effect."""
+        return super().settled and not self.stopping and not self._steps.waiting
 
     def settle(self) -> None:
         """Carry out what stands: run, brake to a stop, sleep, or let the motor go."""
         self._keep_delay()
-        motor = self._motor
-        working = self.initialised and not self._faults
-        self._running = working and self._wanted() and self._delay_left == 0
+        motor = self.motor
+        working = self.initialised and not self.faults
+        self._running = working and self._wanted and self._delay_left == 0
         reference = self.reference()
         self._sleeping = self._running and self._sleeps(reference)
         self._ramps()
-        by_speed = self._memory.raw('control.mode') == _SPEED
+        by_speed = self.memory.raw('control.mode') == _SPEED
         motor.regulation = Regulation.SPEED if by_speed else Regulation.FREQUENCY
         if self._running and not self._sleeping:
             motor.energise()
@@ -197,29 +182,29 @@ class OptimalRunner(Runner):
     @property
     def stopping(self) -> bool:
         """Whether the motor goes down the ramp to a stop."""
-        return self._motor.driven and not self._running
+        return self.motor.driven and not self._running
 
     @property
     def inv_st(self) -> int:
-        """The inverter status while no fault stands [M1]."""
+        """The inverter status while no fault is active [M1]."""
         return 29 if self._sleeping else super().inv_st
 
     @property
     def status_word(self) -> Status:
         """Drive Status [M1]."""
-        motor = self._motor
-        ready = self.initialised and not self._faults
-        alarm = motor.limited or bool(self._faults.alarms)
+        motor = self.motor
+        ready = self.initialised and not self.faults
+        alarm = motor.limited or bool(self.faults.alarms)
         bits = {
             Status.READY: ready,
             Status.SWITCHED_ON: motor.driven,
             Status.ENABLED: ready and self._steps.enabled and not self.stopping,
-            Status.FAULT_ACTIVE: bool(self._faults),
+            Status.FAULT_ACTIVE: bool(self.faults),
             Status.ECHO_1: bool(self.control_word & Control.ECHO_1),
             Status.ECHO_2: bool(self.control_word & Control.ECHO_2),
             Status.DISABLED: not self.run_input,
             Status.ALARM_ACTIVE: alarm,
-            Status.CONTROL_FROM_BUS: self._bus,
+            Status.CONTROL_FROM_BUS: self.on_bus,
             Status.SETPOINT_REACHED: self._running and motor.reached,
             Status.LIMIT_ACTIVE: motor.limited,
             Status.SLEEP_ACTIVE: self._sleeping,
@@ -236,34 +221,22 @@ class OptimalRunner(Runner):
 
     def reference(self) -> float:
         """The reference that is followed in a run, signed (Hz)."""
-        plate = self._motor.plate
-        if self.scmd is not Smode.FIELDBUS:
+        plate = self.motor.plate
+        if self.scmd != Smode.FIELDBUS:
             return plate.frequency * TERMINAL_SHARE
-        setpoint = self._memory.number(self.setpoint_key)
-        if self._memory.raw('control.mode') == _FREQUENCY:
+        setpoint = self.memory.number(self.setpoint_key)
+        if self.memory.raw('control.mode') == _FREQUENCY:
             most, scale = _MOST_FREQUENCY, 1.0
         else:
             most, scale = _MOST_SPEEDS * plate.speed, plate.pole_pairs / 60
         return scale * min(max(setpoint, -most), most)
 
-    def _wanted(self) -> bool:
-        if self.source is Source.KEYPAD:
-            return True
-        if not self.run_input:
-            return False
-        bus = self.scmd is not Smode.STOP or self._steps.run
-        return bus if self._bus else self.source is Source.EXT
+    def _commanded(self) -> bool:
+        bus = self.scmd != Smode.STOP or self._steps.run
+        return bus if self.on_bus else self.source is Source.EXT
 
     def _sleeps(self, reference: float) -> bool:
         """Whether so small a reference suspends the output, once the ramp has come down to it."""
-        least = self._memory.number('control.f_sleep')
-        slow = not self._motor.driven or abs(self._motor.ramp) < least
+        least = self.memory.number('control.f_sleep')
+        slow = not self.motor.driven or abs(self.motor.ramp) < least
         return slow and abs(reference) < least
-
-    @property
-    def _brakes(self) -> bool:
-        return bool(self._memory.raw('control.st_mode'))
-
-    @property
-    def _bus(self) -> bool:
-        return self.source in (Source.SCMD, Source.CONTROL_WORD)

@@ -21,37 +21,65 @@ Commands become control words, and the state of the generic state machine orders
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
-from nfo_sinus_driver.simulator.control_source import RELEASED
-from nfo_sinus_driver.simulator.control_source import RUN_COMMANDS
-from nfo_sinus_driver.simulator.control_source import RUNNING
-from nfo_sinus_driver.simulator.control_source import STANDBY
-from nfo_sinus_driver.simulator.control_source import TERMINAL_SHARE
-from nfo_sinus_driver.simulator.control_source import Source
-from nfo_sinus_driver.simulator.control_source import local_share
-from nfo_sinus_driver.simulator.faults import Faults
-from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.runner import Runner
-from nfo_sinus_driver.simulator.runner import nameplate
-from nfo_sinus_driver.simulator.state_machine import Conditions
-from nfo_sinus_driver.simulator.state_machine import Phase
-from nfo_sinus_driver.simulator.state_machine import StateMachine
-from nfo_sinus_driver.simulator.tuning import FAILURES
-from nfo_sinus_driver.simulator.tuning import PROCEDURES
-from nfo_sinus_driver.simulator.tuning import Tuning
-from nfo_sinus_driver.simulator.variant import REFUSED
-from nfo_sinus_driver.simulator.variant import Variant
+from nfo_sinus_driver.simulator.sinus import control_unit
+from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
+from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.sinus.faults import SinusFaults
+from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
+from nfo_sinus_driver.simulator.sinus.variant import REFUSED
+from nfo_sinus_driver.simulator.sinus.variant import Variant
+from nfo_sinus_driver.simulator.sinus_g2.commands import RELEASED
+from nfo_sinus_driver.simulator.sinus_g2.commands import RUN_COMMANDS
+from nfo_sinus_driver.simulator.sinus_g2.commands import RUNNING
+from nfo_sinus_driver.simulator.sinus_g2.commands import STANDBY
+from nfo_sinus_driver.simulator.sinus_g2.commands import local_share
+from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
+from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
+from nfo_sinus_driver.simulator.sinus_g2.tuning import FAILURES
+from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
+from nfo_sinus_driver.simulator.sinus_g2.tuning import Tuning
 
+#: What leaves the factory beside what all have.
+FACTORY: Mapping[str, Value] = {
+    **control_unit.FACTORY,
+    'motor.cos_phi': 0.82,
+    'motor.r_rot': 3.4,
+    'motor.l_main': 0.36,
+    'motor.sigma': 0.08,
+    'control.ain_set': '0-10V',
+    'control.kp_spd': 2.0,
+    'control.ti_spd': 0.2,
+    'pi_reg.reg_amp': 1,
+    'freque.op_mode': 'Terminal',
+    'freque.f_fix1': 10,
+    'freque.f_fix2': 15,
+    'freque.f_fix3': 20,
+    'freque.f_fix4': 25,
+    'freque.f_fix5': 30,
+    'freque.f_fix6': 40,
+    'freque.f_fix7': 50,
+    'freque.fr_max': 50,
+    'fieldbus.sw_ver': 4.38,
+    'fieldbus.nfo_ver': 4018,
+    'fieldbus.spd_scl_numerator': 1,
+    'fieldbus.spd_scl_denominator': 1,
+}
 #: The regulated quantity of each control mode; PI-Reg regulates the process by the frequency.
 _REGULATION_OF = {
     0: Regulation.FREQUENCY,
@@ -69,8 +97,18 @@ _SOURCES: Mapping[int, Source] = {
     Mode.EXT: Source.EXT,
     Mode.BUS: Source.SCMD,
 }
-
-
+#: What hands control to the bus.
+_COMMANDS = frozenset({'fieldbus.mode', 'fieldbus.drive_control'})
+#: The states that the state machine leaves by itself.
+_PASSING = frozenset(
+    {
+        Phase.NOT_READY_TO_SWITCH_ON,
+        Phase.DISABLE,
+        Phase.SHUTDOWN,
+        Phase.QUICK_STOP,
+        Phase.FAULT_REACTION_ACTIVE,
+    }
+)
 #: The inverter status while it tunes [M0 table 19].
 _TUNING = 28
 #: What DriveStatus adds while it tunes: the motor has current, and nobody says what that shows as.
@@ -84,10 +122,16 @@ _TUNING_STATUS = (
 )
 
 
-class G2Runner(Runner):
+class G2ControlUnit(SinusControlUnit):
     """
     Runs the motor of a G2, and tunes it.
 
+    :param dialect: the manual that describes its firmware; by default as SWVer says.
+    :param options: those of every Sinus.
+    :raises ValueError: there is no such manual, or SWVer was given and is of another firmware.
+
+    :ivar firmware: what its firmware does its own way.
+    :ivar self_restart: ends faults by itself.
     :ivar tuning: the procedure that is going on.
     """
 
@@ -98,20 +142,30 @@ class G2Runner(Runner):
         2: 'status.trq_set',
         3: 'status.spd_set',
     }
+    setpoints = frozenset(setpoint_of.values())
     delayed = 25
     usual = Variant()
     run_command = 'fieldbus.scmd'
+    run_codes = frozenset(Scmd)
 
-    def __init__(self, memory: Memory, motor: Motor, faults: Faults, counters: Counters) -> None:
-        super().__init__(memory, motor, faults, counters)
+    def __init__(
+        self, memory: Memory, address: int, *, dialect: str | None = None, **options: Any
+    ) -> None:
+        self.firmware = firmware_of(memory, dialect)
+        faults = SinusFaults(memory.model, log_size=self.firmware.log_size)
+        super().__init__(memory, address, faults, **options)
+        self.self_restart = SelfRestart(memory, faults)
         self.machine = StateMachine()
-        self.scmd = Scmd.STOP
         self.word = RELEASED
         self._dc_brake_left = 0.0
         self.tuning: Tuning | None = None
         #: What InvSt says of the tuning that was finished, until the next command.
         self._tuned = 0
         self._next_failure = 0
+
+    def line_rules(self, protocol: str) -> LineRules:
+        """Return how it takes its line by a protocol."""
+        return self.firmware.line_rules(protocol)
 
     def restart(self) -> None:
         """Begin as after power-on."""
@@ -120,12 +174,15 @@ class G2Runner(Runner):
 
     def take(self, source: Source) -> None:
         """Hand control over; a run command that stood is forgotten."""
-        self.source = source
-        self.scmd = Scmd.STOP
+        super().take(source)
         self.word = RELEASED
-        self._delay_left = None
         self.tuning = None
         self._tuned = 0
+
+    def trip(self, code: int, *, cause_present: bool = False) -> None:
+        """Let a fault happen, and count the tries to end it."""
+        super().trip(code, cause_present=cause_present)
+        self.self_restart.tripped(code)
 
     def fail_tuning(self, code: int) -> None:
         """
@@ -137,30 +194,30 @@ class G2Runner(Runner):
             raise ValueError(f'a tuning fails with {sorted(FAILURES)}, not with {code}')
         self._next_failure = code
 
+    def key_of(self, key: str) -> str:
+        """Return the set-point of the control mode for the common one."""
+        return self.setpoint_key if key == 'fieldbus.setpoint' else key
+
     def write(self, key: str, raw: int) -> bool:
         """Carry out MODE, SCMD, DriveControl or its mask."""
-        if key == 'fieldbus.mode':
-            self._write_mode(raw)
-        elif key == 'fieldbus.scmd':
-            self._write_scmd(raw)
-        elif key == 'fieldbus.drive_control':
-            self._write_control(Control(raw))
-        elif key == 'fieldbus.drv_ctrl_write_mask':
+        if key == 'fieldbus.drv_ctrl_write_mask':
             keep, add = Control(raw & 0xFFFF), Control(raw >> 16)
             self._write_control(self.word & keep | add)
-        else:
-            return False
-        return True
+            return True
+        return super().write(key, raw)
+
+    def written(self, key: str, protocol: str) -> None:
+        """Take note of a fieldbus: to the older firmware all but Classic is one [C3]."""
+        if key in _COMMANDS:
+            self.by_fieldbus = protocol != 'classic' and self.firmware.own_bus_codes
 
     def show(self, key: str) -> int | None:
-        """Return the raw number of MODE, DriveControl or a status word."""
-        if key == 'fieldbus.mode':
-            return self.mode
-        if key == 'fieldbus.drive_control':
-            return int(self.word)
-        if key in ('fieldbus.drive_status', 'fieldbus.profidrive_status'):
+        """Return the raw number of what is neither stored nor measured."""
+        if key == 'fieldbus.setpoint':
+            return self.memory.raw(self.setpoint_key)
+        if key == 'fieldbus.profidrive_status':
             return int(self.status_word)
-        return None
+        return super().show(key)
 
     def command(self, scmd: Scmd) -> None:
         """Take a run command or Stop from SCMD."""
@@ -181,42 +238,32 @@ class G2Runner(Runner):
         if source is None:
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
         self._refuse_when_tuning()
-        if raw == Mode.STOP and self._faults.serial:
-            self._faults.acknowledge_serial()
+        if raw == Mode.STOP and self.faults.serial:
+            self.faults.acknowledge_serial()
         else:
-            self.refuse_when_faulted('fieldbus.mode')
+            self.admit('fieldbus.mode')
         self.take(source)
 
-    def _write_scmd(self, raw: int) -> None:
-        if raw not in set(Scmd):
-            raise Refused(Reason.VALUE, f'SCMD has no code {raw:#x}')
-        self.refuse_when_faulted('fieldbus.scmd')
-        if self.source.mode is not Mode.BUS:
-            raise Refused(Reason.STATE, 'SCMD needs MODE = Bus')
+    def _command(self, raw: int) -> None:
         if raw != Scmd.STOP or self.variant.stop_in_tuning == REFUSED:
             self._refuse_when_tuning()
         self.tuning, self._tuned = None, 0
         if raw in PROCEDURES:
             self._tune(raw)
         elif raw == Scmd.ERASE_E_LOG:
-            self._faults.log.clear()
+            self.faults.log.clear()
         elif raw == Scmd.RESET_E_OUT:
-            self._counters.e_out = 0.0
+            self.counters.energy = 0.0
         elif raw in RUN_COMMANDS or raw == Scmd.STOP:
             self.command(Scmd(raw))
 
     def _tune(self, raw: int) -> None:
-        if self._motor.driven or self._motor.turning:
+        if self.motor.driven or self.motor.turning:
             raise Refused(Reason.STATE, 'tuning needs a motor that stands')
         self.command(Scmd.STOP)
         # as a run command without RUN or in a fault, it leads to nothing
-        if not self._faults and (self.run_input or not PROCEDURES[raw].measures):
+        if not self.faults and (self.run_input or not PROCEDURES[raw].measures):
             self.tuning = Tuning.begun(raw)
-
-    def _drop_run_command(self) -> None:
-        self.scmd = Scmd.STOP
-        if self.source is Source.KEYPAD:
-            self.take(Source.STOP)
 
     def _refuse_when_tuning(self) -> None:
         if self.tuning is not None:
@@ -226,7 +273,7 @@ class G2Runner(Runner):
         tuning = self.tuning
         if tuning is None:
             return
-        if self._faults or (tuning.procedure.measures and not self.run_input):
+        if self.faults or (tuning.procedure.measures and not self.run_input):
             self.tuning = None
             return
         tuning.left -= dt
@@ -235,47 +282,44 @@ class G2Runner(Runner):
         self.tuning = None
         if self._next_failure:
             code, self._next_failure = self._next_failure, 0
-            self._faults.trip(code, self._counters.op_time, cause_present=False)
+            self.faults.trip(code, self.counters.operating_time, cause_present=False)
             return
         self._tuned = tuning.procedure.done
-        tuning.store(self._memory)
-        self._motor.plate = nameplate(self._memory)
+        tuning.store(self.memory)
+        self.motor.plate = self.nameplate()
 
-    def _write_control(self, word: Control) -> None:
+    def _write_control(self, raw: int) -> None:
+        word = Control(raw)
         self._refuse_when_tuning()
         # acknowledging goes this way, so a fault does not refuse it [M0 table 16, FAULTED]
         if self.machine.asks_reset(word):
-            self._faults.acknowledge()
+            self.faults.acknowledge()
         self.control(word)
 
     def wait(self, dt: float) -> None:
-        """Let the start delay and the DC braking before the start run."""
+        """Let ``dt`` seconds pass: of tuning, of the DC braking before the start, of a fault."""
         super().wait(dt)
         self._go_on_tuning(dt)
         if self.machine.phase is Phase.OPERATION_ENABLED:
             self._dc_brake_left = max(0.0, self._dc_brake_left - dt)
-
-    @property
-    def waiting(self) -> bool:
-        """Whether a start delay, DC braking or a tuning runs."""
-        braking = self._dc_brake_left > 0 and self.machine.phase is Phase.OPERATION_ENABLED
-        return braking or self.tuning is not None or super().waiting
+        self.self_restart.wait(dt, driven=self.motor.driven, voltage=self.motor.voltage_on)
 
     @property
     def mode(self) -> int:
-        """What MODE reads."""
-        return super().mode if self.tuning is None else Mode.INHIBIT
+        """What MODE reads [M0 table 17]."""
+        if self.tuning is not None:
+            return Mode.INHIBIT
+        if self.source is Source.STOP:
+            return Mode.STOP
+        return Mode.BUS if self.on_bus else Mode.EXT
 
     @property
     def settled(self) -> bool:
-        """Whether the state machine stays where it is as long as nothing new comes."""
-        return self.machine.phase not in (
-            Phase.NOT_READY_TO_SWITCH_ON,
-            Phase.DISABLE,
-            Phase.SHUTDOWN,
-            Phase.QUICK_STOP,
-            Phase.FAULT_REACTION_ACTIVE,
-        )
+        """Whether all stays as it is: state machine, DC braking, tuning, faults."""
+        phase = self.machine.phase
+        braking = self._dc_brake_left > 0 and phase is Phase.OPERATION_ENABLED
+        waits = braking or self.tuning is not None or self.self_restart.waiting
+        return super().settled and not waits and phase not in _PASSING
 
     def settle(self) -> None:
         """Carry out what stands: control word, state machine, power stage, demand."""
@@ -284,11 +328,11 @@ class G2Runner(Runner):
         effective = self.word
         if self.source is Source.CONTROL_WORD and (not self.run_input or self._delay_left):
             effective &= ~Control.SWITCH_ON
-        motor, machine = self._motor, self.machine
+        motor, machine = self.motor, self.machine
         conditions = Conditions(
             initialised=self.initialised,
-            fault=bool(self._faults),
-            brake=bool(self._memory.raw('control.st_mode')),
+            fault=bool(self.faults),
+            brake=self._brakes,
             at_zero=motor.at_zero,
             voltage=motor.voltage_on,
         )
@@ -296,7 +340,7 @@ class G2Runner(Runner):
         machine.update(effective, conditions)
         started = machine.phase is Phase.OPERATION_ENABLED and not motor.driven
         if started and before not in (Phase.DISABLE, Phase.SHUTDOWN):
-            self._dc_brake_left = self._memory.number('control.dc_brk')
+            self._dc_brake_left = self.memory.number('control.dc_brk')
         if machine.driven:
             motor.energise()
             self._demand()
@@ -315,13 +359,13 @@ class G2Runner(Runner):
 
     @property
     def inv_st(self) -> int:
-        """The inverter status while no fault stands [M0 table 19]."""
+        """The inverter status while no fault is active [M0 table 19]."""
         if self.tuning is not None:
             return _TUNING
         if self._tuned:
             return self._tuned
         code = super().inv_st
-        still = code == _KEYPAD_RUNNING and self._motor.at_zero
+        still = code == _KEYPAD_RUNNING and self.motor.at_zero
         return _KEYPAD_STILL if still else code
 
     @property
@@ -335,29 +379,29 @@ class G2Runner(Runner):
         if self.tuning is not None:
             return _TUNING_STATUS
         status = self.machine.status()
-        if self.source in (Source.SCMD, Source.CONTROL_WORD):
+        if self.on_bus:
             status |= Status.CTRL_FROM_NET
             if self.word & Control.NET_REF:
                 status |= Status.REF_FROM_NET
-        if self.machine.phase is Phase.OPERATION_ENABLED and self._motor.reached:
+        if self.machine.phase is Phase.OPERATION_ENABLED and self.motor.reached:
             status |= Status.SETPOINT_REACHED
-        if self._motor.limited:
+        if self.motor.limited:
             status |= Status.LIMIT_ACTIVE
         return status
 
     def reference(self) -> float:
         """The reference that the source gives, signed: Hz, or the torque relative to nominal."""
-        code = self._memory.raw('control.mode')
-        frequency = self._motor.plate.frequency
+        code = self.memory.raw('control.mode')
+        frequency = self.motor.plate.frequency
         nominal = 1.0 if _REGULATION_OF[code] is Regulation.TORQUE else frequency
-        if self.source is Source.SCMD and self.scmd is not Scmd.FIELDBUS:
+        if self.source is Source.SCMD and self.scmd != Scmd.FIELDBUS:
             return nominal * local_share(self.scmd, self._fixed_shares())
         if not self.word & Control.NET_REF:
             return nominal * TERMINAL_SHARE
-        setpoint = self._memory.number(self.setpoint_key)
+        setpoint = self.memory.number(self.setpoint_key)
         scale = {
             'status.frq_set': 1.0,
-            'status.spd_set': self._motor.plate.pole_pairs / 60,
+            'status.spd_set': self.motor.plate.pole_pairs / 60,
             'status.trq_set': 0.01,
             'status.reg_set': frequency / 100,
         }
@@ -365,15 +409,11 @@ class G2Runner(Runner):
 
     def _fixed_shares(self) -> dict[int, float]:
         """The fixed references of Freque, as shares of f-Nom; the other modes use the same."""
-        frequency = self._motor.plate.frequency
-        values = {n: self._memory.number(f'freque.f_fix{n}') for n in range(1, 8)}
+        frequency = self.motor.plate.frequency
+        values = {n: self.memory.number(f'freque.f_fix{n}') for n in range(1, 8)}
         return {n: value / frequency for n, value in values.items() if value}
 
-    def _wanted(self) -> bool:
-        if self.source is Source.KEYPAD:
-            return True
-        if not self.run_input:
-            return False
+    def _commanded(self) -> bool:
         if self.source is Source.CONTROL_WORD:
             return bool(self.word & Control.SWITCH_ON)
         return self.source is Source.EXT or self.scmd in RUN_COMMANDS
@@ -387,19 +427,19 @@ class G2Runner(Runner):
         net = Control(0)
         if self.source is Source.SCMD:
             net = Control.NET_CTRL
-            if self.scmd is Scmd.FIELDBUS:
+            if self.scmd == Scmd.FIELDBUS:
                 net |= Control.NET_REF
         self.word = net
-        if not self._wanted() or self._delay_left != 0:
+        if not self._wanted or self._delay_left != 0:
             return STANDBY | net
         reference = self.reference()
         forward = reference > 0 or (reference == 0 and self.machine.direction > 0)
         return RUNNING | net | (Control.ENABLE_OP if forward else Control.ENABLE_REV_OP)
 
     def _demand(self) -> None:
-        motor = self._motor
+        motor = self.motor
         self._ramps()
-        regulation = _REGULATION_OF[self._memory.raw('control.mode')]
+        regulation = _REGULATION_OF[self.memory.raw('control.mode')]
         braking = self.machine.phase is not Phase.OPERATION_ENABLED or self._dc_brake_left > 0
         if braking:
             # a stop goes down the ramp in every control mode
@@ -418,8 +458,8 @@ class G2Runner(Runner):
     def _through_rfg(self, reference: float) -> float:
         """What the ramp generator's bits of DriveControl make of the reference [M0 table 14]."""
         if not self.word & Control.ENABLE_RFG:
-            self._motor.accel = self._motor.retard = _RESET_TIME
+            self.motor.accel = self.motor.retard = _RESET_TIME
             return 0.0
         if not self.word & Control.UNLOCK_RFG:
-            return self._motor.ramp
+            return self.motor.ramp
         return reference if self.word & Control.USE_REF_FOR_RFG else 0.0

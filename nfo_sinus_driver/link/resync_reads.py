@@ -37,7 +37,7 @@ def answer_kinds(request: Request[Any]) -> tuple[bytes, bytes]:
     return request.answer_head, refusal_head(request)
 
 
-def probes(
+def resync_reads(
     unit: int, addresses: Sequence[Address]
 ) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
     """

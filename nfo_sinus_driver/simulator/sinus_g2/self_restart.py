@@ -47,7 +47,7 @@ TRIES: Mapping[int, str] = {
 
 
 class SelfRestart:
-    """Ends the faults of one drive by itself; no known setting does that on an Optimal [C58]."""
+    """Ends the faults of one drive by itself."""
 
     def __init__(self, memory: Memory, faults: Faults) -> None:
         self._memory = memory
@@ -80,7 +80,7 @@ class SelfRestart:
 
     @property
     def waiting(self) -> bool:
-        """Whether a fault stands that ends by itself."""
+        """Whether a fault is active that ends by itself."""
         codes = self._faults.codes
         return bool(codes) and not self._faults.lasting and all(map(self._has_tries, codes))
 

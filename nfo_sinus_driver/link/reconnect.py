@@ -24,7 +24,7 @@ from nfo_sinus_driver.link.interface import Link
 _log = logging.getLogger(__name__)
 
 
-class Keeper:
+class Reconnect:
     """
     Opens a link, and again when it was lost; nothing that the link raises gets out.
 
@@ -49,15 +49,15 @@ class Keeper:
         try:
             self._link.open()
         except PortError as error:
-            self.lose(error, reopen_at)
+            self.mark_lost(error, reopen_at)
         except BaseException as error:
             _log.exception('error in the link')
-            self.lose(PortError(f'error in the link: {error!r}'), reopen_at)
+            self.mark_lost(PortError(f'error in the link: {error!r}'), reopen_at)
         else:
             self.is_open = True
         return self.is_open
 
-    def lose(self, error: PortError, reopen_at: float) -> None:
+    def mark_lost(self, error: PortError, reopen_at: float) -> None:
         """Close the link because of an error, until it may be tried again."""
         self.close()
         self.error = error

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Who runs the drive and how: MODE, SCMD, terminals and keypad, translated to control words.
+Run commands of a G2, and the control words that they are translated to.
 
 [M0 §7.2] says that MODE and SCMD are translated for the generic state machine; the words here
 are ours, since the manual does not print its own.
@@ -22,34 +22,10 @@ are ours, since the manual does not print its own.
 from __future__ import annotations
 
 from collections.abc import Mapping
-import enum
 
 from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-
-
-class Source(enum.Enum):
-    """Where the drive takes its commands from."""
-
-    #: Nobody: status Stop.
-    STOP = 'stop'
-    #: The terminals.
-    EXT = 'ext'
-    #: The keypad's own run command.
-    KEYPAD = 'keypad'
-    #: SCMD.
-    SCMD = 'scmd'
-    #: DriveControl.
-    CONTROL_WORD = 'control_word'
-
-    @property
-    def mode(self) -> Mode:
-        """What MODE reads [M0 table 17]."""
-        if self is Source.STOP:
-            return Mode.STOP
-        return Mode.EXT if self in (Source.EXT, Source.KEYPAD) else Mode.BUS
-
+from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 
 #: The motor is released: MODE = Stop.
 RELEASED = Control(0)
@@ -64,7 +40,6 @@ RUNNING = (
 RUN_COMMANDS = frozenset(code for code in Scmd if code & 1 and code < Scmd.FULL_TUNING)
 
 #: The references that do not come over the bus, as shares of the nominal value.
-TERMINAL_SHARE = 0.5
 _ANALOG_SHARE = 0.6
 _FIXED_SHARES = (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 

@@ -1,0 +1,58 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What carries the bytes of a serial line."""
+
+from __future__ import annotations
+
+import re
+from typing import Protocol
+
+from nfo_sinus_driver.link.serial_port import SerialPort
+from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.url_port import UrlPort
+
+#: An address on a network without the kind of URL that says what is there.
+_HOST_AND_PORT = re.compile(r'[^/]+:\d+')
+
+
+class Port(Protocol):
+    """What carries the bytes."""
+
+    def open(self) -> None: ...  # noqa: D102
+
+    def close(self) -> None: ...  # noqa: D102
+
+    def write(self, data: bytes) -> None: ...  # noqa: D102
+
+    def read(self, until: float) -> bytes: ...  # noqa: D102
+
+
+def port_of(name: str, settings: LineSettings) -> Port:
+    """
+    Return the port of a name; it is not open yet.
+
+    :param name: a device path, or a URL of pyserial (``socket://host:port``).
+    :raises ValueError: neither; the message says what to write.
+    """
+    if not name:
+        raise ValueError('port is empty: name a device, such as /dev/ttyUSB0')
+    if '://' in name:
+        return UrlPort(name, settings)
+    if _HOST_AND_PORT.fullmatch(name):
+        raise ValueError(
+            f'port {name!r} is no device: write socket://{name} for a serial device server, or '
+            'set protocol to modbus_tcp for a gateway'
+        )
+    return SerialPort(name, settings)

@@ -1,0 +1,84 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every protocol that there is, and the link that speaks it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nfo_sinus_driver.link.ascii_link import AsciiLink
+from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.protocol import LineProtocol
+from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.tcp_link import TcpLink
+
+#: A new protocol is a file of this folder, and its link stands here.
+_LINKS = {
+    link.protocol.name: link
+    for link in (
+        RtuLink,
+        AsciiLink,
+        TcpLink,
+        ClassicLink,
+    )
+}
+#: What the driver's ``protocol`` parameter takes, and what each is.
+PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}
+
+
+def protocol_of(name: str) -> LineProtocol:
+    """
+    Return a protocol.
+
+    :raises ValueError: there is none of that name; the message says which there are.
+    """
+    if name not in PROTOCOLS:
+        raise ValueError(f'unknown protocol {name!r}: choose one of {", ".join(PROTOCOLS)}')
+    return PROTOCOLS[name]
+
+
+def line_settings(
+    protocol: str,
+    *,
+    baud_rate: int = 0,
+    char_format: str = '',
+    response_timeout: float = 0.2,
+    rs485: bool = False,
+) -> LineSettings:
+    """
+    Return how a line is set; ``0`` and ``''`` are the factory settings of the protocol.
+
+    :raises ValueError: no such protocol, or a setting that no drive has; the message says which
+        there are.
+    """
+    found = protocol_of(protocol)
+    return LineSettings(
+        baud_rate or found.baud_rate, char_format or found.char_format, response_timeout, rs485
+    )
+
+
+def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
+    """
+    Return the link for a protocol on a port; it is not open yet.
+
+    :param port: a device path, or a URL of pyserial (``socket://host:port``); ``host:port`` of
+        the gateway for ``modbus_tcp``, where only the ``response_timeout`` of the settings counts.
+    :raises ValueError: no such protocol or kind of URL, or a setting with which the protocol can
+        never work; the message says what can.
+    """
+    protocol_of(protocol).require_char_format(settings.char_format)
+    return _LINKS[protocol].on_port(port, settings)

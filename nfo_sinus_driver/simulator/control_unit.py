@@ -1,0 +1,167 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The part of a simulated drive that decides; each family has its own.
+
+Around it are the parts that are alike in all: what it keeps (:mod:`memory`), what it turns
+(:mod:`motor`), what went wrong (:mod:`faults`), power and time (:mod:`drive`).
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Sequence
+from typing import Any
+from typing import ClassVar
+
+from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.measured import Counters
+from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.motor import Motor
+from nfo_sinus_driver.simulator.motor import Nameplate
+from nfo_sinus_driver.simulator.timing import Timing
+
+
+class ControlUnit(abc.ABC):
+    """
+    Takes the commands of a drive and turns them into orders to the motor.
+
+    A family has to say what it writes, shows and does (the abstract ones); the rest has a default
+    that does for a plain drive. Parameters go by their keys, as raw numbers of the memory.
+
+    :param address: of the drive on its line.
+    :param faults: those of this family; by default plain ones.
+
+    :ivar run_input: the digital input that allows a run; set it at any time.
+    :ivar initialised: the self-test after power-on is over.
+    """
+
+    #: Set-points that can be changed at the keypad, too.
+    setpoints: ClassVar[frozenset[str]] = frozenset()
+    #: What a factory reset leaves as it is: without them it would not hear the line any more.
+    line_settings: ClassVar[frozenset[str]] = frozenset()
+
+    def __init__(self, memory: Memory, address: int, faults: Faults | None = None) -> None:
+        self.memory = memory
+        self.faults = Faults(memory.model) if faults is None else faults
+        self.motor = Motor(self.nameplate())
+        self.counters = Counters()
+        self.run_input = True
+        self.initialised = False
+        self._address = address
+
+    # ---- what it takes and shows ----
+
+    @abc.abstractmethod
+    def write(self, key: str, raw: int) -> bool:
+        """
+        Carry out a write of a command; ``False`` if ``key`` is none, so that it is stored.
+
+        :raises Refused: VALUE or STATE.
+        """
+
+    @abc.abstractmethod
+    def show(self, key: str) -> int | None:
+        """Return the raw number of what is neither stored nor measured; else ``None``."""
+
+    @property
+    @abc.abstractmethod
+    def status_code(self) -> int:
+        """The inverter status, without acknowledging anything."""
+
+    def read(self, key: str) -> int | None:
+        """Return what reading has an effect for, having it; else ``None``."""
+        return None
+
+    def key_of(self, key: str) -> str:
+        """Return which parameter is meant: there may be one for the set-points of all modes."""
+        return key
+
+    def admit(self, key: str) -> None:
+        """
+        Look whether a parameter may be written now.
+
+        :raises Refused: STATE.
+        """
+
+    def stored(self, key: str) -> None:
+        """Take note that a parameter has a new value in the memory."""
+
+    def written(self, key: str, protocol: str) -> None:
+        """Take note by which protocol, as the tables call it, a parameter was just written."""
+
+    # ---- what it does ----
+
+    @abc.abstractmethod
+    def settle(self) -> None:
+        """Carry out what stands: commands, state, power stage, demand."""
+
+    @property
+    @abc.abstractmethod
+    def settled(self) -> bool:
+        """Whether all stays as it is as long as nothing new comes and the motor is settled."""
+
+    def wait(self, dt: float) -> None:
+        """Let ``dt`` seconds pass."""
+
+    @abc.abstractmethod
+    def restart(self) -> None:
+        """Begin as after power-on: nobody commands. What is in the memory stays."""
+
+    def boot(self) -> None:
+        """End the self-test after power-on."""
+        self.faults.restart()
+        self.restart()
+        self.initialised = True
+
+    def trip(self, code: int, *, cause_present: bool = False) -> None:
+        """
+        Let a fault happen.
+
+        :raises ValueError: the family has no such fault.
+        """
+        self.faults.trip(code, self.counters.operating_time, cause_present=cause_present)
+
+    def nameplate(self) -> Nameplate:
+        """Return the motor's data; by default those of a motor of 1.5 kW."""
+        return Nameplate()
+
+    # ---- the line ----
+
+    @property
+    def address(self) -> int:
+        """The address that is in effect."""
+        return self._address
+
+    def set_to(self, lines: Sequence[tuple[str, Timing]]) -> None:
+        """
+        Be set to the first of some lines, if there is anything to set, and be reached by all.
+
+        :param lines: of each, the protocol that the drive speaks there, speed and format.
+        :raises ValueError: it cannot be.
+        """
+
+    def hears(self, protocol: str, timing: Timing) -> bool:
+        """Whether it is set to this protocol, speed and format."""
+        return True
+
+    def heard(self) -> None:
+        """Take note that a valid frame for this drive arrived."""
+
+    # ---- for tests and people ----
+
+    def report(self) -> dict[str, Any]:
+        """Return what else there is to say of the drive, as plain data."""
+        return {}

@@ -1,0 +1,103 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every family of Sinus is made of: its Modbus, its options, what can happen to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from nfo_sinus_driver.simulator import modbus
+from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.family import Option
+from nfo_sinus_driver.simulator.injections import Argument
+from nfo_sinus_driver.simulator.injections import Target
+from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.modbus import KNOWN
+from nfo_sinus_driver.simulator.modbus import TREATMENTS
+from nfo_sinus_driver.simulator.sinus.control_unit import KEYS
+from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
+from nfo_sinus_driver.simulator.sinus.variant import CHOICES
+
+OPTIONS = (
+    Option('lenient', 'a Classic message that is refused while the bus has control is no serial '
+           'fault'),
+    Option(
+        'newer_functions',
+        'how drives treat functions 17, 23 and 43, which older ones do not have (default: known)',
+        TREATMENTS,
+    ),
+    Option(
+        'run_command_in_fault',
+        'what an acknowledged fault does to a run command (default: drops; of the Optimal keeps)',
+        CHOICES['run_command_in_fault'],
+    ),
+    Option(
+        'refuses_in_fault',
+        'what is refused while a fault is active; on Classic always all (default: nothing)',
+        CHOICES['refuses_in_fault'],
+    ),
+    Option(
+        'stop_in_tuning',
+        'whether SCMD = Stop ends a tuning, or is refused until it is over (default: taken)',
+        CHOICES['stop_in_tuning'],
+    ),
+)
+
+
+def _unit(target: Target) -> SinusControlUnit:
+    unit = target.one.control_unit
+    assert isinstance(unit, SinusControlUnit)
+    return unit
+
+
+def _sio_error(target: Target, given: dict[str, Any]) -> None:
+    flags = {flag.bit_length() - 1: flag for flag in LineError}
+    if given['bit'] not in flags:
+        raise ValueError(f'SioErr has no bit {given["bit"]}, only {", ".join(map(str, flags))}')
+    _unit(target).serial_error(flags[given['bit']])
+
+
+VERBS: Mapping[str, Verb] = {
+    'keypad': Verb(
+        'press a key: stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally)',
+        lambda target, given: _unit(target).press(given['key']),
+        (Argument('key', str, 'stop, ext or start', choices=tuple(KEYS)),),
+    ),
+    'sio-error': Verb(
+        'let something go wrong on the line: a flag of SioErr, and Sio Fail under bus control',
+        _sio_error,
+        (Argument('bit', int, 'bit of SioErr, such as 1: parity'),),
+    ),
+}
+
+
+#: What only the newer firmware of a G2 has [C57].
+NEWER = frozenset((modbus.REPORT_SLAVE_ID, modbus.WRITE_AND_READ, modbus.ENCAPSULATED))
+
+
+class ModbusServer(modbus.Server):
+    """The Modbus side of one Sinus, whose newer functions can be refused or unheard of."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        super().__init__(drive)
+        assert isinstance(drive.control_unit, SinusControlUnit)
+        self._unit = drive.control_unit
+
+    def treats(self, function: int) -> str:
+        """Return how the drive treats a function."""
+        chosen = self._unit.newer_functions if function in NEWER else KNOWN
+        return super().treats(function) if chosen == KNOWN else chosen

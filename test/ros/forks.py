@@ -1,0 +1,147 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Forks of a process that has imported most of what driver and simulator import.
+
+A test starts both, and what they import is a quarter of what it costs.
+
+Run as a program, it forks for each line of JSON that it reads, and the fork runs the script of that
+command from its beginning to its end, as a process of its own would.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import json
+import os
+from pathlib import Path
+import runpy
+import signal
+import subprocess
+import sys
+import time
+
+#: Not rclpy: it brings threads, which do not come along with a fork.
+_MODULES = (
+    'nfo_sinus_driver.drive',
+    'nfo_sinus_driver.simulator.main',
+    'nfo_sinus_msgs.action',
+    'nfo_sinus_msgs.msg',
+    'nfo_sinus_msgs.srv',
+    'numpy',
+    'rcl_interfaces.srv',
+    'sensor_msgs.msg',
+    'yaml',
+)
+_SET_CHILD_SUBREAPER = 36
+#: How often it is looked whether one has ended, s.
+_PERIOD = 0.005
+
+
+class Fork:
+    """What tests need of ``subprocess.Popen``, for a process that was forked elsewhere."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        self.returncode: int | None = None
+
+    def poll(self) -> int | None:
+        if self.returncode is None:
+            ended, status = os.waitpid(self.pid, os.WNOHANG)
+            if ended:
+                self.returncode = os.waitstatus_to_exitcode(status)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while self.poll() is None:
+            if deadline is not None and time.monotonic() > deadline:
+                raise subprocess.TimeoutExpired(f'process {self.pid}', timeout)
+            time.sleep(_PERIOD)
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+def start(command: list[str], environment: dict[str, str], log: Path) -> Fork:
+    """Start a Python script; what it says goes to the end of a file."""
+    server = _server()
+    log.touch()
+    request = {'command': command, 'environment': environment, 'log': str(log)}
+    server.stdin.write(json.dumps(request) + '\n')
+    server.stdin.flush()
+    return Fork(int(server.stdout.readline()))
+
+
+@functools.cache
+def _server() -> subprocess.Popen[str]:
+    # whoever loses his parent, as the forks do, becomes our child, so that we see how he ends
+    assert ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
+    return subprocess.Popen(
+        [sys.executable, __file__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # numpy would begin threads, too
+        env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'},
+    )
+
+
+def _serve() -> None:
+    for module in _MODULES:
+        importlib.import_module(module)
+    assert len(os.listdir('/proc/self/task')) == 1, 'a fork would lack the others'
+    for line in sys.stdin:
+        reading, writing = os.pipe()
+        if os.fork() == 0:
+            pid = os.fork()
+            if pid == 0:
+                os.close(reading)
+                os.close(writing)
+                _become(**json.loads(line))
+                return
+            os.write(writing, b'%d\n' % pid)
+            os._exit(0)
+        # from now on it is the child of who asked
+        os.wait()
+        os.write(sys.stdout.fileno(), os.read(reading, 100))
+        os.close(reading)
+        os.close(writing)
+
+
+def _become(command: list[str], environment: dict[str, str], log: str) -> None:
+    os.setsid()
+    os.environ.clear()
+    os.environ.update(environment)
+    ends = (0, os.devnull, os.O_RDONLY), (1, log, os.O_WRONLY | os.O_APPEND)
+    for descriptor, path, flags in ends:
+        opened = os.open(path, flags)
+        os.dup2(opened, descriptor)
+        os.close(opened)
+    os.dup2(1, 2)
+    sys.argv = command
+    runpy.run_path(command[0], run_name='__main__')
+
+
+if __name__ == '__main__':
+    _serve()

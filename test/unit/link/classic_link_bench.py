@@ -1,0 +1,83 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A Classic link on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from classic_far_end import FarEnd
+from classic_far_end import Fate
+import pytest
+from support.addresses import classic_id
+from support.addresses import packed
+from virtual_wire import Wire
+
+from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.settings import LineSettings
+
+TIMEOUT = 0.1
+SETTINGS = LineSettings(baud_rate=9600, char_format='7E1', response_timeout=TIMEOUT)
+UNIT = 1
+MODE = 0x29
+A = classic_id(0x1E)
+B = classic_id(0xB6)
+#: OpTime, as the manual prints it: the low word first.
+LONG = classic_id(0x27, 0x127)
+
+_T = TypeVar('_T')
+
+
+class Bench:
+    """A link on a virtual line; everything done with it happens in virtual time."""
+
+    def __init__(self, *fates: Fate, settings: LineSettings = SETTINGS, unit: int = UNIT) -> None:
+        self.wire = Wire(settings)
+        self.drive = FarEnd(self.wire, iter(fates))
+        self.link = ClassicLink(self.wire, settings)
+        self.unit = unit
+        self.do(self.link.open)
+
+    def do(self, action: Callable[[], _T]) -> _T:
+        with self.wire.time():
+            return action()
+
+    def read(self, address: Address, unit: int | None = None) -> Reply:
+        return self.do(lambda: self.link.read(self.unit if unit is None else unit, address))
+
+    def write(self, address: Address, *words: int, unit: int | None = None) -> Reply:
+        unit = self.unit if unit is None else unit
+        return self.do(lambda: self.link.write(unit, address, packed(*words)))
+
+    def refused(self, code: int, *words: str) -> Refused:
+        with pytest.raises(Refused) as raised:
+            self.write(A, 5)
+        assert raised.value.code == code
+        for word in words:
+            assert word in str(raised.value)
+        return raised.value
+
+    @property
+    def asked(self) -> list[int]:
+        """The parameters of all requests so far."""
+        return [number for _, number, _, _ in self.drive.requests]
+
+    def answer_of(self, index: int) -> bytes:
+        """What the drive says to the request with this index."""
+        return packed(self.drive.word(self.asked[index], index))

@@ -1,0 +1,304 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who a unit is, question by question: a drive that does not tell costs little."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from identify_bench import G2
+from identify_bench import KNOWN
+from identify_bench import ONE
+from identify_bench import SERIAL
+from identify_bench import TIMEOUT
+from identify_bench import TWO
+from identify_bench import Unit
+from identify_bench import asked_all
+from identify_bench import device_answer
+from identify_bench import g2_answer
+from identify_bench import refuses
+from identify_bench import silent
+from identify_bench import spoil
+import pytest
+from support.addresses import packed
+
+from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.errors import LinkError
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import NotReady
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.modbus_identify import REGULAR
+from nfo_sinus_driver.link.modbus_identify import DeviceObjects
+from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
+from nfo_sinus_driver.link.modbus_identify import ReadDevice
+from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
+from nfo_sinus_driver.link.modbus_identify import revision
+from nfo_sinus_driver.link.modbus_identify import serial_number
+from nfo_sinus_driver.link.modbus_identify import text
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.settings import LineSettings
+
+# --- what the bytes say ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('data', 'clean'),
+    [
+        (b'NFO Drives AB', 'NFO Drives AB'),
+        (b'  1.50/400 ', '1.50/400'),
+        (b'', ''),
+        (b'\x00\xff\n', ''),
+        (b'Sinus\x00\x00', 'Sinus'),
+        # nobody writes a second line into our log, or colours it
+        (b'a\nERROR \x1b[31mb', 'a ERROR [31mb'),
+    ],
+)
+def test_text(data: bytes, clean: str) -> None:
+    assert text(data) == clean
+
+
+@given(st.binary(max_size=255))
+def test_any_text_is_printable(data: bytes) -> None:
+    for said in (text(data), revision(data), serial_number(data)):
+        assert said.isascii() and said.isprintable()
+        assert said == said.strip()
+
+
+@pytest.mark.parametrize(
+    ('data', 'clean'),
+    [
+        (b' 4.30 / 4018 ', '4.30 / 4018'),
+        (b' 4.30   /   4018 ', '4.30 / 4018'),
+        (b'4.30/4018', '4.30 / 4018'),
+        (b'4.30', '4.30'),
+        (b'/', ''),
+        (b'', ''),
+    ],
+)
+def test_revision(data: bytes, clean: str) -> None:
+    assert revision(data) == clean
+
+
+@pytest.mark.parametrize(
+    ('report', 'serial'),
+    [
+        (SERIAL, '0123456789ABCDEF'),
+        (b'ABC123          ', 'ABC123'),
+        (b'ABC123\x00\x00\x00', 'ABC123'),
+        # with the standard's run indicator behind it, before it, and an id before that
+        (SERIAL + b'\xff', '0123456789ABCDEF'),
+        (SERIAL + b'\x00', '0123456789ABCDEF'),
+        (b'\xff' + SERIAL, '0123456789ABCDEF'),
+        (b'\x11\xff' + SERIAL, '0123456789ABCDEF'),
+        (b'B\x00' + SERIAL, '0123456789ABCDEF'),
+        (b'\x11\xff', ''),
+        (b' ' * 16, ''),
+        (b'', ''),
+    ],
+)
+def test_serial_number(report: bytes, serial: str) -> None:
+    assert serial_number(report) == serial
+
+
+# --- the questions --------------------------------------------------------------------------------
+
+
+class Script:
+    """Answers questions as a unit would, without a line."""
+
+    def __init__(self, *replies: object) -> None:
+        self._replies = list(replies)
+        self.asked: list[Request[Any]] = []
+
+    def __call__(self, request: Request[object]) -> tuple[object, float]:
+        self.asked.append(request)
+        reply = self._replies.pop(0)
+        if isinstance(reply, Exception):
+            raise reply
+        return reply, float(len(self.asked))
+
+
+def test_two_questions_tell_all() -> None:
+    script = Script(DeviceObjects(tuple(G2.items())), SERIAL)
+    assert asked_all(ModbusInquiry(1, script)) == KNOWN
+    assert script.asked == [ReadDevice(1, REGULAR, 0), ReportSlaveId(1)]
+
+
+def test_reply_says_when_its_last_byte_came() -> None:
+    inquiry = ModbusInquiry(1, Script(DeviceObjects(()), b''))
+    assert [inquiry.ask().arrived, inquiry.ask().arrived] == [1.0, 2.0]
+    assert inquiry.done
+
+
+def test_reading_goes_on_where_more_follows() -> None:
+    script = Script(
+        DeviceObjects(((0, b'NFO'), (1, b'')), 2),
+        DeviceObjects(((2, b'4.30/4018'),), 4),
+        DeviceObjects(((4, b'NFO Sinus'), (5, b'1.50/400'))),
+        SERIAL,
+    )
+    found = asked_all(ModbusInquiry(1, script))
+    assert (found.vendor, found.revision, found.model) == ('NFO', '4.30 / 4018', '1.50/400')
+    assert script.asked[1:3] == [ReadDevice(1, REGULAR, 2), ReadDevice(1, REGULAR, 4)]
+
+
+@pytest.mark.parametrize('following', [0, 1, 2, 7, 0x80, 255])
+def test_only_what_is_ahead_and_known_is_read_on(following: int) -> None:
+    script = Script(DeviceObjects((), 2), DeviceObjects((), following), b'')
+    asked_all(ModbusInquiry(1, script))
+    assert [type(question) for question in script.asked] == [ReadDevice, ReadDevice, ReportSlaveId]
+
+
+def test_objects_that_nobody_knows_are_passed_over() -> None:
+    script = Script(DeviceObjects(((0, b'NFO'), (7, b'x'), (0x80, b'y'))), b'')
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+
+
+@pytest.mark.parametrize('error', [Refused(1), Refused(2), Refused(3), NoAnswer(), DamagedAnswer()])
+def test_a_question_without_answer_is_not_asked_again(error: LinkError) -> None:
+    script = Script(error, SERIAL)
+    assert asked_all(ModbusInquiry(1, script)) == Identification(serial='0123456789ABCDEF')
+    script = Script(DeviceObjects(((0, b'NFO'),)), error)
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+    script = Script(DeviceObjects(((0, b'NFO'),), 1), error, error)
+    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+    script = Script(error, error)
+    assert asked_all(ModbusInquiry(1, script)) == Identification()
+
+
+def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
+    script = Script(NotReady(1.0), DeviceObjects(((0, b'NFO'),)), NotReady(2.0), SERIAL)
+    inquiry = ModbusInquiry(1, script)
+    for _ in range(2):
+        with pytest.raises(NotReady):
+            inquiry.ask()
+        assert not inquiry.done
+        inquiry.ask()
+    assert inquiry.done
+    assert inquiry.found == Identification(vendor='NFO', serial='0123456789ABCDEF')
+
+
+# --- on a line in virtual time --------------------------------------------------------------------
+
+@pytest.mark.parametrize('baud', [1200, 19200, 57600])
+def test_a_g2_tells_who_it_is(baud: int) -> None:
+    unit = Unit(LineSettings(baud_rate=baud, response_timeout=TIMEOUT))
+    assert unit.identify() == KNOWN
+    assert unit.functions == [43, 17]
+    unit.wire.check_gaps()
+    assert unit.read() == packed(3), 'and there is no doubt'
+
+
+def test_nothing_is_sent_before_the_first_question() -> None:
+    unit = Unit()
+    inquiry = unit.link.identify(1)
+    assert not inquiry.done
+    assert unit.functions == []
+
+
+def test_refusals_cost_no_time_out() -> None:
+    unit = Unit()
+    unit.answers.update({17: refuses, 43: refuses})
+    before = unit.wire.now
+    assert unit.identify() == Identification()
+    assert unit.functions == [43, 17]
+    assert unit.wire.now - before < TIMEOUT / 2
+    assert unit.read() == packed(3)
+
+
+def test_silence_costs_one_time_out_each() -> None:
+    unit = Unit()
+    unit.answers.update({17: silent, 43: silent})
+    before = unit.wire.now
+    assert unit.identify() == Identification()
+    assert unit.functions == [43, 17]
+    assert 2 * TIMEOUT < unit.wire.now - before < 2.5 * TIMEOUT
+    assert unit.read() == packed(3)
+    assert unit.identify() == Identification()
+    assert unit.functions == [43, 17, 3, 43, 17], 'the quarantine was over'
+    unit.wire.check_gaps()
+
+
+@pytest.mark.parametrize('function', [43, 17])
+def test_late_answer_is_not_taken_for_another(function: int) -> None:
+    unit = Unit()
+    unit.late[function] = 1.2
+    found = unit.identify()
+    assert found.vendor == ('' if function == 43 else KNOWN.vendor)
+    assert found.serial == ('' if function == 17 else KNOWN.serial)
+    assert unit.read() == packed(len(unit.functions))
+    assert unit.functions == [43, 17, 3]
+
+
+def test_a_late_refusal_is_not_taken_for_another_one() -> None:
+    unit = Unit()
+    unit.answers[43] = refuses
+    unit.late[43] = 1.2
+    assert unit.identify() == Identification(serial=KNOWN.serial)
+    assert unit.read() == packed(len(unit.functions))
+
+
+@pytest.mark.parametrize('function', [43, 17])
+def test_damaged_answer_leaves_it_empty(function: int) -> None:
+    unit = Unit()
+    good = unit.answers[function]
+    unit.answers[function] = lambda frame: spoil(good(frame), 90)
+    found = unit.identify()
+    assert (found.vendor == '', found.serial == '') == (function == 43, function == 17)
+    assert unit.read() == packed(len(unit.functions))
+
+
+@pytest.mark.parametrize('cut', [2, 5, 8, 9, 30, 80])
+def test_answer_that_stops_in_the_middle(cut: int) -> None:
+    unit = Unit()
+    unit.answers[43] = lambda frame: device_answer(1, REGULAR, G2)[:cut]
+    before = unit.wire.now
+    assert unit.identify() == Identification(serial=KNOWN.serial)
+    assert unit.wire.now - before < 3 * TIMEOUT
+
+
+def test_answer_in_lumps_of_an_adapter() -> None:
+    unit = Unit()
+    whole = device_answer(1, REGULAR, G2)
+
+    def far_end(frame: bytes, end: float) -> None:
+        if frame[1] != 43:
+            unit.wire.arrive(end, g2_answer(1))
+            return
+        for number, at in enumerate(range(0, len(whole), 31), start=1):
+            unit.wire.arrive(end + 0.025 * number, whole[at : at + 31], lump=True)
+
+    unit.wire.far_end = far_end
+    assert unit.identify() == KNOWN
+
+
+def test_doubled_answer_is_noticed() -> None:
+    unit = Unit()
+    unit.answers[43] = lambda frame: 2 * device_answer(1, REGULAR, G2)
+    assert unit.identify() == KNOWN
+    assert unit.read() == packed(len(unit.functions))
+
+
+def test_a_unit_whose_reads_are_in_doubt_can_say_who_it_is() -> None:
+    unit = Unit()
+    unit.answers[3] = silent
+    for address in (ONE, TWO):
+        with pytest.raises(NoAnswer):
+            unit.read(address)
+    assert unit.identify() == KNOWN
+    assert unit.functions == [3, 3, 43, 17]

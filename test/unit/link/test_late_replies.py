@@ -1,0 +1,203 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What to believe while replies may still come, without any line."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.catalog import Access
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import classic_link
+from nfo_sinus_driver.link.late_replies import DISTRUST
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY
+from nfo_sinus_driver.link.late_replies import Doubt
+from nfo_sinus_driver.link.late_replies import LateReplies
+
+TIMEOUT = 0.2
+UNIT = 1
+#: When all of this happens.
+NOW = 1000.0
+
+
+class Ask(NamedTuple):
+    """A request whose answers are of a kind, or a refusal of that kind."""
+
+    kind: str
+    unit: int = UNIT
+
+
+def kinds(request: Ask) -> tuple[str, str]:
+    return request.kind, f'no {request.kind}'
+
+
+def make() -> LateReplies[Ask, str]:
+    return LateReplies(TIMEOUT, kinds)
+
+
+def waits(count: int, lost: list[float]) -> list[float]:
+    """
+    Ask questions that have so many kinds of replies, and lose each.
+
+    :param lost: how long each transaction takes beyond its time-out, s.
+    :returns: how long one had to wait before each.
+    """
+    late: LateReplies[Ask, int] = LateReplies(TIMEOUT, lambda request: ())
+    now, waited = NOW, []
+    for more in lost:
+        began = now
+        questions = [(kind, (kind,)) for kind in range(count)]
+        try:
+            question = late.first_certain(UNIT, questions, now)
+        except NotReady as error:
+            now = error.until
+            question = late.first_certain(UNIT, questions, now)
+        waited.append(now - began)
+        assert question not in late.quarantined(UNIT, now)
+        now += TIMEOUT + more
+        late.quarantine(UNIT, (question,), now)
+    return waited
+
+
+LOST = st.lists(st.floats(0.001, 0.3), max_size=30)
+
+
+@given(LOST)
+def test_of_four_questions_one_is_always_certain(lost: list[float]) -> None:
+    assert waits(4, lost) == [0.0] * len(lost)
+
+
+@given(LOST)
+def test_of_three_questions_one_is_certain_after_a_time_out(lost: list[float]) -> None:
+    assert all(wait <= TIMEOUT for wait in waits(3, lost))
+
+
+def test_of_two_questions_none_is_for_two_time_outs() -> None:
+    # that is why two parameters to resync with are too few
+    assert max(waits(2, [0.001] * 5)) == pytest.approx(2 * TIMEOUT, abs=0.01)
+
+
+def test_a_quarantine_lasts_until_the_latest_reply_or_any_certain_one() -> None:
+    late = make()
+    late.expect(Ask('a'), NOW)
+    late.quarantine(2, ('c',), NOW)
+    assert late.quarantined(UNIT, NOW) == {'a', 'no a'}
+    nearly = NOW + (LATEST_REPLY - 1) * TIMEOUT - 0.001
+    assert late.quarantined(UNIT, nearly) == {'a', 'no a'}
+    late.quarantine(UNIT, ('no a',), nearly)
+    assert late.quarantined(UNIT, nearly + 0.002) == {'no a'}
+    assert late.quarantined(2, nearly + 0.002) == set()
+    late.release(UNIT)
+    assert late.quarantined(UNIT, nearly + 0.002) == set()
+
+
+def test_a_question_is_certain_when_each_of_its_replies_is() -> None:
+    late = make()
+    late.quarantine(UNIT, ('a',), NOW)
+    late.quarantine(UNIT, ('no a',), NOW + 0.1)
+    with pytest.raises(NotReady) as raised:
+        late.first_certain(UNIT, [('question', kinds(Ask('a')))], NOW + 0.1)
+    assert raised.value.until == pytest.approx(NOW + 0.1 + 3 * TIMEOUT)
+
+
+# --- told twice -----------------------------------------------------------------------------------
+
+
+def told(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) -> None:
+    """One transaction: a request goes out and is answered."""
+    late.sent(request)
+    late.note(request, reply, now, now + TIMEOUT)
+
+
+@pytest.mark.parametrize(
+    ('second', 'reply', 'later', 'trusted', 'untrusted'),
+    [
+        (Ask('b'), b'1', 0.1, Doubt.LISTEN, Doubt.RESYNC),
+        (Ask('a'), b'1', 0.1, Doubt.NONE, Doubt.ONCE_MORE),
+        # other bytes, or the same after a time-out, or those of another unit, were not told twice
+        (Ask('b'), b'2', 0.1, Doubt.NONE, Doubt.NONE),
+        (Ask('b'), b'1', 0.3, Doubt.NONE, Doubt.NONE),
+        (Ask('b', 2), b'1', 0.1, Doubt.NONE, Doubt.NONE),
+    ],
+)
+def test_doubt_about_the_same_bytes(
+    second: Ask, reply: bytes, later: float, trusted: Doubt, untrusted: Doubt
+) -> None:
+    for told_unasked, doubt in ((False, trusted), (True, untrusted)):
+        late = make()
+        if told_unasked:
+            late.heard_unasked(NOW)
+        told(late, Ask('a'), b'1', NOW)
+        told(late, second, reply, NOW + later)
+        assert late.doubt_about(second, NOW + later) is doubt
+        # what names what it is about is right, told once or twice
+        assert late.doubt_about(second, NOW + later, names_it=True) in (Doubt.NONE, Doubt.ONCE_MORE)
+
+
+def test_a_line_is_trusted_again_after_a_while() -> None:
+    late = make()
+    late.heard_unasked(NOW)
+    for now, doubt in ((NOW + DISTRUST - 1, Doubt.RESYNC), (NOW + DISTRUST + 1, Doubt.LISTEN)):
+        told(late, Ask('a'), b'1', now)
+        told(late, Ask('b'), b'1', now + 0.1)
+        assert late.doubt_about(Ask('b'), now + 0.1) is doubt
+    late.sent(Ask('c'))
+    assert late.doubt_about(Ask('c'), NOW) is Doubt.NONE, 'that is about the one before'
+
+
+def test_what_comes_unasked_may_come_once_more() -> None:
+    late = make()
+    late.heard_unasked(NOW)
+    assert late.quarantined(UNIT, NOW) == set(), 'nothing was asked yet'
+    late.sent(Ask('a'))
+    late.heard_unasked(NOW)
+    assert late.quarantined(UNIT, NOW) == {'a', 'no a'}
+    late.clear()
+    late.heard_unasked(NOW)
+    assert late.quarantined(UNIT, NOW) == set(), 'that was on another connection'
+
+
+@given(st.lists(st.floats(0, 10), min_size=1, max_size=60))
+def test_a_slow_reply_is_remembered_and_forgotten(seconds: list[float]) -> None:
+    late = make()
+    for took in seconds:
+        late.took(UNIT, took)
+    assert late.longest(UNIT) >= 1.25 * seconds[-1]
+    assert late.longest(UNIT) <= 1.25 * max(seconds)
+    for _ in range(200):
+        late.took(UNIT, 0.0)
+    assert late.longest(UNIT) < 0.001
+    assert late.longest(2) == 0.0
+
+
+# --- what is asked meanwhile ----------------------------------------------------------------------
+
+
+def test_what_is_asked_over_classic_is_in_the_table_of_every_firmware_and_does_nothing() -> None:
+    model = load_family('sinus_g2')
+    for number in classic_link._EVERYWHERE:
+        (parameter,) = (
+            parameter
+            for parameter in model.values()
+            if 'classic' in parameter.addresses
+            and parameter.at('classic').numbers == (number,)
+        )
+        assert parameter.since is None
+        assert parameter.access in (Access.READ, Access.READ_WRITE)

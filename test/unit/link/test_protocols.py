@@ -1,0 +1,156 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What each protocol is, by its name, and how its lines are set."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import LineProtocol
+from nfo_sinus_driver.link import line_settings
+from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.settings import LineSettings
+
+EVERY = pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
+PORTS = {'modbus_tcp': 'gateway:502'}
+
+
+def open_with(protocol: str, char_format: str) -> None:
+    """Make the link that speaks a protocol on a line that is set so."""
+    open_link(protocol, PORTS.get(protocol, '/dev/x'), LineSettings(char_format=char_format))
+
+
+@EVERY
+def test_a_link_says_what_it_speaks(protocol: LineProtocol) -> None:
+    port = PORTS.get(protocol.name, '/dev/x')
+    assert PROTOCOLS[protocol.name] is protocol
+    assert open_link(protocol.name, port, line_settings(protocol.name)).protocol is protocol
+
+
+@EVERY
+def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProtocol) -> None:
+    rows = load_family('sinus_g2').values()
+    assert any(protocol.addressing in row.addresses for row in rows)
+    assert protocol.broadcast not in protocol.units
+    assert protocol.point_to_point in (None, protocol.units[0])
+
+
+@given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
+def test_addresses(protocol: LineProtocol, address: int) -> None:
+    highest = 94 if protocol.name == 'classic' else 247
+    lowest = 0 if protocol.name == 'classic' else 1
+    if lowest <= address <= highest:
+        protocol.require_unit(address)
+    else:
+        with pytest.raises(ValueError, match=f'^address {address}: .* has {lowest} to {highest}$'):
+            protocol.require_unit(address)
+
+
+FORMATS = st.builds(''.join, st.tuples(*map(st.sampled_from, ('78', 'EON', '12'))))
+
+
+@given(st.sampled_from(['modbus_rtu', 'modbus_ascii']), FORMATS)
+def test_a_modbus_frame_has_as_many_data_bits_as_its_protocol(protocol: str, format_: str) -> None:
+    # RTU has eight, ASCII seven (MODBUS over Serial Line V1.02 §2.5)
+    if format_[0] == ('8' if protocol == 'modbus_rtu' else '7'):
+        open_with(protocol, format_)
+    else:
+        with pytest.raises(ValueError, match=f"^char_format '{format_}': {protocol} has [78]E1"):
+            open_with(protocol, format_)
+
+
+@given(FORMATS)
+def test_classic_has_the_formats_of_its_firmwares(format_: str) -> None:
+    if format_ in ('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1'):
+        open_with('classic', format_)
+    else:
+        with pytest.raises(ValueError, match='classic has 7E1, 7O1, 7N2, 8E1, 8O1, 8N2, 8N1'):
+            open_with('classic', format_)
+
+
+@given(FORMATS)
+def test_the_line_of_a_gateway_is_the_gateways(format_: str) -> None:
+    open_with('modbus_tcp', format_)
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'baud_rate', 'char_format'),
+    [('modbus_rtu', 19200, '8E1'), ('modbus_ascii', 19200, '7E1'), ('classic', 9600, '7E1')],
+)
+def test_factory_settings(protocol: str, baud_rate: int, char_format: str) -> None:
+    # [M0 §6.2.2], [M0 §6.1.2], [C6]
+    line = line_settings(protocol)
+    assert (line.baud_rate, line.char_format) == (baud_rate, char_format)
+    open_link(protocol, '/dev/x', line)
+    asked = line_settings(protocol, baud_rate=9600, char_format=f'{char_format[0]}N2')
+    assert (asked.baud_rate, asked.char_format) == (9600, f'{char_format[0]}N2')
+    with pytest.raises(ValueError, match='unknown protocol'):
+        line_settings('profibus')
+
+
+def test_unknown_protocol() -> None:
+    with pytest.raises(ValueError, match="unknown protocol 'profibus': choose one of modbus_rtu"):
+        open_link('profibus', '/dev/null', LineSettings())
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('char_format', 'bits', 'parity', 'stop', 'char_bits'),
+    [
+        ('8E1', 8, 'E', 1, 11),
+        ('8N2', 8, 'N', 2, 11),
+        ('7O1', 7, 'O', 1, 10),
+        ('8N1', 8, 'N', 1, 10),
+    ],
+)
+def test_line_settings(
+    char_format: str, bits: int, parity: str, stop: int, char_bits: int
+) -> None:
+    line = LineSettings(baud_rate=9600, char_format=char_format)
+    assert (line.data_bits, line.parity, line.stop_bits) == (bits, parity, stop)
+    assert line.char_time == pytest.approx(char_bits / 9600)
+
+
+@pytest.mark.parametrize('baud', BAUD_RATES)
+def test_silence_between_two_frames(baud: int) -> None:
+    # [MODBUS over Serial Line V1.02, 2.5.1.1]: 3.5 characters of 11 bits, fixed above 19200
+    gap = LineSettings(baud_rate=baud).frame_gap
+    assert gap == pytest.approx(38.5 / baud if baud <= 19200 else 0.00175)
+
+
+@pytest.mark.parametrize(
+    ('setting', 'message'),
+    [
+        ({'baud_rate': 115200}, 'the drive knows 1200, 2400'),
+        ({'baud_rate': 0}, 'the drive knows'),
+        ({'char_format': '8e1'}, 'write data bits, parity and stop bits'),
+        ({'char_format': '9N1'}, 'such as 8E1'),
+        ({'char_format': '8E1 '}, 'such as 8E1'),
+        ({'response_timeout': 0.0}, '0.01 to 10 s'),
+        ({'response_timeout': 10.1}, '0.01 to 10 s'),
+        ({'response_timeout': float('nan')}, '0.01 to 10 s'),
+    ],
+)
+def test_settings_that_no_drive_has(setting: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        LineSettings(**setting)  # type: ignore[arg-type]

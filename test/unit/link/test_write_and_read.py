@@ -1,0 +1,60 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Writing and reading in one transaction (function 23)."""
+
+from __future__ import annotations
+
+from identify_bench import ONE
+from identify_bench import TWO
+from identify_bench import Unit
+from identify_bench import refuses
+from identify_bench import write_and_read_request
+import pytest
+from support.addresses import packed
+
+from nfo_sinus_driver.link.errors import NoAnswer
+from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+
+
+def test_write_and_read() -> None:
+    unit = Unit()
+    with unit.wire.time():
+        reply = unit.link.write_and_read(1, TWO, packed(1, 2), ONE)
+    assert reply.data == packed(1)
+    assert reply.arrived == unit.wire.now
+    request = WriteAndRead(1, 0x258, packed(1, 2), 0x2A5, 1)
+    assert unit.wire.sent[-1][1] == write_and_read_request(request)
+
+
+def test_its_answer_is_put_in_quarantine_as_that_of_a_read() -> None:
+    unit = Unit()
+    unit.late[23] = 1.5
+    with unit.wire.time(), pytest.raises(NoAnswer) as error:
+        unit.link.write_and_read(1, ONE, packed(7), ONE)
+    assert error.value.maybe_done
+    unit.late.clear()
+    with unit.wire.time():
+        # what is written is never held back: it goes alone, for its answer names it
+        assert unit.link.write_and_read(1, ONE, packed(7), ONE).data == b''
+    assert unit.functions == [23, 6]
+
+
+def test_write_and_read_refused() -> None:
+    unit = Unit()
+    unit.answers[23] = refuses
+    with unit.wire.time(), pytest.raises(Refused) as refusal:
+        unit.link.write_and_read(1, ONE, packed(7), ONE)
+    assert refusal.value.code == Refused.ILLEGAL_FUNCTION
