@@ -58,7 +58,7 @@ def report_of(error: Exception) -> Report:
 
 def explain_fault(inverter: Inverter, seen: InverterStatus) -> Report:
     """Return which fault is active, what it means and what to do about its cause."""
-    return Report(Cause.FAULT, status=inverter.describe(), fault=seen.listed)
+    return inverter.report(Cause.FAULT, fault=seen.listed)
 
 
 def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
@@ -68,8 +68,7 @@ def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
     :raises DriveError: one is.
     """
     if seen.faulted:
-        status = inverter.describe()
-        raise DriveError(Report(Cause.FAULT_FORBIDS, status=status, fault=seen.listed))
+        raise DriveError(inverter.report(Cause.FAULT_FORBIDS, fault=seen.listed))
 
 
 def explain_stop(
@@ -95,7 +94,7 @@ def explain_stop(
         cause = Cause.RUN_INPUT_LOST
     elif not seen.runs:
         cause = Cause.STOPPED_BY_ITSELF
-    return cause and Report(cause, status=inverter.describe())
+    return cause and inverter.report(cause)
 
 
 def _why_control_is_lost(inverter: Inverter, seen: InverterStatus) -> Cause:

@@ -307,20 +307,19 @@ class Controller:
         self._stop()
         await self._sequence.wait_confirmed(patience or None)
         seen = self._inverter.seen
-        status = self._inverter.describe()
         if self.blocked_by_fault:
-            return Report(Cause.STOP_BLOCKED, status=status)
+            return self._inverter.report(Cause.STOP_BLOCKED)
         if seen is not None and seen.faulted and not seen.driven:
-            return Report(Cause.STOPPED_BY_FAULT, status=status)
+            return self._inverter.report(Cause.STOPPED_BY_FAULT)
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
         if not seen.driven:
-            return Report(Cause.STOPPED, status=status)
+            return self._inverter.report(Cause.STOPPED)
         try:
             coasts = await self._inverter.coasts_to_stop()
         except LinkError:
             # the stop is confirmed all the same
-            return Report(Cause.STOPPING, status=status)
+            return self._inverter.report(Cause.STOPPING)
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
@@ -369,10 +368,9 @@ class Controller:
                 seen = self._inverter.seen
                 by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
                 if isinstance(error, Refused) and by_fault:
-                    return Report(Cause.STOP_BLOCKED, status=self._inverter.describe())
-                status = self._inverter.describe()
+                    return self._inverter.report(Cause.STOP_BLOCKED)
                 raise DriveError(
-                    Report(Cause.QUICK_STOP_UNCONFIRMED, why=report_of(error), status=status)
+                    self._inverter.report(Cause.QUICK_STOP_UNCONFIRMED, why=report_of(error))
                 ) from error
             if not may_run:
                 return self._no_control(self._inverter.seen)
@@ -391,7 +389,7 @@ class Controller:
         seen = await inverter.look(Priority.SERVICE)
         fault = seen.listed
         if not seen.faulted and fault.kind is Kind.STATUS:
-            return Report(Cause.NOTHING_TO_ACKNOWLEDGE, status=inverter.describe())
+            return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
         may_run = self.may_run or await self._method.in_control(Priority.SERVICE)
         with self._stopped_by_itself():
             return await self._acknowledge(seen, may_run=may_run)
@@ -419,8 +417,8 @@ class Controller:
             )
             await self._settle()
         except DriveError:
-            now, status = inverter.seen or seen, inverter.describe()
-            report = Report(Cause.STILL_FAULTED, status=status, fault=now.listed)
+            now = inverter.seen or seen
+            report = inverter.report(Cause.STILL_FAULTED, fault=now.listed)
             if now.code != seen.code:
                 report = Report(Cause.NEXT_FAULT, acknowledged=acknowledged, still=report)
             raise DriveError(report) from None
@@ -446,7 +444,7 @@ class Controller:
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
-            raise DriveError(Report(Cause.RELEASE_BLOCKED, status=self._inverter.describe()))
+            raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
         released = Report(Cause.CONTROL_RELEASED, stop=stopped)
         try:
             await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
@@ -469,19 +467,13 @@ class Controller:
 
     async def secure_found(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
-        seen = self._inverter.seen
+        inverter, seen = self._inverter, self._inverter.seen
         if await self._method.in_control(Priority.SERVICE):
             if seen is not None and seen.runs_by_bus and not self.stopping:
-                status = self._inverter.describe()
-                self._inverter.tell(
-                    Severity.WARNING, Report(Cause.FOUND_RUNNING, status=status)
-                )
+                inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)
         elif self._lost_in_use and seen is not None and not seen.faulted:
-            status = self._inverter.describe()
-            self._inverter.tell(
-                Severity.WARNING, Report(Cause.CONTROL_LOST_WHILE_AWAY, status=status)
-            )
+            inverter.tell(Severity.WARNING, inverter.report(Cause.CONTROL_LOST_WHILE_AWAY))
         self._lost_in_use = False
 
     def connected(self) -> None:
@@ -560,7 +552,6 @@ class Controller:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)
 
     def _no_control(self, seen: InverterStatus | None) -> Report:
-        status = self._inverter.describe()
         if seen is not None and seen.driven:
-            raise DriveError(Report(Cause.RUN_BY_OTHERS, status=status))
-        return Report(Cause.NO_CONTROL, status=status)
+            raise DriveError(self._inverter.report(Cause.RUN_BY_OTHERS))
+        return self._inverter.report(Cause.NO_CONTROL)

@@ -480,8 +480,8 @@ class Drive:
             return
         seen = await self._inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
-            method, status = self.settings.control_method, self._inverter.describe()
-            raise DriveError(Report(Cause.OTHER_METHOD_RUNS, method=method, status=status))
+            method = self.settings.control_method
+            raise DriveError(self._inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     async def _stop_for_good(self, patience: float) -> Report | None:
         if self._controller is not None:

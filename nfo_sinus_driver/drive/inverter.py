@@ -437,6 +437,10 @@ class Inverter:
         """Return code and text of the inverter status; ``''`` before it was read."""
         return '' if self.seen is None else f'{self.seen.code} {self.text}'
 
+    def report(self, cause: Cause, **values: object) -> Report:
+        """Return a report that says what the inverter status is, too."""
+        return Report(cause, status=self.describe(), **values)
+
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
         if not self._registers.reaches(key) or (self._older and not self.model[key].older):

@@ -54,17 +54,16 @@ class Notices:
 
     def _reports(self, seen: InverterStatus) -> Iterator[tuple[Severity, Report]]:
         """Yield what is there."""
-        status = self._inverter.describe()
         by_code = seen.means(Meaning.CURRENT_LIMIT)
         limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
         if limited and not seen.faulted:
             (limit,) = seen.model.codes(Meaning.CURRENT_LIMIT)
-            yield Severity.WARNING, Report(Cause.CURRENT_LIMITED, status=status, limit=limit)
+            yield Severity.WARNING, self._inverter.report(Cause.CURRENT_LIMITED, limit=limit)
         if seen.kind is Kind.ALARM and not by_code:
             if seen.listed.remedy:
-                yield Severity.WARNING, Report(Cause.ALARM, status=status, alarm=seen.listed)
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM, alarm=seen.listed)
             elif self._unnamed and not limited:
                 # once only, it came or went between the two readings
-                yield Severity.WARNING, Report(Cause.ALARM_UNNAMED, status=status)
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM_UNNAMED)
         if Fact.SLEEPING in seen.facts:
-            yield Severity.INFO, Report(Cause.ASLEEP, status=status)
+            yield Severity.INFO, self._inverter.report(Cause.ASLEEP)

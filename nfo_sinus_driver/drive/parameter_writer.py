@@ -188,8 +188,7 @@ class ParameterWriter:
         except LinkError as error:
             raise not_changed(stopped, self.explain(error)) from error
         if seen.driven:
-            status = self._inverter.describe()
-            raise not_changed(stopped, Report(Cause.STANDSTILL_NEEDED, status=status))
+            raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
 
     def describe(self, entry: Written) -> Change:
         """Return what was written as a person reads it."""
@@ -341,5 +340,5 @@ class ParameterWriter:
         if seen is not None and seen.driven and self._registers.model[key].stopped:
             return Report(Cause.REFUSED_WHILE_RUNNING, why=why)
         if seen is not None and seen.faulted:
-            return Report(Cause.REFUSED_WHILE_FAULTED, why=why, status=inverter.describe())
+            return inverter.report(Cause.REFUSED_WHILE_FAULTED, why=why)
         return why

@@ -183,14 +183,13 @@ class Procedures:
         controller, inverter, what = self._commands, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
-        status = inverter.describe()
         found = await controller.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
-            raise DriveError(Report(Cause.CONTROL_INHIBITED, what=what, status=status))
+            raise DriveError(inverter.report(Cause.CONTROL_INHIBITED, what=what))
         if seen.driven:
-            raise DriveError(Report(Cause.MOTOR_RUNS, what=what, status=status))
+            raise DriveError(inverter.report(Cause.MOTOR_RUNS, what=what))
         if found not in (Holder.NOBODY, Holder.BUS):
-            raise DriveError(Report(Cause.CONTROLLED_LOCALLY, what=what, status=status))
+            raise DriveError(inverter.report(Cause.CONTROLLED_LOCALLY, what=what))
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
@@ -199,8 +198,7 @@ class Procedures:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)
-                status = inverter.describe()
-                raise DriveError(Report(Cause.NO_STANDBY, what=what, status=status))
+                raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
             await self._bus.sleep(confirmation.LOOK_PERIOD)

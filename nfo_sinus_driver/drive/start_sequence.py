@@ -86,8 +86,7 @@ class StartSequence:
             if wanted(seen):
                 return
             if seen.faulted:
-                status = self._inverter.describe()
-                raise DriveError(Report(Cause.START_FAULTED, status=status))
+                raise DriveError(self._inverter.report(Cause.START_FAULTED))
             # in standby after the start delay it has forgotten the start, and must not wait for
             # another one
             if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
@@ -97,7 +96,7 @@ class StartSequence:
                 deadline += await self._inverter.read_start_delay()
             if time.monotonic() > deadline:
                 cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
-                raise DriveError(Report(cause, status=self._inverter.describe()))
+                raise DriveError(self._inverter.report(cause))
             await self._bus.sleep(confirmation.LOOK_PERIOD)
 
     async def take_control(self, control_mode: str) -> None:

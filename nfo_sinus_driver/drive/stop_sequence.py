@@ -186,8 +186,7 @@ class StopSequence:
         self._task = None
         self._report_outcome()
         if pause:
-            status = self._inverter.describe()
-            self._inverter.tell(Severity.INFO, Report(Cause.STOP_CONFIRMED_LATE, status=status))
+            self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
@@ -199,10 +198,8 @@ class StopSequence:
                 return
             if seen is not None and not seen.faulted:
                 if seen.runs_by_bus:
-                    status = self._inverter.describe()
-                    self._inverter.tell(
-                        Severity.WARNING, Report(Cause.STARTED_AFTER_FAULT, status=status)
-                    )
+                    started = self._inverter.report(Cause.STARTED_AFTER_FAULT)
+                    self._inverter.tell(Severity.WARNING, started)
                 return
 
     async def _rest(self) -> None:
@@ -281,11 +278,10 @@ class StopSequence:
 
     def _why_not(self, seen: InverterStatus, refusal: Refused | None) -> Report | None:
         """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
-        status = self._inverter.describe()
         if seen.tuning and refusal:
-            return Report(Cause.TUNING_REFUSES, status=status, error=str(refusal))
+            return self._inverter.report(Cause.TUNING_REFUSES, error=str(refusal))
         if seen.tuning:
-            return Report(Cause.TUNING_ENERGISES, status=status)
+            return self._inverter.report(Cause.TUNING_ENERGISES)
         if refusal and not seen.local:
             return report_of(refusal)
-        return Report(Cause.DRIVE_SAYS, status=status) if seen.keeps_running else None
+        return self._inverter.report(Cause.DRIVE_SAYS) if seen.keeps_running else None

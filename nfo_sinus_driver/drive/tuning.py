@@ -142,19 +142,18 @@ class Tuning:
             if seen.code != told_code or elapsed > told_at + _TELL_PERIOD:
                 told_code, told_at = seen.code, elapsed
                 progress(seen, elapsed)
-            status = inverter.describe()
             if seen.faulted:
-                return Report(Cause.TUNING_FAILED, what=what, status=status, fault=seen.listed)
+                return inverter.report(Cause.TUNING_FAILED, what=what, fault=seen.listed)
             if seen.means(Meaning.TUNED):
-                return Report(Cause.TUNED, what=what, status=status)
+                return inverter.report(Cause.TUNED, what=what)
             if seen.means(Meaning.TUNING):
                 begun = True
             elif access.aborted:
-                return Report(Cause.TUNING_STOPPED, what=what, status=status)
+                return inverter.report(Cause.TUNING_STOPPED, what=what)
             elif begun:
-                return Report(Cause.TUNING_CUT_SHORT, what=what, status=status)
+                return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
             elif elapsed > confirmation.TIMEOUT:
-                return Report(Cause.TUNING_DOES_NOT_BEGIN, what=what, status=status)
+                return inverter.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
             if elapsed > _LONGEST:
-                raise DriveError(Report(Cause.TUNING_ENDLESS, what=what, status=status))
+                raise DriveError(inverter.report(Cause.TUNING_ENDLESS, what=what))
             await self._bus.sleep(_LOOK_PERIOD)

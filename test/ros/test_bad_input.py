@@ -222,7 +222,7 @@ def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) ->
     refused = client.enable()
     assert not refused.success
     sensor = 'thermistor' if bench.way.tells else 'temperature sensor'
-    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '~/fault_ack'):
+    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '/nfo_sinus/fault_ack'):
         assert part in refused.message
     assert drive.state()['scmd'] == 0
     assert not drive.state()['turning']

@@ -63,7 +63,7 @@ def test_connect_says_who_answers(rig: Rig) -> None:
     assert rig.notes.told(Cause.CONNECTED, Severity.INFO)
     assert rig.notes.told(identity, Severity.INFO)
     # a second time is no harm
-    assert rig.drive.connect().result(PATIENCE) == identity
+    assert str(rig.drive.connect().result(PATIENCE)) == identity
     assert not rig.drive.armed
 
 
@@ -211,7 +211,7 @@ def test_stops_of_a_drive_with_a_fault(rig: Rig) -> None:
     rig.simulator.inject('fault', 5)
     wait_until(lambda: not rig.drive.armed)
     for command in (rig.drive.stop, rig.drive.quick_stop):
-        assert command().result(PATIENCE).startswith('stopped by fault 5 Overload')
+        assert said(command().result(PATIENCE)).startswith('stopped by fault 5 Overload')
 
 
 def test_stop_of_a_drive_that_is_not_ours(rig: Rig) -> None:

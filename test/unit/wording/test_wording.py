@@ -114,8 +114,9 @@ def test_every_sentence_is_given_what_it_needs() -> None:
     for _, tree in trees(REPORTING):
         named: set[Cause] = set()
         for call in ast.walk(tree):
-            if isinstance(call, ast.Call) and name_of(call) == 'Report':
+            if isinstance(call, ast.Call) and name_of(call) in ('Report', 'report'):
                 values = {str(keyword.arg) for keyword in call.keywords}
+                values |= {'status'} if name_of(call) == 'report' else set()
                 causes = causes_in(call.args[0])
                 given += [(cause, values) for cause in causes]
                 general += [] if causes else [values]
