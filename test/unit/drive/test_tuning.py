@@ -80,7 +80,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_told(rig: Rig, procedure)
     changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
     assert changed
     assert {change.key: (change.old, change.new) for change in result.changes} == changed
-    assert str(result.changes[0]) in str(result)
+    assert str(result.changes[0]) in said(result)
 
 
 def test_control_is_given_back_as_it_was_found(rig: Rig) -> None:

@@ -56,9 +56,9 @@ def name_of(call: ast.Call) -> str:
 
 def texts(node: ast.AST) -> Iterator[str]:
     """What a program says, but for docstrings, its own mistakes and its log of these."""
-    if isinstance(node, ast.Call) and name_of(node) in SPEAKING:
-        return
-    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+    mistake = isinstance(node, ast.Call) and name_of(node) in SPEAKING
+    docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    if mistake or docstring or isinstance(node, ast.Assert):
         return
     if isinstance(node, ast.JoinedStr):
         yield ''.join(
