@@ -46,6 +46,7 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LinkError
@@ -61,7 +62,7 @@ RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 class Acme:
     """The registers of an Acme at the other end of a line; it refuses what it does not have."""
 
-    space = 'modbus'
+    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self) -> None:
         self.registers = dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0)
