@@ -228,6 +228,13 @@ def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) ->
     assert not drive.state()['turning']
 
 
+def test_what_to_call_is_named_in_full_wherever_it_is(bench: Bench) -> None:
+    bench.simulator().inject('fault', 4, standing=True)
+    bench.driver('-r', '__ns:=/line1', '-r', '~/fault_ack:=reset')
+    refused = bench.client('/line1/nfo_sinus').connected().enable()
+    assert refused.message.endswith('then call /line1/reset')
+
+
 @needs('parameters')
 def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.mode=Speed')
