@@ -293,7 +293,7 @@ def test_monitor(nfo: Nfo, bench: Bench) -> None:
     assert 0.0 < least <= median <= p99 <= most
     assert int(cells[8]) > 20 and cells[9:] == ['0', '0', '0', '0']
     assert bench.writes() == []
-    assert bench.drive().ack_reads == 0
+    assert bench.drive().control_unit.ack_reads == 0
     assert bench.drive().motor.driven
 
 
@@ -335,7 +335,7 @@ def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
     assert facts['connected'] and facts['code'] == 5 and facts['kind'] == 'fault'
     assert facts['frequency'] == 0.0
     assert bench.writes() == []
-    assert bench.drive().inv_st == 5
+    assert bench.drive().control_unit.status_code == 5
 
 
 def test_monitor_tells_of_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> None:
