@@ -31,6 +31,7 @@ from nfo_sinus_driver.cli.values import parse_value
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 
 
@@ -59,10 +60,11 @@ def set_(options: argparse.Namespace) -> int:
                     exact = drive.parameters.exact(name, value)
                     barred = is_barred(name, drive.model, options)
                     if barred and not same(exact, values.get(name)):
-                        raise ParameterError(f'{name}: {BARRED}')
-                    drive.parameters.admit(name, value)
+                        wrong.append(f'{name}: {BARRED}')
+                    else:
+                        drive.parameters.admit(name, value)
                 except ParameterError as error:
-                    wrong.append(str(error))
+                    wrong.append(say(error))
         if wrong:
             raise Trouble(listed('nothing was written:', wrong))
         changes = drive.parameters.change(wanted).result()

@@ -23,18 +23,22 @@ import time
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.cli.helm import NO_TIMEOUT
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
 from nfo_sinus_driver.cli.status_line import as_line
+from nfo_sinus_driver.cli.stopping import RELEASED
 from nfo_sinus_driver.cli.stopping import Stopping
 from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.drive import Report
 
 #: What connecting to a drive says, and what does not matter to who stops it or acknowledges.
-_MUTE = ('the drive has no time-out', 'the motor runs under bus control from before', 'fault ')
+_MUTE = {*NO_TIMEOUT, Cause.FOUND_RUNNING, Cause.FAULT_APPEARED}
 #: How long a drive may take to answer to all that a command consists of, s.
 _LONGEST = 15.0
 _STATUS_PERIOD = 0.2
@@ -47,7 +51,7 @@ def stop(options: argparse.Namespace) -> int:
             done, answer = _stop(helm, options)
         except DriveError as error:
             done, answer = False, (
-                f'the stop is NOT confirmed: {in_our_words(str(error))}. '
+                f'the stop is NOT confirmed: {say(error)}. '
                 'Use the RUN input or the emergency stop if the motor turns'
             )
         if options.json:
@@ -85,15 +89,15 @@ def _stop(helm: Helm, options: argparse.Namespace) -> tuple[bool, str]:
     stopping = Stopping(helm, drive, show)
     helm.finish(drive.connect(), _LONGEST)
     drive.activate()
-    if not stopping.stop(quick=options.quick):
-        return False, stopping.answer
-    how = stopping.answer
+    stopped = stopping.stop(quick=options.quick)
+    how = say(stopping.answer)
+    if not stopped:
+        return False, how
     if not options.json:
         helm.screen.say(how)
-    given_back = stopping.give_back()
-    if not given_back:
-        return False, f'{how}, but control was not given back'
-    return True, stopping.answer
+    if not stopping.give_back():
+        return False, f'{how}, but control was not released'
+    return True, say(stopping.answer)
 
 
 def _in_charge(helm: Helm) -> Drive:
@@ -111,18 +115,20 @@ def ack(options: argparse.Namespace) -> int:
         remote.identify(thoroughly=False)
         seen = remote.look()
         told = remote.inverter.describe()
-        error = ''
+        error: DriveError | Trouble | None = None
+        acknowledged = False
         if not seen.faulted and seen.kind is Kind.STATUS:
-            answer = f'nothing to acknowledge ({told})'
+            answer = say(Report(Cause.NOTHING_TO_ACKNOWLEDGE, status=told))
         else:
             try:
-                answer = _acknowledge(helm, seen)
-            except DriveError as failure:
-                error = answer = in_our_words(str(failure))
+                answer = say(_acknowledge(helm, seen))
+                acknowledged = True
+            except (DriveError, Trouble) as failure:
+                error, answer = failure, say(failure)
         if options.json:
             now = remote.look()
             facts = {
-                'acknowledged': answer.startswith('acknowledged'),
+                'acknowledged': acknowledged,
                 'code': seen.code,
                 'text': remote.inverter.text_of(seen.code),
                 'code_now': now.code,
@@ -132,20 +138,21 @@ def ack(options: argparse.Namespace) -> int:
             helm.screen.put(json.dumps(facts, ensure_ascii=False))
         elif not error:
             helm.screen.put(answer)
-    if error:
-        raise Trouble(error)
+    if error is not None:
+        raise Trouble(answer)
     return 0
 
 
-def _acknowledge(helm: Helm, seen: InverterStatus) -> str:
+def _acknowledge(helm: Helm, seen: InverterStatus) -> Report:
     """
     Acknowledge, and leave nothing behind that could start the motor.
 
-    :raises DriveError: the fault still stands, or the motor runs.
+    :raises DriveError: the fault is still active.
+    :raises Trouble: the motor runs.
     """
     remote = helm.remote
     if seen.driven:
-        raise DriveError(
+        raise Trouble(
             f'the motor runs ({remote.inverter.describe()}), and to acknowledge would stop it: '
             'type nfo-sinus stop first'
         )
@@ -154,4 +161,4 @@ def _acknowledge(helm: Helm, seen: InverterStatus) -> str:
     answer = helm.finish(drive.acknowledge(), _LONGEST)
     # nobody is here afterwards to keep the drive from timing out
     released = helm.finish(drive.disconnect(1.0), _LONGEST)
-    return f'{answer}; control given back' if 'given back' in released else answer
+    return Report(Cause.CONTROL_RELEASED, stop=answer) if released.cause in RELEASED else answer

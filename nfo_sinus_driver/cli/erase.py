@@ -20,12 +20,14 @@ import argparse
 from collections.abc import Sequence
 import json
 
+from nfo_sinus_driver.cli.helm import NO_TIMEOUT
 from nfo_sinus_driver.cli.helm import at_the_helm
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.question import require_yes
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import LogEntry
 
-_MUTE = ('the drive has no time-out', 'fault ')
+_MUTE = {*NO_TIMEOUT, Cause.FAULT_APPEARED}
 _LONGEST = 15.0
 
 

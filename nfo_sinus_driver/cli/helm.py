@@ -20,7 +20,6 @@ import argparse
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Iterator
-from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
 import sys
@@ -32,10 +31,13 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -51,6 +53,12 @@ _LOOK_PERIOD = 0.02
 _POLL_RATE = 20.0
 
 
+#: What connecting says of a drive that has no time-out of its own.
+NO_TIMEOUT = frozenset(
+    (Cause.NO_OWN_TIMEOUT, Cause.OWN_TIMEOUT_OFF, Cause.OWN_TIMEOUT_STOPS_NOTHING)
+)
+
+
 def spoken(name: str) -> str:
     """Return a signal as a person knows it."""
     return {'SIGINT': 'Ctrl-C', 'SIGTSTP': 'Ctrl-Z'}.get(name, name)
@@ -61,35 +69,36 @@ class Ended(Exception):
     Something ended it; the message says what.
 
     :ivar status: the exit status, if all goes well from then on.
+    :ivar signal: the name of the signal that did it; ``''``: something else did.
     """
 
-    def __init__(self, why: str, status: int) -> None:
+    def __init__(self, why: str, status: int, signal: str = '') -> None:
         super().__init__(why)
         self.status = status
+        self.signal = signal
 
 
 class Ear:
     """
     Hears what a drive has to tell, on the worker of the bus.
 
-    :param mute: how events begin that are of no interest here.
+    :param mute: of what nothing is said here.
     """
 
-    def __init__(self, say: Callable[[str], None], mute: Sequence[str]) -> None:
-        self._say = say
-        self._mute = tuple(mute)
-        #: What was said to a person.
-        self.told: list[str] = []
+    def __init__(self, show: Callable[[str], None], mute: Collection[Cause]) -> None:
+        self._show = show
+        self._mute = mute
+        #: What an operator was told.
+        self.told: list[Report] = []
         #: What was measured last.
         self.values: dict[Role, float] = {}
 
-    def on_event(self, severity: Severity, text: str) -> None:
-        """Pass on what a person has to know."""
-        if severity is Severity.INFO or text.startswith(self._mute):
+    def on_event(self, event: Event) -> None:
+        """Pass on what an operator has to know."""
+        if event.severity is Severity.INFO or event.cause in self._mute:
             return
-        text = in_our_words(text)
-        self.told.append(text)
-        self._say(text)
+        self.told.append(event.report)
+        self._show(say(event.report))
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Nothing: it is looked at when it is shown."""
@@ -113,7 +122,7 @@ class Helm:
     """
 
     def __init__(
-        self, session: Session, screen: Screen, signals: HeldSignals, mute: Sequence[str]
+        self, session: Session, screen: Screen, signals: HeldSignals, mute: Collection[Cause]
     ) -> None:
         self._session = session
         self._signals = signals
@@ -155,7 +164,7 @@ class Helm:
             show()
             name = self.signal(_LOOK_PERIOD)
             if name:
-                raise Ended(name, 130)
+                raise Ended(name, 130, name)
         return future.result()
 
     def finish(
@@ -170,19 +179,19 @@ class Helm:
         while not future.done():
             show()
             if time.monotonic() > deadline:
-                raise DriveError(f'no answer within {timeout:g} s')
+                raise DriveError(Report(Cause.TOO_LATE, timeout=timeout))
             self.signal(_LOOK_PERIOD)
         return future.result()
 
 
 @contextlib.contextmanager
 def at_the_helm(
-    options: argparse.Namespace, *, mute: Sequence[str] = (), live: bool = False
+    options: argparse.Namespace, *, mute: Collection[Cause] = (), live: bool = False
 ) -> Iterator[Helm]:
     """
     Open the line to command a drive; signals are held while the ``with`` block lasts.
 
-    :param mute: how events begin that are of no interest.
+    :param mute: of what nothing is said.
     :param live: whether the status may be one line of a terminal.
     """
     live = live and sys.stdout is not None and sys.stdout.isatty()

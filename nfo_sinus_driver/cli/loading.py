@@ -33,6 +33,7 @@ from nfo_sinus_driver.cli.trouble import Interrupted
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
@@ -95,10 +96,10 @@ class Loading:
     def _tell_how_far(self, error: Exception) -> None:
         """Say what was written and what was not."""
         left = [key for key in self._data if key not in self._written]
-        # a message of the writer begins with the parameter that it is about
-        failed = [key for key in left if str(error).startswith(f'{key}:')]
-        left = [key for key in left if key not in failed]
-        remark(str(error))
+        refused = error.key if isinstance(error, ParameterError) else ''
+        failed = [key for key in left if key == refused]
+        left = [key for key in left if key != refused]
+        remark(say(error))
         if self._written:
             remark(listed('written:', map(str, self._written.values())))
         if failed:
@@ -121,7 +122,8 @@ class Loading:
             if back:
                 remark(listed('put back:', map(str, back.values())))
             lost = (key for key in stained if key not in back)
-            return listed(f'NOT all put back, {error}; not as it was:', map(self._state, lost))
+            head = f'NOT all put back, {say(error)}; not as it was:'
+            return listed(head, map(self._state, lost))
         return f'not loaded: all that was written is put back ({len(back)}), the drive is as it was'
 
     def _wants_it_back(self) -> bool:

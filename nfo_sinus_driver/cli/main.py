@@ -44,7 +44,7 @@ from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.tune import tune
 from nfo_sinus_driver.cli.watch import monitor
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
@@ -86,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         remark(str(error))
         return _USAGE
     except (Trouble, DriveError) as error:
-        remark(in_our_words(str(error)))
+        remark(say(error))
         return failed
     except BrokenPipeError:
         # who read the output has gone, and Python would complain of it once more at the end

@@ -32,13 +32,21 @@ from nfo_sinus_driver.cli.stopping import SHUTDOWN_TIMEOUT
 from nfo_sinus_driver.cli.stopping import Stopping
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1
 #: How long the word may take why it was stopped, s.
 _LONGEST_WORD = 1.0
+#: Why a motor follows set-points no more.
+_ENDS = (
+    Cause.STOPPED_BECAUSE,
+    Cause.STOPPED_BECAUSE_OF_FAULT,
+    Cause.LOST,
+    Cause.LOST_IN_USE,
+)
 _FAILED = 1
 _INTERRUPTED = 130
 
@@ -82,17 +90,17 @@ class _Ride:
         """
         self._require_admitted()
         # whatever happens from here on, it is stopped
-        status, why = _FAILED, 'an error in this command'
+        status, why, signal = _FAILED, 'an error in this command', ''
         try:
             self._start()
             self._follow()
         except Ended as end:
-            status, why = end.status, str(end)
+            status, why, signal = end.status, str(end), end.signal
         except DriveError as error:
-            why = in_our_words(str(error))
+            why = say(error)
             self._screen.say(why)
         finally:
-            confirmed = self._end(why)
+            confirmed = self._end(why, signal)
         return status if confirmed else _FAILED
 
     def _require_admitted(self) -> None:
@@ -107,7 +115,7 @@ class _Ride:
         if seen.faulted:
             fault = seen.listed
             raise Trouble(
-                f'fault {told} stands: {fault.description}. {fault.remedy}; '
+                f'fault {told} is active: {fault.description}. {fault.remedy}; '
                 'then type nfo-sinus ack'
             )
         mode = remote.do(remote.inverter.read_control_mode)
@@ -155,7 +163,7 @@ class _Ride:
             if name:
                 # without --for this is how one ends it
                 wanted = name == 'SIGINT' and options.seconds is None
-                raise Ended(name, 0 if wanted else _INTERRUPTED)
+                raise Ended(name, 0 if wanted else _INTERRUPTED, name)
             if not drive.armed:
                 raise Ended(self._why_disarmed(), _FAILED)
             if self._screen.gone:
@@ -171,32 +179,33 @@ class _Ride:
         """Return why the motor follows set-points no more; a person has been told."""
         deadline = time.monotonic() + _LONGEST_WORD
         while time.monotonic() < deadline:
-            for text in reversed(self._helm.ear.told):
-                if text.startswith(('stopped: ', 'lost: ')):
-                    return text
+            for report in reversed(self._helm.ear.told):
+                if report.cause in _ENDS:
+                    return say(report)
             self._helm.signal(0.01)
         return 'it was stopped'
 
-    def _end(self, why: str) -> bool:
+    def _end(self, why: str, signal: str) -> bool:
         """Stop the motor and give control back; true when all of it was confirmed."""
         if self._drive.identity is None:
             return True
         confirmed = False
         try:
-            if why.startswith('SIG'):
-                self._screen.say(f'{spoken(why)}: stopping the motor')
+            if signal:
+                self._screen.say(f'{spoken(signal)}: stopping the motor')
             confirmed = self._stopping.stop()
             if confirmed:
-                self._screen.say(self._stopping.answer)
                 told = self._stopping.answer
+                self._screen.say(say(told))
                 # who ended it so is in a hurry, or not there any more
-                hurry = (why.startswith('SIG') and why != 'SIGINT') or self._screen.gone
+                hurry = signal not in ('', 'SIGINT') or self._screen.gone
                 confirmed = self._stopping.give_back(SHUTDOWN_TIMEOUT if hurry else math.inf)
                 if confirmed and self._stopping.answer != told:
-                    self._screen.say(self._stopping.answer)
+                    self._screen.say(say(self._stopping.answer))
         finally:
             if self._options.json:
-                facts = {'ended': why, 'stop_confirmed': confirmed, 'stop': self._stopping.answer}
+                stop = say(self._stopping.answer)
+                facts = {'ended': why, 'stop_confirmed': confirmed, 'stop': stop}
                 self._screen.put(json.dumps(facts, ensure_ascii=False))
         return confirmed
 

@@ -37,6 +37,7 @@ from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import listed
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS
@@ -173,7 +174,7 @@ def _ask(drive: Remote) -> dict[str, str] | None:
                 'model': AUTO,
             }
         if not isinstance(cause, NoAnswer):
-            remark(str(error))
+            remark(say(error))
         return None
     return {
         'product': identity.model or drive.model.name,

@@ -34,12 +34,16 @@ from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import Listener
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
@@ -86,9 +90,9 @@ class Remote:
         except DriveError as error:
             if not isinstance(error.__cause__, Refused):
                 raise
-            raise DriveError(
-                f'{self} answers, but not as a {self.model.name} does ({error}): is --model right?'
-            ) from error.__cause__
+            model, why = self.model.name, error.report
+            other = Report(Cause.NOT_THE_MODEL, drive=str(self), model=model, why=why)
+            raise DriveError(other) from error.__cause__
 
     def look(self) -> InverterStatus:
         """Read the status, without acknowledging anything."""
@@ -117,10 +121,10 @@ class Remote:
 
     # --- what the layers below have to tell ---------------------------------------------------
 
-    def on_event(self, severity: Severity, text: str) -> None:
-        """Pass on what a person has to know."""
-        if severity is not Severity.INFO:
-            remark(text)
+    def on_event(self, event: Event) -> None:
+        """Pass on what an operator has to know."""
+        if event.severity is not Severity.INFO:
+            remark(say(event.report))
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Nothing: nobody polls."""

@@ -22,9 +22,11 @@ import math
 import time
 
 from nfo_sinus_driver.cli.helm import Helm
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
 
 #: How long an answer of the drive layer may take, s; it gives up earlier by itself.
 _LONGEST_ANSWER = 10.0
@@ -35,6 +37,9 @@ SHUTDOWN_TIMEOUT = 4.0
 _LOOK_PERIOD = 0.05
 #: How long a poll may take, s.
 _LONGEST_POLL = 2.0
+
+#: How control was released.
+RELEASED = (Cause.CONTROL_RELEASED, Cause.COASTED_AND_RELEASED)
 
 _EMERGENCY = 'use the RUN input or the emergency stop if the motor turns'
 
@@ -50,17 +55,17 @@ class Stopping:
         self._helm = helm
         self._drive = drive
         self._show = show
-        #: What the drive answered.
-        self.answer = ''
+        #: What the drive answered, or what became of its stop.
+        self.answer: Report | None = None
 
     def stop(self, *, quick: bool = False) -> bool:
         """Stop it; true when the drive has confirmed it. It says loudly when it has not."""
-        say, drive = self._helm.screen.say, self._drive
+        show, drive = self._helm.screen.say, self._drive
         try:
             self.answer = self._finish(drive.quick_stop() if quick else drive.stop())
         except DriveError as error:
-            self.answer = in_our_words(str(error))
-            say(f'{self.answer}: {_EMERGENCY}')
+            self.answer = error.report
+            show(f'{say(error)}: {_EMERGENCY}')
             return self.confirmed_late()
         return True
 
@@ -80,10 +85,10 @@ class Stopping:
             patience = 0.0 if self._may_turn(begun) else 1.0
             released = self._finish(self._drive.disconnect(patience))
         except DriveError as error:
-            self._helm.screen.say(f'control was not given back: {in_our_words(str(error))}')
+            self._helm.screen.say(f'control was not released: {say(error)}')
             return False
-        if 'given back' in released or 'ramp' in released:
-            self.answer = in_our_words(released)
+        if released.cause in (*RELEASED, Cause.LEFT_TO_RAMP):
+            self.answer = released
         return True
 
     def _may_turn(self, since: float) -> bool:
@@ -96,21 +101,23 @@ class Stopping:
 
     def confirmed_late(self) -> bool:
         """Let a stop be tried on for a while; true when the drive has confirmed it."""
-        say, drive = self._helm.screen.say, self._drive
+        show, drive = self._helm.screen.say, self._drive
         deadline = time.monotonic() + _LAST_TRIES
         while drive.stop_unconfirmed and time.monotonic() < deadline:
             self._show()
             if self._helm.signal(_LOOK_PERIOD):
                 break
         if drive.stop_unconfirmed:
-            say(
+            show(
                 'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
                 'the emergency stop; nfo-sinus stop tries again'
             )
             return False
-        self.answer = 'the stop is confirmed now'
-        say(self.answer)
+        seen = drive.snapshot
+        status = f'{seen.status.code} {seen.text}' if seen.status is not None else ''
+        self.answer = Report(Cause.STOP_CONFIRMED_LATE, status=status)
+        show(say(self.answer))
         return True
 
-    def _finish(self, future: Future[str]) -> str:
+    def _finish(self, future: Future[Report]) -> Report:
         return self._helm.finish(future, _LONGEST_ANSWER, self._show)

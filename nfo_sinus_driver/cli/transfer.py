@@ -38,6 +38,7 @@ from nfo_sinus_driver.cli.values import is_barred
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
@@ -149,7 +150,7 @@ def _differing(
             if not options.dry_run:
                 drive.parameters.admit(key, value)
         except (ParameterError, ValueError) as error:
-            wrong.append(str(error))
+            wrong.append(say(error))
         else:
             found[key] = data
     if wrong:

@@ -20,6 +20,7 @@ import argparse
 import json
 import time
 
+from nfo_sinus_driver.cli.helm import NO_TIMEOUT
 from nfo_sinus_driver.cli.helm import Ended
 from nfo_sinus_driver.cli.helm import Helm
 from nfo_sinus_driver.cli.helm import at_the_helm
@@ -28,9 +29,11 @@ from nfo_sinus_driver.cli.question import require_yes
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.stopping import Stopping
 from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.wording import in_our_words
+from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Tuned
 from nfo_sinus_driver.drive.procedure import require_known
 
@@ -44,6 +47,14 @@ PROCEDURES = {
 _LONGEST = 15.0
 _STATUS_PERIOD = 0.2
 _INTERRUPTED = 130
+#: What is told as the result.
+_OUTCOMES = (
+    Cause.TUNING_CHANGED,
+    Cause.TUNING_FAILED,
+    Cause.TUNING_STOPPED,
+    Cause.TUNING_CUT_SHORT,
+    Cause.TUNING_DOES_NOT_BEGIN,
+)
 
 
 def tune(options: argparse.Namespace) -> int:
@@ -57,8 +68,7 @@ def tune(options: argparse.Namespace) -> int:
         if drive.look().driven:
             raise Trouble(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
     require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
-    # what becomes of it is told as the result
-    mute = ('the drive has no time-out', 'fault ', what)
+    mute = {*NO_TIMEOUT, Cause.FAULT_APPEARED, *_OUTCOMES}
     with at_the_helm(options, mute=mute, live=not options.json) as helm:
         return _Tuning(helm, options, procedure).go()
 
@@ -66,7 +76,7 @@ def tune(options: argparse.Namespace) -> int:
 def _warning(procedure: Procedure) -> str:
     if procedure is Procedure.CALCULATE:
         return 'the drive changes its motor parameters.'
-    return 'the motor gets current and may turn, for minutes.'
+    return 'the motor is energised and may turn, for minutes.'
 
 
 class _Tuning:
@@ -89,10 +99,11 @@ class _Tuning:
         try:
             tuned, status = self._tuned()
         except Ended as end:
-            tuned, status = Tuned(False, f'{end}: not begun', ()), end.status
+            how = Report(Cause.INTERRUPTED, signal=str(end))
+            tuned, status = Tuned(False, how, ()), end.status
         except DriveError as error:
-            tuned = Tuned(False, str(error), ())
-        text = in_our_words(tuned.text)
+            tuned = Tuned(False, error.report, ())
+        text = say(tuned.how)
         if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
             # a fault keeps it still; else nobody tries on when this command has ended
             screen.say(text)

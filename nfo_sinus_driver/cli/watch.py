@@ -33,6 +33,7 @@ from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.statistics_table import as_facts
 from nfo_sinus_driver.cli.statistics_table import statistics_table
+from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import PortError
@@ -94,7 +95,7 @@ def _show(
         if isinstance(error.__cause__, PortError):
             raise
         facts: dict[str, object] = {'connected': False}
-        text = str(error)
+        text = say(error)
         answered = False
     else:
         session.polled(drive.address)

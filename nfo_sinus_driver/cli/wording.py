@@ -12,30 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the drive layer says, in the words of this tool: it speaks of services and parameters."""
+"""What the drive layer reports, in sentences that name what can be typed here."""
 
 from __future__ import annotations
 
-#: What it says, and what is typed here instead; the longer ones first.
-_WORDS = (
-    ('call ~/fault_ack, then ~/enable to go on', 'type nfo-sinus ack, then run it again'),
-    ('call ~/enable to go on', 'run it again to go on'),
-    ('call ~/fault_ack', 'type nfo-sinus ack'),
-    ('~/fault_ack', 'nfo-sinus ack'),
-    ('~/enable', 'nfo-sinus run'),
-    ('expected_control_mode in the driver', 'give another --control-mode'),
-    ('more than lost_after', 'more than a silence after which it is lost'),
-    ('set drive_timeout', 'give --drive-timeout'),
-    ('drive_timeout', '--drive-timeout'),
-    ('set model to auto or to what it is', 'give the right --model'),
-    ('if this driver is killed', 'if this command is killed'),
-    ('the driver is ending', 'this command is ending'),
-    ('; tried again for ever', ''),
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.wording import Calls
+from nfo_sinus_driver.wording import sentence
+
+_CALLS = Calls(
+    acknowledge='type nfo-sinus ack',
+    enable='run it again',
+    program='command',
+    drive_timeout='--drive-timeout',
+    set_drive_timeout='give --drive-timeout',
+    set_control_mode='give another --control-mode',
+    set_model='give the right --model',
 )
 
 
-def in_our_words(text: str) -> str:
-    """Return a message of the drive layer so that it names what can be typed here."""
-    for theirs, ours in _WORDS:
-        text = text.replace(theirs, ours)
-    return text
+def say(what: Report | Exception | None) -> str:
+    """Return what there is to say; an error that is no drive's speaks for itself."""
+    if what is None:
+        return ''
+    if isinstance(what, DriveError):
+        what = what.report
+    return sentence(what, _CALLS) if isinstance(what, Report) else str(what)

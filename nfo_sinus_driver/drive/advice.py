@@ -12,14 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a failed transaction or a status means to a person, and what to check."""
+"""What a failed transaction or a status means."""
 
 from __future__ import annotations
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import GatewaySilent
@@ -29,107 +31,78 @@ from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
-_SILENCE_ADVICE = (
-    'check in this order: BusType in the drive (NFO, which is classic, is the factory setting; '
-    'MbusRtu or MbusAsc for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
-)
-#: Why a drive does not start that seems to be told to.
-NO_RUN_INPUT = (
-    'the drive stays in standby: its RUN input is not active '
-    '(DIN1; strap it to +24 V or close its safety contact)'
-)
 
-
-def explain(error: LinkError, address: int, *, known: bool) -> str:
+def explain(error: LinkError, address: int, *, known: bool) -> Report:
     """
     Return what a failed transaction means.
 
     :param known: the drive has answered before, so that its settings are right [C93].
     """
     if isinstance(error, (PortError, Refused, GatewaySilent, NoPath)):
-        return str(error)
+        return Report(Cause.LINE_FAILED, error=str(error))
     if known:
-        return f'{error}: check the cable and that the drive has power'
+        return Report(Cause.NOT_REACHED, error=str(error))
     if isinstance(error, NoAnswer):
-        return f'nobody answers at address {address}: {_SILENCE_ADVICE}'
-    return (
-        f'what comes from address {address} is no answer ({error}): check baud rate '
-        'and parity, that no other master is on the line, and the wiring'
-    )
+        return Report(Cause.NO_RESPONSE, address=address)
+    return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
-def explain_fault(inverter: Inverter, seen: InverterStatus) -> str:
-    """Return which fault stands, what it means and what to do about its cause."""
-    fault = seen.listed
-    return f'fault {inverter.describe()}: {fault.description}. {fault.remedy}'
+def report_of(error: Exception) -> Report:
+    """Return what an error says, as far as that is known."""
+    if isinstance(error, DriveError):
+        return error.report
+    if isinstance(error, LinkError):
+        return Report(Cause.LINE_FAILED, error=str(error))
+    return Report(Cause.DRIVER_ERROR, error=repr(error))
+
+
+def explain_fault(inverter: Inverter, seen: InverterStatus) -> Report:
+    """Return which fault is active, what it means and what to do about its cause."""
+    return inverter.report(Cause.FAULT, fault=seen.listed)
 
 
 def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
     """
-    See to it that no fault stands, before the motor gets current.
+    See to it that no fault is active before the motor is energised.
 
-    :raises DriveError: one does.
+    :raises DriveError: one is.
     """
     if seen.faulted:
-        fault = seen.listed
-        raise DriveError(
-            f'fault {inverter.describe()} stands: {fault.description}. {fault.remedy}; '
-            'then call ~/fault_ack'
-        )
+        raise DriveError(inverter.report(Cause.FAULT_FORBIDS, fault=seen.listed))
 
 
-def explain_stop(inverter: Inverter, seen: InverterStatus, control_mode: str) -> str:
+def explain_stop(
+    inverter: Inverter, seen: InverterStatus, control_mode: str
+) -> Report | None:
     """
-    Return why the motor no longer follows us and what to do, before it is enabled again.
+    Return why the motor no longer follows us, before it is enabled again.
 
     :param control_mode: the one in which it was enabled.
-    :returns: ``''`` if it does follow.
+    :returns: ``None`` if it does follow.
     """
-    told = inverter.describe()
     if inverter.control_mode != control_mode:
-        return (
-            f'the control mode was changed to {inverter.control_mode or "?"} at the drive, and '
-            f'set-points are in {inverter.unit or "another unit"} now: check what sends them'
-        )
+        mode, unit = inverter.control_mode, inverter.unit
+        return Report(Cause.CONTROL_MODE_CHANGED, mode=mode, unit=unit)
     if seen.faulted:
         return explain_fault(inverter, seen)
+    cause = None
     if seen.state is State.NOT_READY_TO_SWITCH_ON:
-        return f'the drive is starting ({told}): it was switched off and on; check its mains'
-    if not seen.from_bus:
-        return _explain_loss_of_control(inverter, seen)
-    if Fact.RUN_INPUT_MISSING in seen.facts:
-        return f'the RUN input (DIN1) of the drive was lost ({told}): close it'
-    if not seen.runs:
-        return (
-            f'the drive stopped by itself ({told}). Either its RUN input (DIN1) was lost or '
-            'another master stopped it: close the input'
-        )
-    return ''
+        cause = Cause.DRIVE_STARTING
+    elif not seen.from_bus:
+        cause = _why_control_is_lost(inverter, seen)
+    elif Fact.RUN_INPUT_MISSING in seen.facts:
+        cause = Cause.RUN_INPUT_LOST
+    elif not seen.runs:
+        cause = Cause.STOPPED_BY_ITSELF
+    return cause and inverter.report(cause)
 
 
-def explain_loss(inverter: Inverter) -> str:
-    """Return what became of a drive that was lost under our control and is back without it."""
-    return (
-        f'the bus has lost control meanwhile ({inverter.describe()}). The drive was switched off '
-        'and on, or somebody used its keypad: check its mains; then call ~/enable to go on'
-    )
-
-
-def _explain_loss_of_control(inverter: Inverter, seen: InverterStatus) -> str:
-    told = inverter.describe()
+def _why_control_is_lost(inverter: Inverter, seen: InverterStatus) -> Cause:
     if seen.means(Meaning.TERMINALS):
-        return f'the terminals have control now ({told}): press STOP at the drive'
+        return Cause.TERMINALS_IN_CONTROL
     if seen.means(Meaning.KEYPAD):
-        return f'the keypad has control now and runs the motor ({told}): press STOP there'
+        return Cause.KEYPAD_IN_CONTROL
     if seen.runs:
         # the current limit, for one, shows instead of who runs it
-        return f'keypad or terminals have control now and run the motor ({told}): press STOP there'
-    if inverter.was_silent:
-        return (
-            f'the drive did not answer for a moment, and the bus has lost control ({told}). It was '
-            'switched off and on: check its mains'
-        )
-    return (
-        f'the bus has lost control ({told}). Somebody pressed STOP at the keypad, or another '
-        'master took it away: find out who'
-    )
+        return Cause.OTHERS_IN_CONTROL
+    return Cause.POWER_CYCLED if inverter.was_silent else Cause.CONTROL_LOST

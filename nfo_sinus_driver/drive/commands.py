@@ -34,7 +34,9 @@ from nfo_sinus_driver.catalog import Refusal
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -75,7 +77,7 @@ async def carry_out(
             assert isinstance(refused.__cause__, Refused)
             raise refused.__cause__ from None
         except NotPossible as error:
-            raise DriveError(str(error)) from error
+            raise DriveError(Report(Cause.NOT_POSSIBLE, why=str(error))) from error
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):

@@ -20,7 +20,8 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 
@@ -49,7 +50,7 @@ class Confirmation:
         deadline = time.monotonic() + timeout
         while not wanted(await self._inverter.look(priority)):
             if time.monotonic() > deadline:
-                raise DriveError(f'the drive does not do it; it says {self._inverter.describe()}')
+                raise DriveError(self._inverter.report(Cause.NOT_CONFIRMED))
             await self._bus.sleep(LOOK_PERIOD)
 
     async def wait_for_step(self, wanted: Callable[[InverterStatus], bool]) -> None:

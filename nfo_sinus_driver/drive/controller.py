@@ -25,7 +25,6 @@ from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
-import math
 import time
 
 from nfo_sinus_driver.bus import Bus
@@ -37,32 +36,32 @@ from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.advice import explain_fault
-from nfo_sinus_driver.drive.advice import explain_loss
 from nfo_sinus_driver.drive.advice import explain_stop
+from nfo_sinus_driver.drive.advice import report_of
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.start_sequence import StartSequence
 from nfo_sinus_driver.drive.stop_sequence import StopSequence
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
-
-_STOP_PENDING = 'a stop is on its way and not confirmed yet: wait for it, then enable'
 
 
 class ExclusiveAccess:
     """
     The drive in the hands of a procedure, such as a tuning.
 
-    :param what: what for, in words.
+    :param what: its name.
     """
 
     def __init__(self, what: str) -> None:
@@ -85,7 +84,7 @@ class ExclusiveAccess:
         :raises DriveError: somebody has.
         """
         if self._aborted:
-            raise DriveError(f'{self.what} was stopped before it began')
+            raise DriveError(Report(Cause.PROCEDURE_NOT_BEGUN, what=self.what))
 
 
 class Controller:
@@ -108,7 +107,7 @@ class Controller:
         self._starting = StartSequence(bus, inverter, method)
         self._sequence = StopSequence(bus, inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
-        self._refusal: tuple[float, str] | None = None
+        self._refusal: tuple[float, Report] | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
 
@@ -210,7 +209,7 @@ class Controller:
         """
         Have the drive for a procedure: whoever stops it ends the procedure, and its preparations.
 
-        :param what: what for, in words that begin a message.
+        :param what: its name.
         :raises DriveError: somebody has the drive.
         """
         self.require_idle(what)
@@ -231,14 +230,15 @@ class Controller:
         if (self._state, ControlEvent.BEGIN) in control_state.TRANSITIONS:
             return
         if self._access is not None:
-            raise DriveError(f'{what}: {self._access.what} is going on already')
+            other = self._access.what
+            raise DriveError(Report(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other))
         if self.commanded:
-            raise DriveError(f'{what}: the motor is enabled: stop it first')
+            raise DriveError(Report(Cause.MOTOR_ENABLED, what=what))
         if self._state is ControlState.CLOSED:
-            raise DriveError('the driver is ending')
+            raise DriveError(Report(Cause.ENDING))
         if self.blocked_by_fault and self._inverter.seen is not None:
             require_no_fault(self._inverter, self._inverter.seen)
-        raise DriveError(f'{what}: a stop is not confirmed yet')
+        raise DriveError(Report(Cause.STOP_NOT_CONFIRMED_YET, what=what))
 
     async def _require_enable(self) -> None:
         """
@@ -250,20 +250,20 @@ class Controller:
         if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
             return
         if self._enabling is not None:
-            raise DriveError('it is being enabled already')
+            raise DriveError(Report(Cause.ENABLING_ALREADY))
         if self._access is not None:
-            raise DriveError(f'{self._access.what} is going on: wait for its end, or stop it')
+            raise DriveError(Report(Cause.PROCEDURE_GOES_ON, what=self._access.what))
         if self._state is ControlState.CLOSED:
-            raise DriveError('the drive is not active')
+            raise DriveError(Report(Cause.NOT_ACTIVE))
         if self.blocked_by_fault:
             seen = await self._inverter.look(Priority.SERVICE)
             self._explain_refusal(seen)
             require_no_fault(self._inverter, seen)
-        raise DriveError(_STOP_PENDING)
+        raise DriveError(Report(Cause.STOP_PENDING))
 
     # --- what a person asks for ---------------------------------------------------------------
 
-    async def enable(self, prepare: Callable[[], Awaitable[None]]) -> str:
+    async def enable(self, prepare: Callable[[], Awaitable[None]]) -> Report:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
@@ -272,7 +272,7 @@ class Controller:
         :raises DriveError: it was not done, and why; the run command is removed then.
         """
         if self._state is ControlState.ENABLED:
-            return 'is enabled already'
+            return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
@@ -283,19 +283,20 @@ class Controller:
             self._happened(ControlEvent.RUNNING)
             self._setpoint.arm(control_mode)
         except Cancelled:
-            raise DriveError('it was stopped while it was being enabled') from None
+            raise DriveError(Report(Cause.STOPPED_WHILE_ENABLING)) from None
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
             await self._settle()
-            raise DriveError(str(error) or repr(error)) from error
+            raise DriveError(report_of(error)) from error
         finally:
             self._enabling = None
         if self._inverter.settings.follows_setpoints:
-            return 'enabled; it follows set-points that arrive from now on'
-        return f'enabled; it follows its own reference ({self._inverter.settings.reference})'
+            return Report(Cause.ENABLED)
+        reference = self._inverter.settings.reference
+        return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
-    async def stop(self, patience: float | None = None) -> str:
+    async def stop(self, patience: float | None = None) -> Report:
         """
         Stop as the drive's StMode says; control is kept.
 
@@ -307,19 +308,19 @@ class Controller:
         await self._sequence.wait_confirmed(patience or None)
         seen = self._inverter.seen
         if self.blocked_by_fault:
-            return self._stopped_by_fault
+            return self._inverter.report(Cause.STOP_BLOCKED)
         if seen is not None and seen.faulted and not seen.driven:
-            return f'stopped by fault {self._inverter.describe()}'
+            return self._inverter.report(Cause.STOPPED_BY_FAULT)
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
         if not seen.driven:
-            return f'stopped ({self._inverter.describe()})'
+            return self._inverter.report(Cause.STOPPED)
         try:
             coasts = await self._inverter.coasts_to_stop()
         except LinkError:
             # the stop is confirmed all the same
-            return f'stopping ({self._inverter.describe()})'
-        return 'stopping: it coasts' if coasts else 'stopping: it ramps down'
+            return self._inverter.report(Cause.STOPPING)
+        return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
         """
@@ -338,7 +339,7 @@ class Controller:
         self._sequence.request()
         await self._sequence.wait_confirmed()
 
-    async def quick_stop(self) -> str:
+    async def quick_stop(self) -> Report:
         """
         Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
@@ -347,7 +348,7 @@ class Controller:
         :raises DriveError: the drive does not confirm it; the stop is retried until it does.
         """
         if not self._method.coasts:
-            return f'{await self.stop()} (this drive has no quick stop)'
+            return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
         may_run = self.may_run
         with self._stopped_by_itself():
             try:
@@ -367,18 +368,17 @@ class Controller:
                 seen = self._inverter.seen
                 by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
                 if isinstance(error, Refused) and by_fault:
-                    return self._stopped_by_fault
+                    return self._inverter.report(Cause.STOP_BLOCKED)
                 raise DriveError(
-                    f'the quick stop is NOT confirmed: {error} ({self._inverter.describe()}); '
-                    'trying a stop'
+                    self._inverter.report(Cause.QUICK_STOP_UNCONFIRMED, why=report_of(error))
                 ) from error
             if not may_run:
                 return self._no_control(self._inverter.seen)
             self._sequence.request()
             await self._settle()
-            return 'released: the motor coasts'
+            return Report(Cause.QUICK_STOPPED)
 
-    async def acknowledge(self) -> str:
+    async def acknowledge(self) -> Report:
         """
         Acknowledge a fault; run command and set-point are removed before, where the drive lets us.
 
@@ -389,14 +389,14 @@ class Controller:
         seen = await inverter.look(Priority.SERVICE)
         fault = seen.listed
         if not seen.faulted and fault.kind is Kind.STATUS:
-            return f'nothing to acknowledge ({inverter.describe()})'
+            return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
         may_run = self.may_run or await self._method.in_control(Priority.SERVICE)
         with self._stopped_by_itself():
             return await self._acknowledge(seen, may_run=may_run)
 
-    async def _acknowledge(self, seen: InverterStatus, *, may_run: bool) -> str:
+    async def _acknowledge(self, seen: InverterStatus, *, may_run: bool) -> Report:
         inverter = self._inverter
-        name = inverter.describe()
+        acknowledged = inverter.describe()
         if seen.state is State.FAULT_REACTION_ACTIVE:
             # what comes before FAULTED acknowledges nothing [M0 table 16]
             with contextlib.suppress(DriveError):
@@ -406,7 +406,7 @@ class Controller:
                     confirmation.TIMEOUT,
                 )
         try:
-            why = await self._method.acknowledge(seen.code, inverter.control_mode)
+            details = await self._method.acknowledge(seen.code, inverter.control_mode)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
@@ -418,14 +418,15 @@ class Controller:
             await self._settle()
         except DriveError:
             now = inverter.seen or seen
-            stands = now.listed
-            first = f'acknowledged {name}, but ' if now.code != seen.code else ''
-            raise DriveError(
-                f'{first}{inverter.describe()} still stands: {stands.description}. {stands.remedy}'
-            ) from None
-        return f'acknowledged {name} ({why})' if why else f'acknowledged {name}'
+            report = inverter.report(Cause.STILL_FAULTED, fault=now.listed)
+            if now.code != seen.code:
+                report = Report(Cause.NEXT_FAULT, acknowledged=acknowledged, still=report)
+            raise DriveError(report) from None
+        if details:
+            return Report(Cause.ACKNOWLEDGED_DETAILED, status=acknowledged, details=details)
+        return Report(Cause.ACKNOWLEDGED, status=acknowledged)
 
-    async def release(self, timeout: float) -> str:
+    async def release(self, timeout: float) -> Report:
         """
         Give control back once the motor stands.
 
@@ -438,24 +439,22 @@ class Controller:
         # it, one may stand that an acknowledgement has not come to remove yet
         seen = self._inverter.seen
         may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
-        stopped = await self.stop() if may_run else ''
+        stopped = await self.stop() if may_run else None
         if not await self._method.in_control(Priority.SERVICE):
-            return stopped or 'control is not ours'
+            return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
-            raise DriveError(
-                f'fault {self._inverter.describe()} stands and the drive takes no command: '
-                'a run command may still stand in it when the fault is acknowledged'
-            )
+            raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
+        released = Report(Cause.CONTROL_RELEASED, stop=stopped)
         try:
             await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
             if not self._inverter.sio_tot:
-                return f'{stopped}; it was left to its ramp, under bus control'
-            stopped = 'released to coast, for the time-out of the drive would end the ramp'
+                return Report(Cause.LEFT_TO_RAMP, stop=stopped)
+            released = Report(Cause.COASTED_AND_RELEASED)
         await self._method.release()
-        return f'{stopped}; control given back'
+        return released
 
     def close(self) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
@@ -468,17 +467,13 @@ class Controller:
 
     async def secure_found(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
-        seen = self._inverter.seen
+        inverter, seen = self._inverter, self._inverter.seen
         if await self._method.in_control(Priority.SERVICE):
             if seen is not None and seen.runs_by_bus and not self.stopping:
-                self._tell(
-                    Severity.WARNING,
-                    f'the motor runs under bus control from before '
-                    f'({self._inverter.describe()}): stopping it; call ~/enable to go on',
-                )
+                inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)
         elif self._lost_in_use and seen is not None and not seen.faulted:
-            self._tell(Severity.WARNING, explain_loss(self._inverter))
+            inverter.tell(Severity.WARNING, inverter.report(Cause.CONTROL_LOST_WHILE_AWAY))
         self._lost_in_use = False
 
     def connected(self) -> None:
@@ -495,7 +490,7 @@ class Controller:
         if self._refusal is not None:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
-            self._tell(Severity.WARNING, f'stopping: {reason}')
+            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPING_BECAUSE, why=reason))
         self._happened(ControlEvent.LOST)
         if self._lost_in_use:
             self._sequence.request()
@@ -504,7 +499,7 @@ class Controller:
     def alarmed_by(self, seen: InverterStatus) -> bool:
         """Tell whether a status is a reason to stop."""
         follows = self._state is ControlState.ENABLED and seen.at >= self._since
-        return follows and bool(self._why_stopped(seen))
+        return follows and self._why_stopped(seen) is not None
 
     def judge(self, seen: InverterStatus) -> bool:
         """Judge what the drive says about itself; true if a person was told of it."""
@@ -515,40 +510,36 @@ class Controller:
             return True
         if seen.at < self._since:
             return False
-        reason = ''
+        reason = None
         if self._state is ControlState.ENABLED:
             reason = self._why_stopped(seen)
         elif not (self.commanded or self.stopping) and seen.keeps_running:
-            reason = (
-                'it runs under bus control although nobody enabled it: find out whether another '
-                'master commands it'
-            )
-        if reason:
+            reason = Report(Cause.RUNS_UNASKED)
+        if reason is not None:
             self._stop()
             self._tell_stopped(reason)
-        return bool(reason)
+        return reason is not None
 
-    def refused(self, reason: str) -> None:
+    def refused(self, reason: Report) -> None:
         """Stop because of a set-point; the next status may tell a better reason."""
         self._stop()
         self._refusal = (time.monotonic(), reason)
 
     def _explain_refusal(self, seen: InverterStatus) -> bool:
-        refused_at, reason = self._refusal or (math.inf, '')
-        if seen.at <= refused_at:
+        if self._refusal is None or seen.at <= self._refusal[0]:
             return False
         # it was told to stop when it refused; a drive with a fault refuses everything
-        self._refusal = None
+        (_, reason), self._refusal = self._refusal, None
         self._tell_stopped(explain_fault(self._inverter, seen) if seen.faulted else reason)
         return True
 
-    def _tell_stopped(self, reason: str) -> None:
+    def _tell_stopped(self, reason: Report) -> None:
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
-            remedy = 'then call ~/fault_ack and ~/enable to go on'
-            self._tell(Severity.ERROR, f'stopped: {reason}; {remedy}')
+            stopped = Report(Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
+            self._inverter.tell(Severity.ERROR, stopped)
         else:
-            self._tell(Severity.WARNING, f'stopped: {reason}; then call ~/enable to go on')
+            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPED_BECAUSE, why=reason))
 
     # --- how --------------------------------------------------------------------------------
 
@@ -557,20 +548,10 @@ class Controller:
         with contextlib.suppress(DriveError):
             await self._sequence.wait_confirmed()
 
-    def _why_stopped(self, seen: InverterStatus) -> str:
+    def _why_stopped(self, seen: InverterStatus) -> Report | None:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)
 
-    @property
-    def _stopped_by_fault(self) -> str:
-        """What is said of a motor that a fault has stopped."""
-        fault = self._inverter.describe()
-        return f'stopped by fault {fault}; what the drive refuses now is done when it is over'
-
-    def _no_control(self, seen: InverterStatus | None) -> str:
-        text = f'the bus has no control of this drive ({self._inverter.describe()})'
+    def _no_control(self, seen: InverterStatus | None) -> Report:
         if seen is not None and seen.driven:
-            raise DriveError(f'{text}: stop it where it is controlled, by keypad or RUN input')
-        return f'{text}, and it does not run'
-
-    def _tell(self, severity: Severity, text: str) -> None:
-        self._inverter.tell(severity, text)
+            raise DriveError(self._inverter.report(Cause.RUN_BY_OTHERS))
+        return self._inverter.report(Cause.NO_CONTROL)

@@ -16,9 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
+from collections.abc import Sequence
 from concurrent.futures import Future
 import math
 from typing import Any
@@ -40,22 +42,24 @@ from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.log_watch import LogWatch
 from nfo_sinus_driver.drive.own_timeout import OwnTimeout
+from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.picture import take_picture
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
@@ -77,7 +81,7 @@ class Drive:
     One inverter on a bus.
 
     All public methods may be called from any thread. Those that take time return a future; its
-    exception is a :class:`DriveError` whose message says what is wrong and what to do.
+    exception is a :class:`DriveError`, which says what is wrong.
 
     :param listener: told about every poll and event, on the worker of the bus.
     """
@@ -213,7 +217,7 @@ class Drive:
         """The counters and times of what is said to this drive."""
         return self._bus.statistics(self._unit)
 
-    def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[str]:
+    def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[Identity]:
         """
         Identify the drive, make sure that nothing runs unasked, and watch it from then on.
 
@@ -231,7 +235,7 @@ class Drive:
         """
         return self.run(lambda: self._require_standing())
 
-    def disconnect(self, timeout: float) -> Future[str]:
+    def disconnect(self, timeout: float) -> Future[Report]:
         """
         Stop the motor, give control back and leave the drive alone.
 
@@ -243,31 +247,35 @@ class Drive:
         """Poll at full rate and measure."""
         self._bus.call(lambda: self._set_active(True))
 
-    def deactivate(self) -> Future[str]:
-        """Stop the motor and only keep watch; it cannot be enabled until it is active again."""
+    def deactivate(self) -> Future[Report | None]:
+        """
+        Stop the motor and only keep watch; it cannot be enabled until it is active again.
+
+        The result is ``None`` where there is nothing to stop.
+        """
         return self.run(lambda: self._deactivate())
 
-    def stop_for_good(self, patience: float) -> Future[str]:
+    def stop_for_good(self, patience: float) -> Future[Report | None]:
         """
-        Stop the motor; it can never be enabled again.
+        Stop the motor as :meth:`deactivate` does; it can never be enabled again.
 
         :param patience: how long the drive may take to confirm it, s.
         """
         return self.run(lambda: self._stop_for_good(patience))
 
-    def enable(self) -> Future[str]:
+    def enable(self) -> Future[Report]:
         """Take control and run at set-point 0, then follow set-points that come in."""
         return self.run(lambda: self._enable())
 
-    def stop(self) -> Future[str]:
+    def stop(self) -> Future[Report]:
         """Stop as the drive's StMode says; control is kept."""
         return self.run(lambda: self._command(lambda controller: controller.stop()))
 
-    def quick_stop(self) -> Future[str]:
+    def quick_stop(self) -> Future[Report]:
         """Release the motor at once: it coasts."""
         return self.run(lambda: self._command(lambda controller: controller.quick_stop()))
 
-    def acknowledge(self) -> Future[str]:
+    def acknowledge(self) -> Future[Report]:
         """Acknowledge a fault."""
         return self.run(
             lambda: self._command(lambda controller: controller.acknowledge(), connected=True)
@@ -307,11 +315,11 @@ class Drive:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
         return self.run(lambda: self._read_error_log(most))
 
-    def erase_error_log(self) -> Future[str]:
+    def erase_error_log(self) -> Future[Report]:
         """Erase the error log; the motor must stand."""
         return self.run(lambda: self._unless_closed(self._error_log.erase_now))
 
-    def reset_energy(self) -> Future[str]:
+    def reset_energy(self) -> Future[Report]:
         """Reset the kWh counter; the motor must stand."""
         return self.run(lambda: self._unless_closed(self._error_log.reset_energy_now))
 
@@ -326,11 +334,11 @@ class Drive:
         """
         return self.run(lambda: self._tune(procedure, progress))
 
-    def cancel_tuning(self) -> Future[str]:
+    def cancel_tuning(self) -> Future[Report | None]:
         """Stop a tuning; does nothing else, and nothing if there is none."""
         return self.run(self._procedures.abort)
 
-    def set_drive_timeout(self, seconds: float) -> Future[str]:
+    def set_drive_timeout(self, seconds: float) -> Future[Sequence[Change]]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
         return self.run(lambda: self._own_timeout.set_now(seconds))
 
@@ -342,10 +350,8 @@ class Drive:
         :raises DriveError: the drive follows a reference of its own, and no set-points.
         """
         if not self.settings.follows_setpoints:
-            raise DriveError(
-                f'set-point refused: reference is {self.settings.reference}, so the drive follows '
-                'none; set reference to fieldbus, where its control method has that'
-            )
+            reference = self.settings.reference
+            raise DriveError(Report(Cause.OWN_REFERENCE, reference=reference))
         self._setpoint.request(value)
 
     # --- on the bus ---------------------------------------------------------------------------
@@ -356,23 +362,28 @@ class Drive:
         except LinkError as error:
             raise DriveError(self._explain(error)) from error
         except Cancelled:
-            raise DriveError('the driver is ending') from None
+            raise DriveError(Report(Cause.ENDING)) from None
 
-    def _explain(self, error: LinkError) -> str:
+    def _explain(self, error: LinkError) -> Report:
         return explain(error, self._unit, known=self._inverter.identity is not None)
 
-    async def _command(self, command: Any, *, connected: bool = False) -> str:
+    async def _command(
+        self, command: Callable[[Controller], Awaitable[Report]], *, connected: bool = False
+    ) -> Report:
         if self._controller is None:
-            raise DriveError(MONITOR_REFUSAL)
-        if connected and not self._inverter.connected:
-            raise DriveError(f'the drive at address {self._unit} is not connected')
-        answer: str = await command(self._controller)
-        return answer
+            raise DriveError(Report(Cause.MONITOR_ONLY))
+        if connected:
+            self._require_connected()
+        return await command(self._controller)
 
-    async def _enable(self) -> str:
+    def _require_connected(self) -> None:
+        if not self._inverter.connected:
+            raise DriveError(Report(Cause.NOT_CONNECTED, address=self._unit))
+
+    async def _enable(self) -> Report:
         # looked at on the bus, where a deactivation cannot come between
         if not self._watch.active:
-            raise DriveError('the drive is not active')
+            raise DriveError(Report(Cause.NOT_ACTIVE))
         answer = await self._command(
             lambda controller: controller.enable(self._own_timeout.require_set), connected=True
         )
@@ -380,14 +391,13 @@ class Drive:
         return answer
 
     async def _read_error_log(self, most: int) -> tuple[LogEntry, ...]:
-        if not self._inverter.connected:
-            raise DriveError(f'the drive at address {self._unit} is not connected')
+        self._require_connected()
         return await self._error_log.read_now(most)
 
-    async def _unless_closed(self, procedure: Callable[[], Coroutine[Any, Any, str]]) -> str:
+    async def _unless_closed(self, procedure: Callable[[], Awaitable[Report]]) -> Report:
         # it would take control that nobody gives back any more
         if self._controller is not None and self._controller.state is ControlState.CLOSED:
-            raise DriveError('the driver is ending')
+            raise DriveError(Report(Cause.ENDING))
         return await procedure()
 
     async def _tune(
@@ -395,7 +405,7 @@ class Drive:
     ) -> Tuned:
         # as with enable, the motor may turn
         if not self._watch.active:
-            raise DriveError('the drive is not active')
+            raise DriveError(Report(Cause.NOT_ACTIVE))
 
         def tell(seen: InverterStatus, elapsed: float) -> None:
             if progress is not None:
@@ -403,7 +413,7 @@ class Drive:
 
         return await self._tuning.tune_now(procedure, tell)
 
-    async def _connect_first(self, patient: bool, parameters: bool) -> str:
+    async def _connect_first(self, patient: bool, parameters: bool) -> Identity:
         if not self._watch.begun:
             await self._connect(patient)
             if parameters:
@@ -418,7 +428,8 @@ class Drive:
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
             self._log_watch.begin()
-        return str(self._inverter.identity)
+        assert self._inverter.identity is not None
+        return self._inverter.identity
 
     async def _connect(self, patient: bool) -> None:
         inverter = self._inverter
@@ -428,8 +439,7 @@ class Drive:
             if error.code == Refused.BUSY:
                 raise
             raise DriveError(
-                f'{error}: every {inverter.model.name} has SWVer; is this another model? '
-                'set model to auto or to what it is'
+                Report(Cause.OTHER_MODEL, error=str(error), model=inverter.model.name)
             ) from error
         await inverter.read_control_mode()
         await inverter.read_timeout()
@@ -445,21 +455,19 @@ class Drive:
             self._controller.connected()
         name = '' if identity.model else inverter.model.name
         if identity.model and not inverter.model.profile.names_itself:
-            inverter.tell(
-                Severity.WARNING,
-                f'this drive says that it is a {identity.model}; no {inverter.model.profile.title} '
-                'says anything: set model to auto or to what it is',
-            )
+            title = inverter.model.profile.title
+            unexpected = Report(Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title)
+            inverter.tell(Severity.WARNING, unexpected)
         told = ', '.join(part for part in (name, str(identity)) if part)
-        inverter.tell(Severity.INFO, f'connected: {told}')
+        inverter.tell(Severity.INFO, Report(Cause.CONNECTED, drive=told))
         self._own_timeout.warn_if_unfit()
 
-    async def _disconnect(self, timeout: float) -> str:
+    async def _disconnect(self, timeout: float) -> Report:
         # nobody may enable it while it is awaited that the motor stands
         self._set_active(False)
         try:
             if self._controller is None:
-                return 'only watched'
+                return Report(Cause.ONLY_WATCHED)
             return await self._controller.release(timeout)
         finally:
             if self._parameters_task is not None:
@@ -476,20 +484,18 @@ class Drive:
             return
         seen = await self._inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
-            raise DriveError(
-                f'the motor still runs by control_method {self.settings.control_method} '
-                f'({self._inverter.describe()}): another one has to wait until it stands'
-            )
+            method = self.settings.control_method
+            raise DriveError(self._inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
-    async def _stop_for_good(self, patience: float) -> str:
+    async def _stop_for_good(self, patience: float) -> Report | None:
         if self._controller is not None:
             self._controller.close()
         return await self._deactivate(patience)
 
-    async def _deactivate(self, patience: float | None = None) -> str:
+    async def _deactivate(self, patience: float | None = None) -> Report | None:
         self._set_active(False)
         if self._controller is None or not self._controller.may_run:
-            return ''
+            return None
         if patience is not None and not self.heard:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)

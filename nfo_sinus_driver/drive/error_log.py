@@ -25,7 +25,9 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
@@ -123,7 +125,7 @@ class ErrorLog:
             found.append(self._understood(entry, now, sighting[1] if sighting else math.nan))
         return tuple(found)
 
-    async def erase_now(self) -> str:
+    async def erase_now(self) -> Report:
         """
         Erase the error log by SCMD [M0 table 18], and see that it is empty.
 
@@ -134,10 +136,10 @@ class ErrorLog:
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
                 if code_of(await self._entry(area, 0)):
-                    raise DriveError('the drive took the command, but its error log is not empty')
-        return 'the error log is erased'
+                    raise DriveError(Report(Cause.LOG_NOT_ERASED))
+        return Report(Cause.LOG_ERASED)
 
-    async def reset_energy_now(self) -> str:
+    async def reset_energy_now(self) -> Report:
         """
         Reset the kWh counter E-Out by SCMD, from firmware 4.38 on [M0 table 18], and see it at 0.
 
@@ -148,8 +150,12 @@ class ErrorLog:
         if not self._inverter.has(energy):
             since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                f'{Reset.ENERGY.value} came with firmware {float(since or 0):.2f}; this drive has '
-                f'{(told and told.versions) or "an older one"}'
+                Report(
+                    Cause.ENERGY_RESET_UNKNOWN,
+                    what=Reset.ENERGY.value,
+                    since=float(since or 0),
+                    firmware=told.versions if told else '',
+                )
             )
         with self._procedures.begun(Reset.ENERGY) as access:
             async with self._procedures.in_standby(access):
@@ -157,14 +163,12 @@ class ErrorLog:
                 await self._procedures.command(access, Reset.ENERGY)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
-                    raise DriveError(f'the drive took the command, but {energy} is {after:g} kWh')
-        return f'{energy}: {before:.3f} -> {after:.3f} kWh'
+                    raise DriveError(Report(Cause.ENERGY_NOT_RESET, key=energy, energy=after))
+        return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
 
     def _area(self) -> ErrorLogArea:
         if not self.documented:
-            raise DriveError(
-                f'the error log of this model ({self._inverter.model.name}) is not documented [M1]'
-            )
+            raise DriveError(Report(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name))
         return self._inverter.model.error_logs[self._registers.protocol]
 
     async def _read(
@@ -176,7 +180,7 @@ class ErrorLog:
             # an entry that came in meanwhile has moved the others
             if not entries or await self._entry(area, 0, priority) == entries[0]:
                 return entries
-        raise DriveError('the drive writes into its error log all the time: try again')
+        raise DriveError(Report(Cause.LOG_CHANGES))
 
     async def _read_down(
         self, area: ErrorLogArea, limit: int, known: int, priority: Priority

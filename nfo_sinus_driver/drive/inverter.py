@@ -32,6 +32,10 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Event
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NO_CODE
@@ -39,7 +43,6 @@ from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 
@@ -49,11 +52,6 @@ _log = logging.getLogger(__name__)
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
 _SOON = 2.0
-_NOT_ASKED = (
-    'its firmware is not asked for while the bus has control, which firmware before {before:g} '
-    'takes for a fault: it is treated like that one until it is connected to while the bus has no '
-    'control; set classic_dialect to v2.03 or {name} to know it at once'
-)
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -253,11 +251,9 @@ class Inverter:
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit
-            self.tell(
-                Severity.WARNING,
-                f'it says that {key} is {value:g} {unit}, which cannot be: that is not published; '
-                'check motor and scaling in the drive, and that no other master is on the line',
-            )
+            shown = f'{value:g} {unit}'.rstrip()
+            impossible = Report(Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
+            self.tell(Severity.WARNING, impossible)
         return math.nan
 
     def last_polled(self, role: Role | None) -> Measured:
@@ -312,8 +308,10 @@ class Inverter:
             if before is None:
                 # what the older firmware knows the newer one knows, too
                 self.identity, self._older = Identity(), True
-                text = _NOT_ASKED.format(before=dialect.before, name=dialect.name)
-                self.tell(Severity.WARNING, text)
+                not_asked = Report(
+                    Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
+                )
+                self.tell(Severity.WARNING, not_asked)
             else:
                 self._older = was_older
             return self.identity or Identity()
@@ -436,10 +434,12 @@ class Inverter:
         return self.model.status_code(code).shown(firmware)
 
     def describe(self) -> str:
-        """Return the inverter status for a message: code and text."""
-        if self.seen is None:
-            return 'its status is not known'
-        return f'{self.seen.code} {self.text}'
+        """Return code and text of the inverter status; ``''`` before it was read."""
+        return '' if self.seen is None else f'{self.seen.code} {self.text}'
+
+    def report(self, cause: Cause, **values: object) -> Report:
+        """Return a report that says what the inverter status is, too."""
+        return Report(cause, status=self.describe(), **values)
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
@@ -449,9 +449,10 @@ class Inverter:
         firmware = self.identity.firmware if self.identity else math.nan
         return since is None or not firmware < float(since) - 0.001
 
-    def tell(self, severity: Severity, text: str) -> None:
-        """Say something to a person; what cannot be told keeps nothing from being done."""
+    def tell(self, severity: Severity, report: Report) -> None:
+        """Tell the listener; what cannot be told keeps nothing from being done."""
+        code = None if self.seen is None else self.seen.code
         try:
-            self._listener.on_event(severity, text)
+            self._listener.on_event(Event(severity, report, code))
         except Exception:
-            _log.exception('this could not be told: %s', text)
+            _log.exception('not told: %s', report)

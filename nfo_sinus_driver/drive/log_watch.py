@@ -27,13 +27,15 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import code_of
 from nfo_sinus_driver.drive.error_log import hours_of
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -106,7 +108,8 @@ class LogWatch:
                 except Refused as error:
                     if error.code != Refused.BUSY:
                         # asked for what it does not have, a Classic drive may stop the motor
-                        inverter.tell(Severity.INFO, f'its error log is not watched: {error}')
+                        not_watched = Report(Cause.LOG_NOT_WATCHED, error=str(error))
+                        inverter.tell(Severity.INFO, not_watched)
                         return
                 except DriveError as error:
                     _log.debug('%s', error)
@@ -165,10 +168,10 @@ class LogWatch:
             code, self._fault = self._fault.code, None
         for entry in reversed(entries):
             if entry.code == code:
-                self._inverter.tell(Severity.INFO, f'error log: {entry}')
+                self._inverter.tell(Severity.INFO, Report(Cause.LOG_ENTRY, entry=entry))
             else:
-                text = f'error log: {entry}; no poll saw it'
-                self._inverter.tell(Severity.WARNING, text)
+                unseen = Report(Cause.LOG_ENTRY_UNSEEN, entry=entry)
+                self._inverter.tell(Severity.WARNING, unseen)
             try:
                 self._listener.on_log_entry(entry)
             except Exception:

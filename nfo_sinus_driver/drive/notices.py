@@ -16,26 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 import math
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Severity
 
 #: What comes and goes is told again only when it was away for so long, s.
 _AGAIN_AFTER = 10.0
-
-#: Whether it is there, and how grave it is.
-_SEVERITIES: Mapping[str, Severity] = {
-    'limit': Severity.WARNING,
-    'alarm': Severity.WARNING,
-    'sleep': Severity.INFO,
-}
-
 
 class Notices:
     """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
@@ -43,37 +37,33 @@ class Notices:
     def __init__(self, inverter: Inverter) -> None:
         self._inverter = inverter
         #: When each was last there.
-        self._seen_at: dict[str, float] = {}
+        self._seen_at: dict[tuple[Cause, int], float] = {}
         #: An alarm stood when it was last looked at, with a code that is no alarm's.
         self._unnamed = False
 
     def take(self, seen: InverterStatus) -> None:
         """Tell what has begun."""
-        for name, text in self._texts(seen).items():
+        for severity, report in self._reports(seen):
+            # each alarm by its code
+            name = (report.cause, seen.code if report.cause is Cause.ALARM else 0)
             before = self._seen_at.get(name, -math.inf)
             self._seen_at[name] = seen.at
             if seen.at - before > _AGAIN_AFTER:
-                self._inverter.tell(_SEVERITIES[name.partition(' ')[0]], text)
+                self._inverter.tell(severity, report)
         self._unnamed = seen.kind is Kind.ALARM and not seen.listed.remedy
 
-    def _texts(self, seen: InverterStatus) -> Mapping[str, str]:
-        """Return what is there, each alarm by its code."""
-        told, entry = self._inverter.describe(), seen.listed
-        texts: dict[str, str] = {}
+    def _reports(self, seen: InverterStatus) -> Iterator[tuple[Severity, Report]]:
+        """Yield what is there."""
         by_code = seen.means(Meaning.CURRENT_LIMIT)
         limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
         if limited and not seen.faulted:
             (limit,) = seen.model.codes(Meaning.CURRENT_LIMIT)
-            texts['limit'] = f'the current limit holds the motor back ({told}). {limit.remedy}'
+            yield Severity.WARNING, self._inverter.report(Cause.CURRENT_LIMITED, limit=limit)
         if seen.kind is Kind.ALARM and not by_code:
-            if entry.remedy:
-                texts[f'alarm {seen.code}'] = f'alarm {told}: {entry.description}. {entry.remedy}'
+            if seen.listed.remedy:
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM, alarm=seen.listed)
             elif self._unnamed and not limited:
                 # once only, it came or went between the two readings
-                texts['alarm'] = f'alarm, the status does not say which ({told}): see its display'
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM_UNNAMED)
         if Fact.SLEEPING in seen.facts:
-            texts['sleep'] = (
-                f'the drive sleeps ({told}), for its set-point is below its sleep frequency: '
-                'a greater one wakes it'
-            )
-        return texts
+            yield Severity.INFO, self._inverter.report(Cause.ASLEEP)

@@ -16,13 +16,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
-from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
-from nfo_sinus_driver.drive.snapshot import Severity
 
 
 class OwnTimeout:
@@ -36,7 +40,7 @@ class OwnTimeout:
         self._inverter = inverter
         self._parameters = parameters
         self._commanded = commanded
-        self._told = ''
+        self._told: Report | None = None
         #: It could not be set yet.
         self._due = False
 
@@ -59,8 +63,7 @@ class OwnTimeout:
             if not barred and (seen is None or not seen.faulted):
                 raise
             self._inverter.tell(
-                Severity.WARNING,
-                f'drive_timeout cannot be set yet, and will be when it is enabled: {error}',
+                Severity.WARNING, Report(Cause.OWN_TIMEOUT_LATER, why=error.report)
             )
 
     async def require_set(self) -> None:
@@ -73,7 +76,7 @@ class OwnTimeout:
             await self.set_now(self._inverter.settings.drive_timeout)
             self._due = False
 
-    async def set_now(self, seconds: float) -> str:
+    async def set_now(self, seconds: float) -> Sequence[Change]:
         """
         Set and verify it; 0 leaves it as it is.
 
@@ -81,43 +84,34 @@ class OwnTimeout:
         :raises DriveError: nothing is written to this drive, or it has none.
         """
         if not self._commanded:
-            raise DriveError(MONITOR_REFUSAL)
+            raise DriveError(Report(Cause.MONITOR_ONLY))
         if not seconds:
-            return ''
+            return ()
         if not self._inverter.can_time_out:
-            raise DriveError('drive_timeout: this model has no SioTot, so it must be 0')
+            raise DriveError(Report(Cause.OWN_TIMEOUT_IMPOSSIBLE))
         key = self._inverter.model.key
         wanted = {key(Role.COMMUNICATION_TIMEOUT): seconds, key(Role.STOP_AT_TIMEOUT): True}
-        changes = await self._parameters.change_now(
-            wanted, guarded=False, because=' (drive_timeout)'
+        return await self._parameters.change_now(
+            wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
         )
-        return ', '.join(str(change) for change in changes)
 
     def warn_if_unfit(self) -> None:
         """Tell that it is missing, or strikes too soon; once for each reason in a row."""
-        complaint = self._complaint() if self._commanded else ''
-        if complaint and complaint != self._told:
+        complaint = self._complaint() if self._commanded else None
+        if complaint is not None and complaint != self._told:
             self._told = complaint
             self._inverter.tell(Severity.WARNING, complaint)
 
-    def _complaint(self) -> str:
+    def _complaint(self) -> Report | None:
         inverter = self._inverter
-        least = inverter.settings.lost_after + DRIVE_TIMEOUT_MARGIN
+        timeout, margin = inverter.sio_tot, DRIVE_TIMEOUT_MARGIN
+        least = inverter.settings.lost_after + margin
         if not inverter.can_time_out:
-            why, remedy = 'none is known of this model', 'use the RUN input'
-        elif not inverter.sio_tot:
-            why, remedy = 'SioTot is 0', 'set drive_timeout'
-        elif not inverter.auto_stop:
-            why, remedy = 'AutoStop is OFF', 'set drive_timeout'
-        elif inverter.sio_tot < least - 1e-9:
-            return (
-                f'the time-out of the drive itself (SioTot {inverter.sio_tot:g} s) is less than '
-                f'lost_after + {DRIVE_TIMEOUT_MARGIN:g} s: noise that this driver waits out may '
-                f'stop the motor; set drive_timeout, at least {least:g} s'
-            )
-        else:
-            return ''
-        return (
-            f'the drive has no time-out of its own ({why}): if this driver is killed or the cable '
-            f'is cut, the motor runs on; {remedy}'
-        )
+            return Report(Cause.NO_OWN_TIMEOUT)
+        if not timeout:
+            return Report(Cause.OWN_TIMEOUT_OFF)
+        if not inverter.auto_stop:
+            return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING)
+        if timeout < least - 1e-9:
+            return Report(Cause.OWN_TIMEOUT_SHORT, timeout=timeout, margin=margin, least=least)
+        return None

@@ -21,6 +21,8 @@ from collections.abc import Mapping
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
 
 #: The driver's own setting that goes with each setting of the line.
@@ -38,36 +40,25 @@ def followers(model: Family) -> Mapping[str, str]:
     return {key: setting for key, setting in named.items() if key}
 
 
-def why_not(key: str, inverter: Inverter) -> str:
-    """Return why a setting may not be changed, ``''`` if it may."""
+def why_not(key: str, inverter: Inverter) -> Report | None:
+    """Return why a setting may not be changed, ``None`` if it may."""
     settings = inverter.settings
     if settings.control_method == 'monitor':
-        return 'control_method is monitor: this driver only reads'
+        return Report(Cause.MONITOR_ONLY)
     if inverter.tuning:
-        return 'the drive is tuning: wait for its end, or stop it'
+        return Report(Cause.CHANGE_WHILE_TUNING)
     if key not in inverter.model.communication:
-        return ''
+        return None
     if not settings.allow_communication_changes:
-        return (
-            'communication settings are not changed unless allow_communication_changes is true, '
-            'for the driver may lose the drive'
-        )
+        return Report(Cause.COMMUNICATION_PROTECTED)
     firmware = inverter.identity.firmware if inverter.identity else 0.0
     if firmware < inverter.model.profile.uncertain.get(key, 0.0):
-        return (
-            f'what its codes mean in firmware {firmware:.2f} is not known for sure: '
-            'change it at the keypad'
-        )
-    return ''
+        return Report(Cause.CODES_UNCERTAIN, firmware=firmware)
+    return None
 
 
-def after_change(changed: Mapping[str, Value], model: Family) -> str:
-    """Return how to follow a drive to new settings of the line, ``''`` if none was changed."""
+def after_change(changed: Mapping[str, Value], model: Family) -> Report | None:
+    """Return how to follow a drive to new settings of the line, ``None`` if none was changed."""
     settings = followers(model)
     follow = [f'{settings[key]} ({value})' for key, value in changed.items() if key in settings]
-    if not follow:
-        return ''
-    return (
-        'the drive uses the new settings of the line from its next power-up on, or at once: '
-        f'then start this driver with the {" and ".join(follow)} that it has'
-    )
+    return Report(Cause.FOLLOW_THE_LINE, settings=' and '.join(follow)) if follow else None

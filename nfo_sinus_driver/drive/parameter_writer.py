@@ -27,11 +27,14 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.advice import report_of
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.write_access import Allow
 from nfo_sinus_driver.drive.write_access import WriteAccess
 from nfo_sinus_driver.link import LinkError
@@ -44,14 +47,21 @@ _TRIES = 3
 
 class ParameterError(DriveError):
     """
-    A parameter was not changed; the message begins with its name and says why.
+    A parameter was not changed.
 
+    :ivar key: which one; several, with commas, where they were refused together.
     :ivar left: the keys of those that may not be as they were.
     """
 
-    def __init__(self, text: str, left: Iterable[str] = ()) -> None:
-        super().__init__(text)
+    def __init__(self, key: str, report: Report, left: Iterable[str] = ()) -> None:
+        super().__init__(report)
+        self.key = key
         self.left = tuple(left)
+
+    def followed_by(self, *more: Report, left: Iterable[str] = ()) -> ParameterError:
+        """Return the same error with more to say of it."""
+        report = Report(Cause.SEVERAL, reports=(self.report, *more))
+        return ParameterError(self.key, report, (*self.left, *left))
 
 
 class _BadValue(ParameterError):
@@ -96,10 +106,9 @@ def shown_raw(data: bytes) -> str:
     return f'{data.hex().upper()}h'
 
 
-def describe_drift(drift: Change) -> str:
-    """Return what to say of a parameter that the drive has otherwise than it was wanted."""
-    has, wanted = f'{show(drift.new)} {drift.unit}'.rstrip(), show(drift.old)
-    return f'{drift.key} is {has} in the drive, but {wanted} was asked for: it is left so'
+def not_changed(key: str, why: Report) -> ParameterError:
+    """Return the error of a parameter that was not changed."""
+    return ParameterError(key, Report(Cause.NOT_CHANGED, key=key, why=why))
 
 
 class ParameterWriter:
@@ -127,13 +136,13 @@ class ParameterWriter:
             except ParameterError as error:
                 if not done:
                     raise
-                text, left = await self._put_back(done, allow)
-                raise ParameterError(f'{error}; {text}', (*error.left, *left)) from error
+                reports, left = await self._put_back(done, allow)
+                raise error.followed_by(*reports, left=left) from error
             except Cancelled:
                 if done:
-                    changes = ', '.join(str(self.describe(entry)) for entry in done)
-                    text = f'ended half-way, NOT put back: {changes}'
-                    self._inverter.tell(Severity.WARNING, text)
+                    changes = tuple(self.describe(entry) for entry in done)
+                    ended = Report(Cause.ENDED_HALF_WAY, changes=changes)
+                    self._inverter.tell(Severity.WARNING, ended)
                 raise
         return tuple(self.describe(entry) for entry in done)
 
@@ -177,12 +186,9 @@ class ParameterWriter:
         try:
             seen = await self._inverter.look(_SERVICE)
         except LinkError as error:
-            raise ParameterError(f'{stopped}: {self.explain(error)}') from error
+            raise not_changed(stopped, self.explain(error)) from error
         if seen.driven:
-            raise ParameterError(
-                f'{stopped}: only while the motor is stopped, but it is not '
-                f'({self._inverter.describe()})'
-            )
+            raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
 
     def describe(self, entry: Written) -> Change:
         """Return what was written as a person reads it."""
@@ -201,15 +207,15 @@ class ParameterWriter:
             # between any two parameters, everybody who polls has a turn
             before = await self._registers.read_data(key, Priority.POLL)
         except LinkError as error:
-            raise ParameterError(f'{key}: {self.explain(error)}') from error
+            raise not_changed(key, self.explain(error)) from error
         if before == data:
             return ()
         try:
             await allow()
         except LinkError as error:
-            raise ParameterError(f'{key}: {self.explain(error)}') from error
+            raise not_changed(key, self.explain(error)) from error
         except DriveError as error:
-            raise ParameterError(f'{key}: {error}') from error
+            raise not_changed(key, error.report) from error
         failure = await self._send(key, data)
         kept: bytes | None = None
         try:
@@ -219,18 +225,19 @@ class ParameterWriter:
         if kept == data:
             # whatever became of the answer to the write, a repeated one too
             return (Written(key, before, data),)
-        text = f'{key}: {await self._why(key, data, kept, failure)}'
+        refused = not_changed(key, await self._why(key, data, kept, failure))
         if kept == before and isinstance(failure, Refused):
             bad = failure.code == Refused.ILLEGAL_VALUE
-            raise (_BadValue if bad else ParameterError)(text) from failure
-        trouble, left = '', list[str]()
+            raise _BadValue(key, refused.report) if bad else refused from failure
+        stuck, left = list[Report](), list[str]()
         if kept != before:
-            trouble, left = await self._put_back([Written(key, before, data)], allow)
+            stuck, left = await self._put_back([Written(key, before, data)], allow)
         if not left:
-            raise ParameterError(f'{text}; it is {self._show(key, before)} as before') from failure
+            value = self._show(key, before)
+            raise refused.followed_by(Report(Cause.AS_BEFORE, value=value)) from failure
         if kept is None:
-            text += f'; whether the drive took {self._show(key, data)} is not known'
-        raise ParameterError(f'{text}; {trouble}', left) from failure
+            stuck.insert(0, Report(Cause.PERHAPS_CHANGED, value=self._show(key, data)))
+        raise refused.followed_by(*stuck, left=left) from failure
 
     async def _send(self, key: str, data: bytes) -> LinkError | None:
         """Write; return why the drive may not have taken it: reading it back tells."""
@@ -240,7 +247,7 @@ class ParameterWriter:
             return error
         return None
 
-    async def _restore(self, key: str, before: bytes, allow: Allow) -> str:
+    async def _restore(self, key: str, before: bytes, allow: Allow) -> Report | None:
         """
         See to it that a parameter is as it was; return why it is not.
 
@@ -248,44 +255,49 @@ class ParameterWriter:
 
         :raises LinkError: nobody answers.
         """
-        trouble = ''
+        trouble: Report | None = None
         for _ in range(_TRIES):
             try:
                 await allow()
             except DriveError as refused:
-                return str(refused)
+                return refused.report
             error = await self._send(key, before)
             try:
                 kept = await self._registers.read_data(key, _SERVICE)
             except Refused as refused:
-                trouble = str(refused)
+                trouble = report_of(refused)
                 continue
             if kept == before:
-                return ''
-            trouble = self.explain(error) if error else f'the drive keeps {self._show(key, kept)}'
+                return None
+            keeps = Report(Cause.DRIVE_KEEPS, value=self._show(key, kept))
+            trouble = self.explain(error) if error else keeps
         return trouble
 
     async def _put_back(
         self, done: Sequence[Written], allow: Allow
-    ) -> tuple[str, list[str]]:
+    ) -> tuple[list[Report], list[str]]:
         """Undo what was written; return what to say of it, and what may not be as it was."""
-        stuck: dict[str, str] = {}
-        silence = ''
+        stuck: dict[str, Report] = {}
+        silence: Report | None = None
         for entry in reversed(done):
             trouble = silence
-            if not silence:
+            if silence is None:
                 try:
                     trouble = await self._restore(entry.key, entry.before, allow)
                 except LinkError as error:
                     # two time-outs are enough for the others on the line
                     trouble = self.explain(error)
-                    silence = 'not tried any more'
-            if trouble:
-                before = self._show(entry.key, entry.before)
-                stuck[entry.key] = f'{entry.key} is NOT put back to {before}: {trouble}'
-        back = [entry.key for entry in done if entry.key not in stuck]
-        said = [f'put back: {", ".join(back)}'] if back else []
-        return '; '.join((*said, *stuck.values())), list(stuck)
+                    silence = Report(Cause.NOT_TRIED_ANY_MORE)
+            if trouble is not None:
+                stuck[entry.key] = Report(
+                    Cause.NOT_PUT_BACK,
+                    key=entry.key,
+                    value=self._show(entry.key, entry.before),
+                    why=trouble,
+                )
+        back = tuple(entry.key for entry in done if entry.key not in stuck)
+        reports = [Report(Cause.PUT_BACK, keys=back)] if back else []
+        return [*reports, *stuck.values()], list(stuck)
 
     def value(self, key: str, data: bytes) -> Value:
         """Return what bytes mean, or the bytes as text where they have no meaning."""
@@ -298,33 +310,35 @@ class ParameterWriter:
         unit = self._registers.model[key].unit
         return f'{show(self.value(key, data))} {unit}'.rstrip()
 
-    def explain(self, error: LinkError) -> str:
-        """Return what a failed transaction means to a person."""
+    def explain(self, error: LinkError) -> Report:
+        """Return what a failed transaction means."""
         return explain(error, self._inverter.settings.address, known=True)
 
     async def _why(
         self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
-    ) -> str:
+    ) -> Report:
         """Return why a parameter was not changed."""
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)
         if error is not None:
             return self.explain(error)
         assert kept is not None
-        return f'the drive keeps {self._show(key, kept)} where {self._show(key, data)} was written'
+        value, written = self._show(key, kept), self._show(key, data)
+        return Report(Cause.DRIVE_KEEPS_OTHER, value=value, written=written)
 
-    async def _refusal(self, key: str, data: bytes, error: Refused) -> str:
+    async def _refusal(self, key: str, data: bytes, error: Refused) -> Report:
         """Return what the drive said, and what else is known that may be the reason [C87]."""
         inverter = self._inverter
-        text = f'{error}'
+        why = report_of(error)
         if error.code == Refused.ILLEGAL_VALUE:
-            text = f'the drive does not accept {self._show(key, data)}{error.behind}'
+            value = self._show(key, data)
+            why = Report(Cause.VALUE_NOT_ACCEPTED, value=value, behind=error.behind)
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
             await inverter.look(_SERVICE)
         seen = inverter.seen
         if seen is not None and seen.driven and self._registers.model[key].stopped:
-            return f'{text}: the motor must be stopped for this, and it runs'
+            return Report(Cause.REFUSED_WHILE_RUNNING, why=why)
         if seen is not None and seen.faulted:
-            return f'{text}; fault {inverter.describe()} stands: acknowledge it first (~/fault_ack)'
-        return text
+            return inverter.report(Cause.REFUSED_WHILE_FAULTED, why=why)
+        return why

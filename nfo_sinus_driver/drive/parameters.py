@@ -32,6 +32,9 @@ from typing import Any
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
 from nfo_sinus_driver.drive.parameter_guard import after_change
@@ -41,9 +44,9 @@ from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
+from nfo_sinus_driver.drive.parameter_writer import not_changed
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.drive.wanted_state import WantedState
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -142,11 +145,11 @@ class Parameters:
             return known
         model = self._inverter.model
         if key not in model or not model[key].is_setting or not self.reaches(key):
-            raise ParameterError(f'{key} is no parameter that can be changed here')
+            raise ParameterError(key, Report(Cause.NO_SETTING, key=key))
         try:
             return self._registers.value(key, self._registers.encode(key, value))
         except ValueError as error:
-            raise ParameterError(str(error)) from None
+            raise ParameterError(key, Report(Cause.BAD_VALUE, error=str(error))) from None
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step of the drive."""
@@ -173,8 +176,8 @@ class Parameters:
         """
         exact = self.exact(key, value)
         reason = why_not(key, self._inverter)
-        if reason and self._values.get(key) != exact:
-            raise ParameterError(f'{key}: {reason}')
+        if reason is not None and self._values.get(key) != exact:
+            raise not_changed(key, reason)
         return exact
 
     def read(self, only: Collection[str] | None = None) -> Future[None]:
@@ -191,7 +194,7 @@ class Parameters:
         """Do as :meth:`write_each_now`."""
         return self._run(lambda: self.write_each_now(wanted, wrote))
 
-    def refresh(self) -> Future[str]:
+    def refresh(self) -> Future[Report]:
         """Read every parameter again; the answer says which have changed."""
         return self._run(self._refresh)
 
@@ -227,9 +230,10 @@ class Parameters:
         finally:
             self._unread = 0
         self._keys = tuple(key for key in keys if key in self._data)
-        took = f'{time.monotonic() - started:.1f} s'
         if keys:
-            inverter.tell(Severity.INFO, f'parameters: {self.progress} in {took}')
+            took = time.monotonic() - started
+            report = Report(Cause.SETTINGS_READ, progress=self.progress, seconds=took)
+            inverter.tell(Severity.INFO, report)
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
@@ -248,11 +252,13 @@ class Parameters:
                 if time.monotonic() > tell_at:
                     pause *= 2
                     tell_at = time.monotonic() + pause
-                    self._inverter.tell(Severity.INFO, f'parameters: {self.progress}')
+                    progress = Report(Cause.SETTINGS_BEING_READ, progress=self.progress)
+                    self._inverter.tell(Severity.INFO, progress)
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
         for key in keys:
-            self._inverter.tell(Severity.WARNING, f'{key} cannot be read: {refused[key]}')
+            report = Report(Cause.SETTING_UNREADABLE, key=key, error=str(refused[key]))
+            self._inverter.tell(Severity.WARNING, report)
 
     async def watch_now(self) -> None:
         """Read the settings one after the other, again and again, for ever."""
@@ -298,13 +304,13 @@ class Parameters:
         return barred or not self._inverter.has(key)
 
     async def change_now(
-        self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
+        self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
     ) -> tuple[Change, ...]:
         """
         Write what differs, all of it or nothing, and read it back.
 
-        :param because: what the log says of the reason.
         :param guarded: false for what the driver sets itself.
+        :param told_as: as what each change is reported.
         :returns: what was changed.
         :raises ParameterError: why not.
         """
@@ -320,17 +326,17 @@ class Parameters:
                 changes = await self._writer.write(data)
             except ParameterError as error:
                 hint = after_change({key: exact[key] for key in error.left}, self._inverter.model)
-                if not hint:
+                if hint is None:
                     raise
-                raise ParameterError(f'{error}; {hint}', error.left) from error
+                raise error.followed_by(hint) from error
             self._wanted.follow(exact)
             written = {change.key for change in changes}
             for key in data:
                 self._learn(key, data[key], quiet=key in written)
         for change in changes:
-            self._inverter.tell(Severity.INFO, f'{change}{because}')
+            self._inverter.tell(Severity.INFO, Report(told_as, change=change))
         hint = after_change({change.key: change.new for change in changes}, self._inverter.model)
-        if hint:
+        if hint is not None:
             self._inverter.tell(Severity.WARNING, hint)
         return changes
 
@@ -345,8 +351,8 @@ class Parameters:
         """
         for key in wanted:
             reason = why_not(key, self._inverter)
-            if reason:
-                raise ParameterError(f'{key}: {reason}')
+            if reason is not None:
+                raise not_changed(key, reason)
 
         def learn(written: Written) -> None:
             self._learn(written.key, written.after, quiet=True)
@@ -405,7 +411,7 @@ class Parameters:
         new = [key for key, wanted in data.items() if self._data.get(key) != wanted]
         await self._writer.require_standstill(new)
 
-    async def _refresh(self) -> str:
+    async def _refresh(self) -> Report:
         before = self._values
         keys = [key for key in self._keys if self._inverter.has(key)]
         for key in keys:
@@ -413,7 +419,7 @@ class Parameters:
                 # a person waits for it, so it goes by turns with the polls
                 await self._read(key, once=False, priority=Priority.POLL)
         changed = [key for key in keys if before.get(key) != self._values.get(key)]
-        return f'{len(keys)} parameters read, changed: {", ".join(changed) or "none"}'
+        return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
 
     async def _read(
         self, key: str, *, once: bool, priority: Priority = Priority.REFRESH
@@ -439,7 +445,7 @@ class Parameters:
             values[key] = self._registers.value(key, data)
         except ValueError as error:
             # and nobody may rely on what it was before
-            self._inverter.tell(Severity.WARNING, str(error))
+            self._inverter.tell(Severity.WARNING, Report(Cause.BAD_VALUE, error=str(error)))
         self._values = values
         if not quiet and before is not None and key in values:
             self._tell_news(Change(key, before, values[key], self._inverter.model[key].unit))
@@ -451,4 +457,4 @@ class Parameters:
     def _tell_news(self, change: Change) -> None:
         """Say that somebody else changed a parameter."""
         if not self._wanted.tell_drift(change.key):
-            self._inverter.tell(Severity.INFO, f'changed at the drive: {change}')
+            self._inverter.tell(Severity.INFO, Report(Cause.CHANGED_AT_DRIVE, change=change))

@@ -33,9 +33,10 @@ from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.settings import MONITOR_REFUSAL
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -51,10 +52,8 @@ def require_known(procedure: Procedure | Reset, model: Family) -> None:
     :raises DriveError: it has no command for it.
     """
     if not model.profile.methods_with(procedure):
-        raise DriveError(
-            f'{procedure.value} is not known of this model ({model.name}): its manual lists no '
-            'command for it; do it at the keypad'
-        )
+        what = procedure.value
+        raise DriveError(Report(Cause.UNKNOWN_PROCEDURE, what=what, model=model.name))
 
 
 class Procedures:
@@ -72,7 +71,7 @@ class Procedures:
     @property
     def _commands(self) -> Controller:
         if self._controller is None:
-            raise DriveError(MONITOR_REFUSAL)
+            raise DriveError(Report(Cause.MONITOR_ONLY))
         return self._controller
 
     def require(self, procedure: Procedure | Reset) -> None:
@@ -84,15 +83,18 @@ class Procedures:
         """
         controller, inverter = self._commands, self._inverter
         if not inverter.connected:
-            raise DriveError(f'the drive at address {inverter.settings.address} is not connected')
+            raise DriveError(Report(Cause.NOT_CONNECTED, address=inverter.settings.address))
         require_known(procedure, inverter.model)
         profile = inverter.model.profile
         have = profile.methods_with(procedure)
         if inverter.settings.control_method not in have:
             raise DriveError(
-                f'{procedure.value} needs {profile.methods[have[0]].means}, and one session does '
-                f'not mix control methods: clean up, set control_method to {have[0]} and configure '
-                'again'
+                Report(
+                    Cause.OTHER_METHOD_NEEDED,
+                    what=procedure.value,
+                    means=profile.methods[have[0]].means,
+                    method=have[0],
+                )
             )
         controller.require_idle(procedure.value)
 
@@ -145,7 +147,7 @@ class Procedures:
             raise
         await self._give_back(found)
 
-    async def abort(self) -> str:
+    async def abort(self) -> Report | None:
         """
         End the procedure that has the drive; anything else goes on.
 
@@ -154,7 +156,7 @@ class Procedures:
         controller = self._controller
         procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
         if controller is None or controller.state not in procedure:
-            return ''
+            return None
         return await controller.stop()
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
@@ -183,17 +185,11 @@ class Procedures:
         require_no_fault(inverter, seen)
         found = await controller.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
-            raise DriveError(
-                f'{what}: the drive lets nobody take control now ({inverter.describe()}; MODE is '
-                'Inhibit)'
-            )
+            raise DriveError(inverter.report(Cause.CONTROL_INHIBITED, what=what))
         if seen.driven:
-            raise DriveError(f'{what}: the motor runs ({inverter.describe()}): stop it first')
+            raise DriveError(inverter.report(Cause.MOTOR_RUNS, what=what))
         if found not in (Holder.NOBODY, Holder.BUS):
-            raise DriveError(
-                f'{what}: keypad or terminals have control ({inverter.describe()}), and giving it '
-                'back to them could start the motor: press STOP at the drive first'
-            )
+            raise DriveError(inverter.report(Cause.CONTROLLED_LOCALLY, what=what))
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
@@ -202,7 +198,7 @@ class Procedures:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)
-                raise DriveError(f'{what}: the drive does not stand by: {inverter.describe()}')
+                raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
             await self._bus.sleep(confirmation.LOOK_PERIOD)

@@ -30,10 +30,12 @@ from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.catalog import SetpointTarget
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -96,7 +98,7 @@ class Setpoint:
         unit: int,
         registers: Registers,
         inverter: Inverter,
-        refused: Callable[[str], None],
+        refused: Callable[[Report], None],
         told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
         self._bus = bus
@@ -219,17 +221,23 @@ class Setpoint:
 
     # --- together with the other drives of the line, on the bus -------------------------------
 
-    @property
-    def why_not_shared(self) -> str:
-        """Why it cannot follow a set-point that is told to all drives; ``''`` if it can."""
+    def why_not_shared(self, name: str) -> Report | None:
+        """
+        Return why it cannot follow a set-point that is told to all drives; ``None`` if it can.
+
+        :param name: of the drive.
+        """
         settings = self._inverter.settings
         if settings.control_method == 'monitor':
-            return 'is only monitored'
+            return Report(Cause.MEMBER_MONITORED, name=name)
         if not settings.follows_setpoints:
-            return f'follows a reference of its own ({settings.reference})'
+            reference = settings.reference
+            return Report(Cause.MEMBER_BY_OWN_REFERENCE, name=name, reference=reference)
         if not self.armed:
-            return 'is not enabled'
-        return '' if len(self._keys) == 1 else 'takes a set-point in several writes'
+            return Report(Cause.MEMBER_NOT_ENABLED, name=name)
+        if len(self._keys) > 1:
+            return Report(Cause.MEMBER_TAKES_SEVERAL_WRITES, name=name)
+        return None
 
     @property
     def quantity(self) -> tuple[str, str]:
@@ -301,12 +309,8 @@ class Setpoint:
             return
         if not self._told_missed:
             self._told_missed = True
-            self._tell(
-                Severity.WARNING,
-                'it did not take the set-point for all drives: it keeps '
-                f'{self._meant({address: kept}):g}; '
-                'it is given its own',
-            )
+            missed = Report(Cause.BROADCAST_MISSED, value=self._meant({address: kept}))
+            self._inverter.tell(Severity.WARNING, missed)
         self._written = {}
         self._bus.request(self._slot)
 
@@ -323,7 +327,7 @@ class Setpoint:
         self._expired = False
         if self._warned:
             self._warned = False
-            self._tell(Severity.INFO, 'set-points arrive again')
+            self._inverter.tell(Severity.INFO, Report(Cause.SETPOINTS_AGAIN))
         return limited
 
     def _make(self) -> Transfer | None:
@@ -335,10 +339,9 @@ class Setpoint:
             return None
         limited = self._accept(request)
         if self.clamped and not self._clamp_told:
-            self._tell(
+            self._inverter.tell(
                 Severity.WARNING,
-                f'set-point {request.value:g} is limited to {limited:g} '
-                '(setpoint_max, or the limit of the drive)',
+                Report(Cause.SETPOINT_LIMITED, value=request.value, limited=limited),
             )
         self._clamp_told = self.clamped
         due = self.due(request)
@@ -367,7 +370,7 @@ class Setpoint:
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.data is not None
             asked = self._meant({**self._standing, transfer.address: transfer.data})
-            self._refused(f'it refused set-point {asked:g}: {error}')
+            self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
         else:
             self.was_missed(error)
 
@@ -432,7 +435,7 @@ class Setpoint:
             await self._watch_age_for_ever()
         except Exception as error:
             # a set-point that nobody watches must not be followed
-            self._refused(f'error in the driver: {error!r}')
+            self._refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
 
     async def _watch_age_for_ever(self) -> None:
         while True:
@@ -450,10 +453,8 @@ class Setpoint:
         if self._standing != dict(map(self._registers.target, zero)):
             if not self._warned:
                 self._warned = True
-                self._tell(
-                    Severity.WARNING,
-                    f'no set-point for {timeout:g} s: the motor ramps to a stop '
-                    'until the next one arrives; check what publishes them',
+                self._inverter.tell(
+                    Severity.WARNING, Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
                 )
             before = self._request
             for step in zero:
@@ -464,7 +465,8 @@ class Setpoint:
                     await self._registers.write(replace(step, once=True), Priority.STOP)
                 except LinkError as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
-                        self._refused(f'it refused set-point 0: {error}')
+                        why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
+                        self._refused(why)
                         return
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)
@@ -475,6 +477,3 @@ class Setpoint:
             if self._request is before:
                 self.commanded = 0.0
         self._expired = True
-
-    def _tell(self, severity: Severity, text: str) -> None:
-        self._inverter.tell(severity, text)

@@ -26,26 +26,24 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.setpoint import Request
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.link import LinkError
-
-_NO_BROADCAST = (
-    'only the Classic protocol has set-points for all drives at once: publish one to each drive'
-)
 
 
 @dataclasses.dataclass(frozen=True)
 class Told:
     """
-    What a person should know of set-points for all; each is ``''`` if there is nothing to say.
+    What an operator should know of set-points for all; ``None`` if there is nothing to say.
 
     :ivar refused: why nobody follows them.
     :ivar limited: that they are limited, and why.
     """
 
-    refused: str = ''
-    limited: str = ''
+    refused: Report | None = None
+    limited: Report | None = None
 
 
 class SetpointAll:
@@ -87,7 +85,7 @@ class SetpointAll:
     def _make(self) -> Transfer | None:
         setpoints = self._setpoints()
         refused = self._why_not(setpoints)
-        if refused:
+        if refused is not None:
             self._tell(Told(refused=refused))
             return None
         if not all(setpoint.counts(self._request) for setpoint in setpoints.values()):
@@ -116,25 +114,25 @@ class SetpointAll:
             else:
                 setpoint.was_missed(error)
 
-    def _why_not(self, setpoints: Mapping[str, Setpoint]) -> str:
+    def _why_not(self, setpoints: Mapping[str, Setpoint]) -> Report | None:
         if self._bus.protocol.broadcast is None:
-            return _NO_BROADCAST
+            return Report(Cause.NO_BROADCAST)
         for name, setpoint in setpoints.items():
-            if setpoint.why_not_shared:
-                return f'{name} {setpoint.why_not_shared}'
+            if (refused := setpoint.why_not_shared(name)) is not None:
+                return refused
         meanings = {setpoint.quantity: name for name, setpoint in setpoints.items()}
         if len(meanings) > 1:
             told = ', '.join(
                 f'{name}: {" ".join(quantity).strip()}' for quantity, name in meanings.items()
             )
-            return f'it would not mean the same to all drives ({told})'
-        return ''
+            return Report(Cause.MEMBERS_DIFFER, meanings=told)
+        return None
 
 
-def _limited(request: Request, name: str) -> str:
+def _limited(request: Request, name: str) -> Report | None:
     if abs(request.value) <= request.most:
-        return ''
-    return (
-        f'{request.value:g} is limited to {math.copysign(request.most, request.value):g}, '
-        f'the least that a drive allows ({name})'
+        return None
+    limited = math.copysign(request.most, request.value)
+    return Report(
+        Cause.SHARED_SETPOINT_LIMITED, value=request.value, limited=limited, name=name
     )

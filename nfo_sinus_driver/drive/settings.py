@@ -65,11 +65,6 @@ REFERENCES = _references(AUTO, MONITOR)
 #: The control modes by the names that ``expected_control_mode`` takes.
 CONTROL_MODES = _control_modes(AUTO)
 
-#: Why nothing is written in ``monitor``.
-MONITOR_REFUSAL = (
-    'control_method is monitor: this driver only reads; set control_method to mode_scmd'
-)
-
 _LONGEST_DRIVE_TIMEOUT = 25.0
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-import enum
 import functools
 import math
 from typing import NamedTuple
@@ -31,6 +30,7 @@ from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import StatusCode
+from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.log_entry import LogEntry
 
 NAN = math.nan
@@ -55,14 +55,6 @@ class Measured(NamedTuple):
 
 
 NOT_MEASURED = Measured()
-
-
-class Severity(enum.Enum):
-    """How grave an event is; it becomes the level of a log line."""
-
-    INFO = 'info'
-    WARNING = 'warning'
-    ERROR = 'error'
 
 
 @dataclass(frozen=True)
@@ -271,5 +263,5 @@ class Listener(Protocol):
     def on_log_entry(self, entry: LogEntry) -> None:
         """Take a new entry of the drive's error log."""
 
-    def on_event(self, severity: Severity, text: str) -> None:
-        """Take a line for the log."""
+    def on_event(self, event: Event) -> None:
+        """Take what an operator should know."""

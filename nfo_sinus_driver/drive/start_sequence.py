@@ -24,12 +24,14 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive.advice import NO_RUN_INPUT
 from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
@@ -58,9 +60,9 @@ class StartSequence:
         control_mode = await inverter.read_control_mode()
         expected = inverter.settings.expected_control_mode
         if expected and control_mode != expected:
+            key = inverter.model.key(Role.CONTROL_MODE)
             raise DriveError(
-                f'the drive is in control mode {control_mode}, expected is {expected}: '
-                'set control.mode in the drive or expected_control_mode in the driver'
+                Report(Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key)
             )
         await self.take_control(control_mode)
         await self._confirmation.wait_for_step(lambda now: now.from_bus)
@@ -84,20 +86,17 @@ class StartSequence:
             if wanted(seen):
                 return
             if seen.faulted:
-                raise DriveError(f'the drive did not start: {self._inverter.describe()}')
+                raise DriveError(self._inverter.report(Cause.START_FAULTED))
             # in standby after the start delay it has forgotten the start, and must not wait for
             # another one
             if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(NO_RUN_INPUT)
+                raise DriveError(Report(Cause.NO_RUN_INPUT))
             if seen.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()
             if time.monotonic() > deadline:
-                raise DriveError(
-                    NO_RUN_INPUT
-                    if seen.standby
-                    else f'the drive does not start: {self._inverter.describe()}'
-                )
+                cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
+                raise DriveError(self._inverter.report(cause))
             await self._bus.sleep(confirmation.LOOK_PERIOD)
 
     async def take_control(self, control_mode: str) -> None:

@@ -27,12 +27,15 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive.advice import report_of
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
@@ -45,7 +48,7 @@ _LOST_RETRY_PERIOD = 1.0
 _COMPLAINT_PERIOD = 5.0
 #: Each time it is said after a longer while, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
-_NOT_ANSWERED = 'no answer yet'
+_NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 
 class _Outcome(enum.Enum):
@@ -60,10 +63,6 @@ class _Outcome(enum.Enum):
     UNCONFIRMED = enum.auto()
     #: A fault keeps the motor still, and the drive from taking the stop until it is over.
     BLOCKED_BY_FAULT = enum.auto()
-
-
-class _Busy(Exception):
-    """The drive was too busy for the stop."""
 
 
 class StopSequence:
@@ -94,7 +93,8 @@ class StopSequence:
         self._tried_at = 0.0
         #: How often there was a new reason; what an earlier attempt shows says nothing of it.
         self._reasons = 0
-        self._unconfirmed = ''
+        #: Why it has not been confirmed yet.
+        self._unconfirmed = _NO_ANSWER_YET
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
 
@@ -135,7 +135,7 @@ class StopSequence:
             self.request_anew()
         if self._task is None:
             self._outcome = None
-            self._unconfirmed = _NOT_ANSWERED
+            self._unconfirmed = _NO_ANSWER_YET
             self._due = time.monotonic() + confirmation.TIMEOUT
             self._task = self._bus.spawn(self._keep_trying())
 
@@ -164,11 +164,9 @@ class StopSequence:
             # who waits for a drive that is not there keeps others waiting, and learns no more
             lost = patience is None and not self._inverter.connected and self._outcome is not None
             if lost or time.monotonic() > deadline:
-                raise DriveError(
-                    f'the stop is NOT confirmed: {self._unconfirmed}; it is tried again'
-                )
+                raise DriveError(Report(Cause.STOP_UNCONFIRMED, why=self._unconfirmed))
         if task is not None and task.future.exception() is not None:
-            raise DriveError('the stop is NOT confirmed: the driver is ending')
+            raise DriveError(Report(Cause.STOP_UNCONFIRMED_AT_END))
 
     async def _keep_trying(self) -> None:
         complain_at = self._due
@@ -182,16 +180,13 @@ class StopSequence:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
                 complain_at = time.monotonic() + pause
                 self._inverter.tell(
-                    Severity.ERROR,
-                    f'CANNOT STOP THE MOTOR: {self._unconfirmed}; trying again. '
-                    'Use the RUN input or the emergency stop if it turns',
+                    Severity.ERROR, Report(Cause.CANNOT_STOP, why=self._unconfirmed)
                 )
             await self._rest()
         self._task = None
         self._report_outcome()
         if pause:
-            text = f'the stop is confirmed now: {self._inverter.describe()}'
-            self._inverter.tell(Severity.INFO, text)
+            self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
@@ -203,12 +198,8 @@ class StopSequence:
                 return
             if seen is not None and not seen.faulted:
                 if seen.runs_by_bus:
-                    self._inverter.tell(
-                        Severity.WARNING,
-                        'the fault ended by itself or at the drive, and the motor started by the '
-                        f'run command that stood there ({self._inverter.describe()}): stopping '
-                        'it; call ~/enable to go on',
-                    )
+                    started = self._inverter.report(Cause.STARTED_AFTER_FAULT)
+                    self._inverter.tell(Severity.WARNING, started)
                 return
 
     async def _rest(self) -> None:
@@ -235,14 +226,12 @@ class StopSequence:
         try:
             self._outcome = await self._try_once()
         except (NoAnswer, DamagedAnswer) as error:
-            self._outcome, self._unconfirmed = _Outcome.UNHEARD, str(error)
-        except _Busy as error:
-            self._outcome, self._unconfirmed = _Outcome.BUSY, str(error)
+            self._outcome, self._unconfirmed = _Outcome.UNHEARD, report_of(error)
         except Exception as error:
             # even a mistake of ours must not end the trying
-            self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, str(error) or repr(error)
+            self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
         if self._reasons > reasons:
-            self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NOT_ANSWERED
+            self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
         self._tried_at = time.monotonic()
         self._report_outcome()
         return self._outcome
@@ -262,13 +251,14 @@ class StopSequence:
         :raises LinkError: it was not written, or the status could not be read.
         """
         control_mode = self._inverter.control_mode
-        refusal = ''
+        refusal: Refused | None = None
         try:
             await self._method.stop(control_mode)
         except Refused as error:
             if error.code == Refused.BUSY:
-                raise _Busy(str(error)) from error
-            refusal = str(error)
+                self._unconfirmed = report_of(error)
+                return _Outcome.BUSY
+            refusal = error
         except DamagedAnswer:
             # among late answers a refusal is not believed, until something else was answered
             if self._outcome is _Outcome.UNHEARD:
@@ -278,16 +268,20 @@ class StopSequence:
         if refusal and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
-            self._unconfirmed = refusal
+            self._unconfirmed = report_of(refusal)
             return _Outcome.BLOCKED_BY_FAULT
-        self._unconfirmed = self._why_not(seen, refusal)
-        return _Outcome.UNCONFIRMED if self._unconfirmed else _Outcome.CONFIRMED
+        unconfirmed = self._why_not(seen, refusal)
+        if unconfirmed is None:
+            return _Outcome.CONFIRMED
+        self._unconfirmed = unconfirmed
+        return _Outcome.UNCONFIRMED
 
-    def _why_not(self, seen: InverterStatus, refusal: str) -> str:
-        """Return what keeps a stop from being confirmed; ``''`` if nothing does."""
-        told = self._inverter.describe()
+    def _why_not(self, seen: InverterStatus, refusal: Refused | None) -> Report | None:
+        """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
+        if seen.tuning and refusal:
+            return self._inverter.report(Cause.TUNING_REFUSES, error=str(refusal))
         if seen.tuning:
-            return f'the motor is energised by a tuning ({told})' + (refusal and f': {refusal}')
+            return self._inverter.report(Cause.TUNING_ENERGISES)
         if refusal and not seen.local:
-            return refusal
-        return f'the drive says {told}' if seen.keeps_running else ''
+            return report_of(refusal)
+        return self._inverter.report(Cause.DRIVE_SAYS) if seen.keeps_running else None

@@ -28,14 +28,16 @@ from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Severity
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
@@ -63,19 +65,20 @@ class Tuned:
     How a procedure ended.
 
     :ivar success: the drive says that it has finished.
-    :ivar text: what the drive says, or what went wrong and what to do.
+    :ivar how: what the drive says, or what went wrong.
     :ivar changes: the parameters that are others now, whether it has finished or not.
     """
 
     success: bool
-    text: str
+    how: Report
     changes: tuple[Change, ...]
 
-    def __str__(self) -> str:
+    @property
+    def report(self) -> Report:
+        """All of it."""
         if not self.success and not self.changes:
-            return self.text
-        changed = ', '.join(str(change) for change in self.changes) or 'no parameter'
-        return f'{self.text}; changed: {changed}'
+            return self.how
+        return Report(Cause.TUNING_CHANGED, how=self.how, changes=self.changes)
 
 
 class Tuning:
@@ -112,23 +115,22 @@ class Tuning:
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
                 async with self._procedures.in_standby(access):
-                    self._inverter.tell(Severity.INFO, f'{what} begins: the motor gets current')
+                    self._inverter.tell(Severity.INFO, Report(Cause.TUNING_BEGINS, what=what))
                     await self._procedures.command(access, procedure)
-                    success, text = await self._outcome(what, access, progress)
-                result = Tuned(success, text, await changes())
-        grave = Severity.INFO if success else Severity.ERROR
-        self._inverter.tell(grave, str(result))
+                    how = await self._outcome(what, access, progress)
+                result = Tuned(how.cause is Cause.TUNED, how, await changes())
+        self._inverter.tell(Severity.INFO if result.success else Severity.ERROR, result.report)
         return result
 
     async def _require_motor_plate(self, what: str) -> None:
         for role in _PLATE:
             key = self._inverter.model.key(role)
             if not await self._registers.read_number(key, Priority.SERVICE) > 0:
-                raise DriveError(f'{what} needs {key}: set it as the motor plate says')
+                raise DriveError(Report(Cause.TUNING_NEEDS, what=what, key=key))
 
     async def _outcome(
         self, what: str, access: ExclusiveAccess, progress: Progress
-    ) -> tuple[bool, str]:
+    ) -> Report:
         """Wait until the drive says how it ended."""
         inverter = self._inverter
         started = time.monotonic()
@@ -140,26 +142,18 @@ class Tuning:
             if seen.code != told_code or elapsed > told_at + _TELL_PERIOD:
                 told_code, told_at = seen.code, elapsed
                 progress(seen, elapsed)
-            told = inverter.describe()
             if seen.faulted:
-                fault = seen.listed
-                hint = f'{fault.description}. {fault.remedy}; call ~/fault_ack first'
-                return False, f'{what} failed, {told}: {hint}'
+                return inverter.report(Cause.TUNING_FAILED, what=what, fault=seen.listed)
             if seen.means(Meaning.TUNED):
-                return True, f'{what} finished ({told})'
+                return inverter.report(Cause.TUNED, what=what)
             if seen.means(Meaning.TUNING):
                 begun = True
             elif access.aborted:
-                return False, f'{what} was stopped before it was finished ({told})'
+                return inverter.report(Cause.TUNING_STOPPED, what=what)
             elif begun:
-                return False, (
-                    f'{what} ended, and the drive does not say that it has finished ({told}): '
-                    'was the RUN input lost, or STOP pressed?'
-                )
+                return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
             elif elapsed > confirmation.TIMEOUT:
-                return False, (
-                    f'{what} does not begin ({told}): is its RUN input (DIN1) active?'
-                )
+                return inverter.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
             if elapsed > _LONGEST:
-                raise DriveError(f'{what} has no end ({told}): stopping it')
+                raise DriveError(inverter.report(Cause.TUNING_ENDLESS, what=what))
             await self._bus.sleep(_LOOK_PERIOD)

@@ -20,11 +20,13 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.drive.parameter_writer import describe_drift
-from nfo_sinus_driver.drive.snapshot import Severity
+from nfo_sinus_driver.drive.parameter_writer import show
 
 
 class Settings(Protocol):
@@ -45,7 +47,7 @@ class Settings(Protocol):
         """Return a value as the drive would show it."""
 
     async def change_now(
-        self, wanted: Mapping[str, Value], *, guarded: bool = True, because: str = ''
+        self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
     ) -> tuple[Change, ...]:
         """Write what differs, and read it back."""
 
@@ -76,7 +78,7 @@ class WantedState:
         """Say that a parameter is not as wanted; false if it is."""
         for drift in self.drift:
             if drift.key == key:
-                self._inverter.tell(Severity.WARNING, describe_drift(drift))
+                self._inverter.tell(Severity.WARNING, _not_as_wanted(drift))
                 return True
         return False
 
@@ -94,25 +96,30 @@ class WantedState:
         self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
         missing = [key for key in wanted if key not in here]
         if missing:
-            inverter.tell(
-                Severity.WARNING, f'this drive has no {", ".join(missing)}: not applied'
-            )
+            absent = Report(Cause.WANTED_BUT_MISSING, keys=tuple(missing))
+            inverter.tell(Severity.WARNING, absent)
         drifts = self.drift
         while drifts:
             refused: list[ParameterError] = []
             for drift in drifts:
                 if not write:
-                    inverter.tell(Severity.WARNING, describe_drift(drift))
+                    inverter.tell(Severity.WARNING, _not_as_wanted(drift))
                     continue
                 try:
                     await self._parameters.change_now(
-                        {drift.key: drift.old}, because=', as the parameter file says'
+                        {drift.key: drift.old}, told_as=Cause.CHANGED_AS_WANTED
                     )
                 except ParameterError as error:
                     refused.append(error)
             if len(refused) == len(drifts):
                 for refusal in refused:
-                    text = f'not applied from the parameter file: {refusal}'
-                    inverter.tell(Severity.ERROR, text)
+                    why = refusal.report
+                    inverter.tell(Severity.ERROR, Report(Cause.WANTED_BUT_REFUSED, why=why))
             # values that bound each other may stand in any order
             drifts = self.drift if write and len(refused) < len(drifts) else ()
+
+
+def _not_as_wanted(drift: Change) -> Report:
+    """Return what to say of a parameter that differs from what was wanted."""
+    has = f'{show(drift.new)} {drift.unit}'.rstrip()
+    return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))

@@ -32,7 +32,10 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.advice import explain_fault
 from nfo_sinus_driver.drive.controller import Controller
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.notices import Notices
 from nfo_sinus_driver.drive.picture import take_picture
@@ -42,7 +45,6 @@ from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
-from nfo_sinus_driver.drive.snapshot import Severity
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -126,7 +128,7 @@ class Watch:
         self._turn = 0.0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
-        self._complaint = ''
+        self._complaint: Report | None = None
         #: A status word that came with something else, and has not been judged yet.
         self._told: Reply | None = None
         self._told_fault = 0
@@ -191,7 +193,7 @@ class Watch:
         self._bus.recorder.connected(self._inverter.settings.address)
         self._failing_since = math.inf
         self._failures = 0
-        self._complaint = ''
+        self._complaint = None
         self._told = None
         self._inverter.polled.clear()
 
@@ -212,7 +214,7 @@ class Watch:
                 self._failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
-                self._failed(DriveError(f'error in the driver: {error!r}'))
+                self._failed(DriveError(Report(Cause.DRIVER_ERROR, error=repr(error))))
             if due:
                 if self._inverter.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._inverter.settings.address, started - polled_at)
@@ -353,8 +355,8 @@ class Watch:
         """Say on change that a fault stands, unless who ended a ride because of it has told."""
         code = seen.code if seen.faulted else 0
         if code and code != self._told_fault and not told:
-            text = explain_fault(self._inverter, seen)
-            self._inverter.tell(Severity.ERROR, f'{text}; then call ~/fault_ack')
+            fault = explain_fault(self._inverter, seen)
+            self._inverter.tell(Severity.ERROR, Report(Cause.FAULT_APPEARED, fault=fault))
         self._told_fault = code
 
     async def _measure(self, role: Role) -> float:
@@ -408,7 +410,7 @@ class Watch:
         if not inverter.connected:
             self._failures += 1
             if isinstance(error, DriveError):
-                self._complain(str(error))
+                self._complain(error.report)
             return
         self._failing_since = min(self._failing_since, now)
         # one that answers, but tells no status, cannot be watched either
@@ -420,23 +422,22 @@ class Watch:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
         inverter.connected = False
-        explained = self._explain(error)
+        why = self._explain(error)
         self._bus.recorder.forget_cycle(inverter.settings.address)
-        goes_on = 'tried again for ever'
-        if self._controller is not None and self._controller.lost():
-            goes_on += ', and stopped as soon as it answers; then call ~/enable to go on'
-        inverter.tell(Severity.ERROR, f'lost: {explained}; {goes_on}')
+        in_use = self._controller is not None and self._controller.lost()
+        cause = Cause.LOST_IN_USE if in_use else Cause.LOST
+        inverter.tell(Severity.ERROR, Report(cause, why=why))
         try:
             self._publish(None)
         except Exception:
             # a mistake of who listens must not end the watch
             _log.exception('the loss of the drive could not be told')
 
-    def _complain(self, text: str) -> None:
+    def _complain(self, report: Report) -> None:
         """Say what keeps the drive from being used, once."""
-        if text != self._complaint:
-            self._complaint = text
-            self._inverter.tell(Severity.ERROR, text)
+        if report != self._complaint:
+            self._complaint = report
+            self._inverter.tell(Severity.ERROR, report)
 
     def _publish(self, seen: InverterStatus | None) -> None:
         inverter = self._inverter
@@ -445,7 +446,7 @@ class Watch:
         self.snapshot = take_picture(inverter, self._setpoint, seen, frequency, speed, actual)
         self._listener.on_snapshot(self.snapshot)
 
-    def _explain(self, error: LinkError | DriveError) -> str:
+    def _explain(self, error: LinkError | DriveError) -> Report:
         if isinstance(error, DriveError):
-            return str(error)
+            return error.report
         return explain(error, self._inverter.settings.address, known=True)

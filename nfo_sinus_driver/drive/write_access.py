@@ -23,14 +23,16 @@ import contextlib
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
-from nfo_sinus_driver.drive.errors import DriveError
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.procedure import Procedures
 
 #: Awaited before each write of a setting; raises DriveError if the drive would not take it.
 Allow = Callable[[], Awaitable[None]]
 
-_WHAT = 'a change of settings'
+_WHAT = 'changing settings'
 
 
 class WriteAccess:
@@ -65,7 +67,7 @@ class WriteAccess:
                 # what was had was lost: to somebody who stopped it, or by a serial fault that a
                 # refused write has caused
                 if access.aborted:
-                    raise DriveError(f'{_WHAT} was stopped')
+                    raise DriveError(Report(Cause.PROCEDURE_STOPPED, what=_WHAT))
                 await stack.aclose()
                 access = stack.enter_context(self._procedures.exclusive(_WHAT))
                 await stack.enter_async_context(self._procedures.in_standby(access))

@@ -26,16 +26,18 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
+from nfo_sinus_driver.node.wording import NodeError
 
 #: How long all of them together may take, s. A start delay of a drive may last an hour.
 _LONGEST_ENABLE = 3700.0
 _LONGEST_STOP = 15.0
 
-_Command = Callable[[ManagedDrive], Future[str]]
+_Command = Callable[[ManagedDrive], Future[Report]]
 
 
 class AllDrives:
@@ -101,33 +103,34 @@ class AllDrives:
         """Give a command to every controlled drive; return what failed, and what was done."""
         failed: list[str] = []
         done: list[str] = []
-        futures: list[tuple[str, Future[str]]] = []
+        futures: list[tuple[ManagedDrive, Future[Report]]] = []
         with self._context.at_once():
             for managed in self._context.drives:
                 if managed.settings.control_method == 'monitor':
                     continue
                 try:
-                    futures.append((managed.name, command(managed)))
-                except DriveError as error:
+                    futures.append((managed, command(managed)))
+                except NodeError as error:
                     failed.append(f'{managed.name}: {error}')
         deadline = time.monotonic() + timeout
-        for name, future in futures:
+        for managed, future in futures:
+            name, say = managed.name, managed.wording.say
             try:
                 answer = future.result(max(0.0, deadline - time.monotonic()))
             except DriveError as error:
-                failed.append(f'{name}: {error}')
+                failed.append(f'{name}: {say(error)}')
             except FutureTimeoutError:
                 failed.append(f'{name}: the bus did not get to it in time')
             else:
-                done.append(f'{name}: {answer}')
+                done.append(f'{name}: {say(answer)}')
         return failed, done
 
 
-def _stop_one(managed: ManagedDrive) -> Future[str]:
+def _stop_one(managed: ManagedDrive) -> Future[Report]:
     if managed.drive.identity is None:
-        raise DriveError('it has never answered')
+        raise NodeError('it has never answered')
     return managed.drive.stop()
 
 
-def _enable_one(managed: ManagedDrive) -> Future[str]:
+def _enable_one(managed: ManagedDrive) -> Future[Report]:
     return managed.require_active().enable()

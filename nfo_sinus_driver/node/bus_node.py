@@ -98,4 +98,4 @@ class BusNode(Node):
         if error is None:
             self.get_logger().info(f'{self._port} is open')
         else:
-            self.get_logger().error(f'{error}; trying again for ever')
+            self.get_logger().error(f'{error}; retrying')

@@ -29,9 +29,11 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
+from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a service waits for the bus before it says that it does not know, s. A start delay of
 #: the drive may last an hour.
@@ -68,23 +70,30 @@ class Commands:
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(self, name: str, command: Callable[[Drive], Future[str]], timeout: float) -> None:
+    def offer(
+        self, name: str, command: Callable[[Drive], Future[Report]], timeout: float
+    ) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            return self.answer(response, lambda: command(self._managed.drive), timeout)
+            return self._answer(response, lambda: command(self._managed.drive), timeout)
 
         group = MutuallyExclusiveCallbackGroup()
         self._node.create_service(
             Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
         )
 
+    def _answer(
+        self, response: Any, command: Callable[[], Future[Report]], timeout: float
+    ) -> Any:
+        return self.answer(response, command, timeout, self._managed.wording.say)
+
     def answer(
         self,
         response: Any,
         command: Callable[[], Future[_T]],
         timeout: float,
-        describe: Callable[[_T], str] = str,
+        describe: Callable[[_T], str],
     ) -> Any:
         """
         Give a command, and fill in the answer to who asked for it.
@@ -95,8 +104,8 @@ class Commands:
         try:
             response.message = describe(command().result(timeout))
             response.success = True
-        except DriveError as error:
-            response.message = str(error)
+        except (DriveError, NodeError) as error:
+            response.message = self._managed.wording.say(error)
         except FutureTimeoutError:
             response.message = f'the bus did not get to it within {timeout:g} s'
         except Exception as error:
@@ -109,7 +118,7 @@ class Commands:
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
         if not request.data:
-            return self.answer(response, self._managed.drive.stop, _LONGEST_STOP)
-        return self.answer(
+            return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
+        return self._answer(
             response, lambda: self._managed.require_active().enable(), _LONGEST_COMMAND
         )

@@ -23,6 +23,7 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -35,6 +36,7 @@ from rclpy.parameter import Parameter
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
@@ -50,6 +52,8 @@ from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import coerce
 from nfo_sinus_driver.node.settings import declare
 from nfo_sinus_driver.node.tuning import TuningServices
+from nfo_sinus_driver.node.wording import NodeError
+from nfo_sinus_driver.node.wording import Wording
 
 _NAMES = frozenset(setting.name for setting in DRIVE_SETTINGS)
 #: How long a stop may wait for the bus before it is said that it is not known, s.
@@ -98,12 +102,21 @@ class DriveNode(LifecycleNodeMixin, Node):
         )
         self._drive_parameters = DriveParameters(self)
         queue, follow = context.publish_queue, self._drive_parameters.note
-        reporter = Reporter(self, queue, joint, lambda: self.managed, follow)
+        wording = Wording(self)
+        reporter = Reporter(self, queue, wording, joint, lambda: self.managed, follow)
         #: The drive, for those who command it.
         self.managed = ManagedDrive(
-            self.get_name(), context.bus, self._drive_settings(values), reporter, self.lifecycle
+            self.get_name(),
+            wording,
+            context.bus,
+            self._drive_settings(values),
+            reporter,
+            self.lifecycle,
         )
-        self._wanted = wanted_state(self, self.managed.drive)
+        try:
+            self._wanted = wanted_state(self, self.managed.drive)
+        except DriveError as error:
+            raise ValueError(wording.say(error)) from error
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
         self._setpoints = Setpoints(self, context, self.managed, joint)
@@ -112,7 +125,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         TuningServices(self, self.managed, reporter.stamp)
         context.add(self.managed)
 
-    def stop_for_good(self, patience: float) -> Future[str]:
+    def stop_for_good(self, patience: float) -> Future[Report | None]:
         """
         Stop the motor, and see to it that nobody can start it again.
 
@@ -137,10 +150,10 @@ class DriveNode(LifecycleNodeMixin, Node):
             return TransitionCallbackReturn.FAILURE
         try:
             asked_for = self.managed.connect(patient=self.lifecycle.by_operator)
-        except (DriveError, ValueError) as error:
+        except (DriveError, NodeError, ValueError) as error:
             # of a port that is lost the bus node says so, for all its drives
             port_lost = self._bus_context.bus.port_error is not None
-            self.lifecycle.complain(str(error), known=port_lost)
+            self.lifecycle.complain(self.managed.wording.say(error), known=port_lost)
             return TransitionCallbackReturn.FAILURE
         if not asked_for:
             self.get_logger().info('the settings were changed meanwhile: beginning anew')
@@ -214,14 +227,15 @@ class DriveNode(LifecycleNodeMixin, Node):
         confirmed = self._stop_for(what, drive.deactivate)
         return confirmed or not (drive.stop_unconfirmed and drive.snapshot.connected)
 
-    def _stop_for(self, what: str, command: Callable[[], Future[str]]) -> bool:
+    def _stop_for(self, what: str, command: Callable[[], Future[Any]]) -> bool:
         """Give a command that stops the motor; return whether the drive has confirmed it."""
+        say = self.managed.wording.say
         try:
             answer = command().result(_LONGEST_STOP + self.managed.settings.shutdown_timeout)
         except (DriveError, FutureTimeoutError) as error:
-            self.get_logger().error(f'{what}, but: {error}')
+            self.get_logger().error(f'{what}, but: {say(error)}')
             return False
-        self.get_logger().info(f'{what}: {answer}' if answer else what)
+        self.get_logger().info(f'{what}: {say(answer)}' if answer else what)
         return True
 
     # --- settings -----------------------------------------------------------------------------
@@ -250,7 +264,8 @@ class DriveNode(LifecycleNodeMixin, Node):
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
             admitted = self._drive_parameters.admit(coerced)
         except (ValueError, DriveError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            reason = self.managed.wording.say(error)
+            return SetParametersResult(successful=False, reason=reason)
         with self._drive_parameters.from_outside():
             return super().set_parameters_atomically(admitted)
 
@@ -261,8 +276,9 @@ class DriveNode(LifecycleNodeMixin, Node):
             for parameter in parameters:
                 if parameter.name == 'drive_timeout':
                     self._try_drive_timeout(parameter.value, changes)
-        except (ValueError, DriveError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        except (ValueError, DriveError, NodeError) as error:
+            reason = self.managed.wording.say(error)
+            return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
@@ -302,7 +318,8 @@ class DriveNode(LifecycleNodeMixin, Node):
                 managed.drive.set_drive_timeout(seconds).result(_LONGEST_STOP)
             except (DriveError, FutureTimeoutError) as error:
                 self._drive_parameters.put_back(changes)
-                raise DriveError(f'drive_timeout: {error or "not in time"}') from None
+                why = self.managed.wording.say(error) or 'not in time'
+                raise NodeError(f'drive_timeout: {why}') from None
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.managed.change_settings(self._settings_with(parameters))

@@ -36,7 +36,7 @@ from nfo_sinus_driver.catalog import Parameter as CatalogParameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.
 _LONGEST_CHANGE = 30.0
@@ -113,13 +113,14 @@ class DriveParameters:
         Return parameters to set as the drive will have them; nothing is asked of the drive.
 
         :raises DriveError: the drive cannot have a value, or it may not be changed.
+        :raises ValueError: no such parameter, or a value of another type.
         """
         return [self._admit(parameter) for parameter in parameters]
 
     def _admit(self, parameter: Parameter) -> Parameter:
         if not self._node.has_parameter(parameter.name):
             # rclpy refuses it too, but its message leaves out the name
-            raise DriveError(
+            raise ValueError(
                 f'{parameter.name}: there is no such parameter; those of the drive are there once '
                 'the node is configured'
             )
@@ -144,7 +145,8 @@ class DriveParameters:
         Write parameters that somebody sets to the drive; all of them or none.
 
         :returns: what was changed.
-        :raises DriveError: why not; the drive is as it was, or the message says what is not.
+        :raises DriveError: why not; the drive is as it was, or the error says what is not.
+        :raises NodeError: the bus does not get to it.
         """
         drive = self._drive
         if drive is None or self._outside != threading.get_ident():
@@ -157,6 +159,7 @@ class DriveParameters:
         Undo changes.
 
         :raises DriveError: why not.
+        :raises NodeError: the bus does not get to it.
         """
         if changes and self._drive is not None:
             self._change(self._drive, {change.key: change.old for change in changes})
@@ -166,7 +169,7 @@ class DriveParameters:
         try:
             return drive.parameters.change(wanted).result(_LONGEST_CHANGE)
         except FutureTimeoutError:
-            raise DriveError(
+            raise NodeError(
                 f'{", ".join(wanted)}: the bus did not get to it within {_LONGEST_CHANGE:g} s, but '
                 'may do it yet'
             ) from None
@@ -176,7 +179,7 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
     """
     Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for 'OFF'.
 
-    :raises DriveError: another type altogether.
+    :raises ValueError: another type altogether.
     """
     kind = parameter.kind
     if kind is str and isinstance(given, bool):
@@ -190,7 +193,7 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
         wanted = _KINDS[kind]
         if kind is str:
             wanted = f'one of {", ".join(parameter.labels.values())}'
-        raise DriveError(f'{parameter.key}: {given!r} is given, but it takes {wanted}')
+        raise ValueError(f'{parameter.key}: {given!r} is given, but it takes {wanted}')
     assert isinstance(given, (bool, int, float, str))
     return given
 
@@ -199,7 +202,8 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
     """
     Return the settings of a drive that were given to its node, in a parameter file or by ``-p``.
 
-    :raises DriveError: one of them is of a wrong type, or the drive cannot have it.
+    :raises DriveError: the drive cannot have one of them.
+    :raises ValueError: one is of a wrong type.
     """
     # rclpy has no other way to see the overrides that nobody declared
     given = node._parameter_overrides

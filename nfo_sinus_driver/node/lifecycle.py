@@ -92,7 +92,7 @@ class Lifecycle:
             return
         news, self._complaint = why != self._complaint, why
         if news and not known:
-            log.error(f'{why}; trying again for ever')
+            log.error(f'{why}; retrying')
 
     def _try_to_start(self) -> bool:
         """Configure and activate; return whether the node is active."""

@@ -29,6 +29,7 @@ import ctypes
 import sys
 import time
 import traceback
+from typing import Any
 
 import rclpy
 from rclpy.exceptions import InvalidNodeNameException
@@ -91,7 +92,7 @@ class DriverProcess:
         for name in names:
             try:
                 self._drives.append(DriveNode(name, self._context))
-            except (ParameterException, ValueError, DriveError) as error:
+            except (ParameterException, ValueError) as error:
                 raise ValueError(f'{name}: {error}') from error
         self._warn_of_unknown_names(arguments)
         self._executors = [
@@ -149,7 +150,7 @@ class DriverProcess:
             }
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
         unconfirmed: list[DriveNode] = []
-        releases: dict[Future[str], DriveNode] = {}
+        releases: dict[Future[Any], DriveNode] = {}
         for node, stop in _as_they_end(stops):
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
@@ -176,7 +177,7 @@ def _time_left(node: DriveNode, begun: float) -> float:
     return max(0.0, begun + node.managed.settings.shutdown_timeout - time.monotonic())
 
 
-def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveNode, Future[str]]]:
+def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveNode, Future[Any]]]:
     """
     Yield nodes with their futures: as these end, and at last those that do not end in time.
 
@@ -192,7 +193,7 @@ def _as_they_end(futures: dict[Future[str], DriveNode]) -> Iterator[tuple[DriveN
         yield futures[future], future
 
 
-def _confirmed(node: DriveNode, future: Future[str]) -> bool:
+def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
     """
     Log the answer to a stop or a release; false if there is none, or it is no success.
 
@@ -208,11 +209,12 @@ def _confirmed(node: DriveNode, future: Future[str]) -> bool:
         if not node.managed.drive.heard:
             return True
         # whatever it is, the other drives have to be waited for, too
-        why = str(error) if isinstance(error, DriveError) else f'error in the driver: {error!r}'
+        known = isinstance(error, DriveError)
+        why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
         log.error(why)
         return False
-    if answer:
-        log.info(answer)
+    if answer is not None:
+        log.info(node.managed.wording.say(answer))
     return True
 
 

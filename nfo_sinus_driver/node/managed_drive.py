@@ -21,12 +21,14 @@ import dataclasses
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Listener
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.lifecycle import Lifecycle
+from nfo_sinus_driver.node.wording import NodeError
+from nfo_sinus_driver.node.wording import Wording
 
 #: What identifies a drive or how it is commanded cannot change under way.
 ONLY_UNCONFIGURED = ('address', 'model', 'control_method', 'reference', 'classic_dialect')
@@ -41,17 +43,20 @@ class ManagedDrive:
 
     :param name: the node's.
     :param listener: told about every poll and event, on the worker of the bus.
+    :ivar wording: what it reports, as its node says it.
     """
 
     def __init__(
         self,
         name: str,
+        wording: Wording,
         bus: Bus,
         settings: DriveSettings,
         listener: Listener,
         lifecycle: Lifecycle,
     ) -> None:
         self.name = name
+        self.wording = wording
         self._bus = bus
         self._settings = settings
         self._listener = listener
@@ -100,10 +105,10 @@ class ManagedDrive:
         """
         Return the drive for a command that may turn the motor.
 
-        :raises DriveError: the node takes none; the message says why, and what to do.
+        :raises NodeError: the node takes none; the message says why, and what to do.
         """
         if not self.active:
-            raise DriveError(self._lifecycle.why_not_active)
+            raise NodeError(self._lifecycle.why_not_active)
         return self._drive
 
     def connect(self, *, patient: bool) -> bool:
@@ -113,11 +118,12 @@ class ManagedDrive:
         :param patient: repeat the first request when nobody answers.
         :returns: false if the settings ask for another one meanwhile.
         :raises DriveError: it does not respond, or may not be taken over.
+        :raises NodeError: the one before has not stopped yet.
         :raises ValueError: the model that was found has not all that is set.
         """
         before = self._drive.settings
         if self._drive.stop_unconfirmed and not self._is_asked_for:
-            raise DriveError(f'the stop of the drive at {before.address} is not confirmed yet')
+            raise NodeError(f'the stop of the drive at {before.address} is not confirmed yet')
         if self._settings.model == AUTO:
             detection = detect_model(self._bus, self._settings.address)
             self._found_model = self._bus.run(detection).result()
@@ -133,7 +139,7 @@ class ManagedDrive:
             self._drive.settings = self._concrete
         return asked_for
 
-    def disconnect(self) -> Future[str]:
+    def disconnect(self) -> Future[Report]:
         """Stop the motor, give control back and leave the drive alone."""
         return self._drive.disconnect(self._settings.shutdown_timeout)
 

@@ -35,6 +35,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
@@ -47,6 +48,7 @@ from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.qos import KEPT
 from nfo_sinus_driver.node.qos import LATCHED
 from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.wording import Wording
 
 #: How often diagnostics go out and, while the drive is not connected, the status, s.
 _PERIOD = 1.0
@@ -67,12 +69,14 @@ class Reporter:
         self,
         node: LifecycleNodeMixin,
         queue: PublishQueue,
+        wording: Wording,
         joint: Joint,
         managed: Callable[[], ManagedDrive],
         follow: Callable[[Collection[str]], None],
     ) -> None:
         self._node = node
         self._queue = queue
+        self._wording = wording
         self._joint = joint
         self._managed = managed
         self._follow = follow
@@ -111,15 +115,9 @@ class Reporter:
         """Publish a new entry of the error log."""
         self._queue.put(lambda: self._publish_log_entry(entry))
 
-    def on_event(self, severity: Severity, text: str) -> None:
+    def on_event(self, event: Event) -> None:
         """Log a line."""
-        # one call site for each level: rclpy forbids another level at the same place
-        if severity is Severity.ERROR:
-            self._queue.put(lambda: self._log.error(text))
-        elif severity is Severity.WARNING:
-            self._queue.put(lambda: self._log.warning(text))
-        else:
-            self._queue.put(lambda: self._log.info(text))
+        self._queue.put(lambda: self._log_event(event))
 
     # --- on any thread ------------------------------------------------------------------------
 
@@ -135,6 +133,16 @@ class Reporter:
         return stamp
 
     # --- on the queue's thread ----------------------------------------------------------------
+
+    def _log_event(self, event: Event) -> None:
+        text = self._wording.say(event.report)
+        # one call site for each level: rclpy forbids another level at the same place
+        if event.severity is Severity.ERROR:
+            self._log.error(text)
+        elif event.severity is Severity.WARNING:
+            self._log.warning(text)
+        else:
+            self._log.info(text)
 
     def _frame_id(self) -> str:
         frame_id: str = self._node.get_parameter('frame_id').value

@@ -112,14 +112,15 @@ class Setpoints:
         try:
             self._managed.drive.set_setpoint(value)
         except DriveError as error:
-            self._ignore(str(error))
+            self._ignore(self._managed.wording.say(error))
             return
         if self._managed.drive.armed:
             self._logged_idle = False
         elif not self._logged_idle:
             self._logged_idle = True
+            enable = self._managed.wording.enable
             self._log.info(
-                'set-points arrive, but the drive is not enabled: call ~/enable to follow them'
+                f'set-points arrive, but the drive is not enabled: {enable} to follow them'
             )
 
     def _ignore(self, text: str) -> None:
@@ -152,11 +153,13 @@ class SetpointsForAll:
 
     def _on_told(self, told: Told) -> None:
         """Say on the bus what has changed; a refusal again and again, but not with each request."""
-        again = told.refused and time.monotonic() - self._told_at > _LOG_PERIOD
+        again = told.refused is not None and time.monotonic() - self._told_at > _LOG_PERIOD
         if told == self._told and not again:
             return
         self._told, self._told_at = told, time.monotonic()
-        if told.refused:
-            self._context.log(self._log.warning, f'setpoint_all refused: {told.refused}')
-        elif told.limited:
-            self._context.log(self._log.warning, f'setpoint_all {told.limited}')
+        # it names drives, but nothing that is called
+        say = self._context.drives[0].wording.say
+        if told.refused is not None:
+            self._context.log(self._log.warning, f'setpoint_all refused: {say(told.refused)}')
+        elif told.limited is not None:
+            self._context.log(self._log.warning, f'setpoint_all {say(told.limited)}')

@@ -31,12 +31,15 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
+from nfo_sinus_driver.node.wording import NodeError
 
 _SERVICES = {
     '~/tune_full': Procedure.FULL,
@@ -88,7 +91,8 @@ class TuningServices:
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             tuned = self._result(lambda: self._managed.require_active().tune(procedure).result())
-            response.success, response.message = tuned.success, str(tuned)
+            response.success = tuned.success
+            response.message = self._managed.wording.say(tuned.report)
             return response
 
         return answer
@@ -97,11 +101,13 @@ class TuningServices:
         try:
             return tune()
         except DriveError as error:
-            return Tuned(False, str(error), ())
+            return Tuned(False, error.report, ())
+        except NodeError as error:
+            return Tuned(False, Report(Cause.NOT_POSSIBLE, why=str(error)), ())
         except Exception as error:
             # an exception that leaves a callback would end the executor
             self._node.get_logger().error(f'error in a tuning: {error!r}')
-            return Tuned(False, f'error in the driver: {error}', ())
+            return Tuned(False, Report(Cause.DRIVER_ERROR, error=str(error)), ())
 
     def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
         tuned = self._result(lambda: self._followed(goal))
@@ -113,14 +119,14 @@ class TuningServices:
             goal.abort()
         return Tune.Result(
             success=tuned.success,
-            message=tuned.text,
+            message=self._managed.wording.say(tuned.how),
             changed=[str(change) for change in tuned.changes],
         )
 
     def _followed(self, goal: ServerGoalHandle) -> Tuned:
         procedure = _PROCEDURES.get(goal.request.procedure)
         if procedure is None:
-            raise DriveError(f'there is no procedure {goal.request.procedure}: 0 to 3')
+            raise NodeError(f'there is no procedure {goal.request.procedure}: 0 to 3')
         drive = self._managed.require_active()
         # the bus reports how far it is, and nobody may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()

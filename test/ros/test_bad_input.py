@@ -68,7 +68,7 @@ def _untouched(drive: Simulated) -> None:
 
 def test_an_absent_port_is_waited_for(bench: Bench) -> None:
     driver = bench.driver()
-    _says(driver, bench.port, *bench.way.absent, 'trying again')
+    _says(driver, bench.port, *bench.way.absent, 'retrying')
     bench.simulator()
     bench.client().connected()
 
@@ -151,7 +151,7 @@ def _checks_in_order(driver: Process, *words: str) -> None:
 def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
-    _says(driver, bench.way.nobody[0], '4', 'trying again')
+    _says(driver, bench.way.nobody[0], '4', 'retrying')
     _checks_in_order(driver, *bench.way.nobody)
     client = bench.client()
     assert 'has not answered yet' in client.enable().message
@@ -166,7 +166,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
     drive.inject('power-cycle')
     drive.wait_for(lambda state: not state['silent'], timeout=PATIENCE)
     driver = bench.driver()
-    _says(driver, 'nobody answers at address 1')
+    _says(driver, 'no response from address 1')
     _checks_in_order(driver, *SILENCE)
     _untouched(drive)
 
@@ -222,10 +222,17 @@ def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) ->
     refused = client.enable()
     assert not refused.success
     sensor = 'thermistor' if bench.way.tells else 'temperature sensor'
-    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '~/fault_ack'):
+    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '/nfo_sinus/fault_ack'):
         assert part in refused.message
     assert drive.state()['scmd'] == 0
     assert not drive.state()['turning']
+
+
+def test_what_to_call_is_named_in_full_wherever_it_is(bench: Bench) -> None:
+    bench.simulator().inject('fault', 4, standing=True)
+    bench.driver('-r', '__ns:=/line1', '-r', '~/fault_ack:=reset')
+    refused = bench.client('/line1/nfo_sinus').connected().enable()
+    assert refused.message.endswith('then call /line1/reset')
 
 
 @needs('parameters')

@@ -136,6 +136,6 @@ def test_tuning_is_refused_with_the_reason(rig: Rig) -> None:
     rig.drive.inject('fault', 5)
     rig.client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
     message = rig.client.call('tune_basic').message
-    assert message.startswith('fault 5 Overload stands: ')
-    assert message.endswith('then call ~/fault_ack')
+    assert message.startswith('fault 5 Overload is active: ')
+    assert message.endswith('then call /nfo_sinus/fault_ack')
     assert rig.client.call('fault_ack').success

@@ -84,5 +84,5 @@ def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
         assert port, process.text
         process.signal(signal.SIGINT)
         assert process.wait() == 0
-    wait_until(lambda: 'control given back' in process.text, 'the driver stopped the motor')
+    wait_until(lambda: 'control released' in process.text, 'the driver stopped the motor')
     assert not os.path.exists(port[1]), 'the simulator left its port behind'

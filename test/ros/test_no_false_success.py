@@ -39,8 +39,10 @@ from support.wire import understand
 from ways import needs
 
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.drive_node import DriveNode
@@ -192,8 +194,9 @@ def test_a_stop_that_was_not_confirmed_in_time_is_no_deactivation(
     connected: bool,
     result: TransitionCallbackReturn,
 ) -> None:
-    not_in_time: Future[str] = Future()
-    not_in_time.set_exception(DriveError('the stop is NOT confirmed'))
+    not_in_time: Future[None] = Future()
+    unanswered = Report(Cause.STOP_UNCONFIRMED, why=Report(Cause.NO_ANSWER_YET))
+    not_in_time.set_exception(DriveError(unanswered))
     monkeypatch.setattr(Drive, 'deactivate', lambda self: not_in_time)
     monkeypatch.setattr(Drive, 'stop_unconfirmed', unconfirmed)
     monkeypatch.setattr(Drive, 'snapshot', SimpleNamespace(connected=connected))

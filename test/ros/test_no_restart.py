@@ -87,7 +87,7 @@ def _fault_that_stands(bench: Bench, drive: Simulated, client: Client) -> None:
     client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
     refused = client.call('fault_ack')
     assert not refused.success
-    assert 'Temp Hi still stands' in refused.message
+    assert 'Temp Hi is still active' in refused.message
     drive.inject('ack-cause-gone')
     assert client.call('fault_ack').success
 

@@ -162,7 +162,7 @@ def test_a_fault_that_stands_is_named(stubborn: Stubborn, client: Client) -> Non
     stubborn.simulator.inject('fault', 5)
     client.wait_for('status', lambda status: status.fault, 'the fault')
     text = stubborn.simulator.state()['inv_st_text']
-    refused(set_one(client, 'control.accel', 6.0), 'control.accel', text, '~/fault_ack')
+    refused(set_one(client, 'control.accel', 6.0), 'control.accel', text, '/nfo_sinus/fault_ack')
     assert stubborn.parameters() == before
     assert client.call('fault_ack').success
     assert set_one(client, 'control.accel', 6.0).successful

@@ -51,7 +51,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
     'modbus_tcp': lambda frame: frame[6:],
 }
 #: What a driver says where nobody answers, and what is to be checked, in order.
-SILENCE = 'nobody answers', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
+SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 
 
 @dataclass(frozen=True)

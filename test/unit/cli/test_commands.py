@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 import json
 import re
@@ -25,14 +24,12 @@ from typing import Any
 
 from cli_bench import PATIENCE
 from cli_bench import QUICK
-from cli_bench import ROOT
 from cli_bench import Bench
 from cli_bench import Done
 from cli_bench import MakeBench
 from cli_bench import wait_until
 import pytest
 
-from nfo_sinus_driver.cli.wording import in_our_words
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.simulator.refusal import Reason
@@ -68,7 +65,7 @@ def test_stop(make_bench: MakeBench, way: str) -> None:
     done = bench.run('stop')
     assert done.status == 0, done.err
     assert 'stopping: it ramps down' in done.err
-    assert 'control given back' in done.out
+    assert 'control released' in done.out
     assert bench.stopped
 
 
@@ -170,7 +167,7 @@ def test_stop_waits_for_the_ramp(make_bench: MakeBench) -> None:
     assert not bench.state()['driven'] and bench.state()['source'] == 'stop'
     assert json.loads(done.out) == {
         'confirmed': True,
-        'message': 'stopped (37 Bus Stby); control given back',
+        'message': 'stopped (37 Bus Stby); control released',
     }
 
 
@@ -194,7 +191,7 @@ def test_stop_of_a_drive_that_is_silent(bench: Bench) -> None:
     bench.simulator.inject('silence', 600, address=1)
     done = bench.run('stop', *HASTY)
     assert done.status == 1
-    assert 'the stop is NOT confirmed: nobody answers at address 1' in done.err
+    assert 'the stop is NOT confirmed: no response from address 1' in done.err
     assert 'emergency stop' in done.err
     assert json.loads(bench.run('stop', '--json', *HASTY).out)['confirmed'] is False
 
@@ -242,7 +239,7 @@ def test_ack_of_a_fault_that_still_stands(bench: Bench, nfo: Nfo) -> None:
     bench.simulator.inject('fault', OVERLOAD, address=1, standing=True)
     done = nfo('ack')
     assert done.status == 1 and done.out == ''
-    assert '5 Overload still stands' in done.err and 'Reduce the load' in done.err
+    assert '5 Overload is still active' in done.err and 'Reduce the load' in done.err
     facts = json.loads(nfo('ack', '--json').out)
     assert facts['acknowledged'] is False and facts['code_now'] == OVERLOAD
     bench.simulator.inject('ack-cause-gone', address=1)
@@ -334,7 +331,7 @@ def test_a_signal_cancels_a_tuning(bench: Bench, number: signal.Signals) -> None
 def test_tune_asks_on_a_terminal(bench: Bench, answer: str, tunes: bool) -> None:
     before = bench.value('motor.r_stat')
     done = bench.on_terminal('tune', 'rs', ask='[y/N] ', answer=answer)
-    assert 'the motor gets current and may turn' in done.out
+    assert 'the motor is energised and may turn' in done.out
     assert done.status == (0 if tunes else 1)
     assert (bench.value('motor.r_stat') != before) is tunes
     if tunes:
@@ -418,26 +415,10 @@ def test_erase_while_a_fault_stands(bench: Bench, nfo: Nfo) -> None:
     bench.simulator.inject('fault', 5, address=1)
     done = nfo('errors', '--erase', '--yes')
     assert done.status == 1
-    assert 'fault 5 Overload stands' in done.err and 'type nfo-sinus ack' in done.err
+    assert 'fault 5 Overload is active' in done.err and 'type nfo-sinus ack' in done.err
     assert len(bench.state()['error_log']) == 1
 
 
 def test_erase_of_an_optimal(make_bench: MakeBench) -> None:
     done = make_bench(**OPTIMAL).run('errors', '--erase', '--yes')
     assert done.status == 1 and 'not documented' in done.err
-
-
-# --- words ----------------------------------------------------------------------------------------
-
-
-def test_no_message_of_the_drive_layer_names_what_only_ros_has() -> None:
-    said = [
-        node.value
-        for path in sorted((ROOT / 'nfo_sinus_driver' / 'drive').glob('*.py'))
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    ]
-    services = [text for text in said if '~/' in text]
-    assert services
-    for text in services:
-        assert '~/' not in in_our_words(text)

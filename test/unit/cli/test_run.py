@@ -89,7 +89,7 @@ def test_it_runs_for_a_while_and_stops(make_bench: MakeBench, way: str) -> None:
     out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
     assert bench.stopped
-    assert 'stopping: it ramps down' in err and 'control given back' in err
+    assert 'stopping: it ramps down' in err and 'control released' in err
     assert 'set  10.0 Hz' in out and '10.0 Hz' in out
 
 
@@ -193,7 +193,7 @@ def test_a_signal_stops_the_motor(bench: Bench, number: signal.Signals) -> None:
     assert bench.stopped
     name = 'Ctrl-C' if number is signal.SIGINT else number.name
     assert f'{name}: stopping the motor' in err
-    assert 'ramps down' in err and 'control given back' in err
+    assert 'ramps down' in err and 'control released' in err
 
 
 @pytest.mark.parametrize('way', ['classic', 'optimal', 'drive_control'])
@@ -307,7 +307,7 @@ def test_ctrl_c_on_a_terminal(bench: Bench) -> None:
     terminal.read()
     assert terminal.end() == 0
     assert bench.stopped
-    assert 'control given back' in terminal.said
+    assert 'control released' in terminal.said
 
 
 def test_ctrl_z_does_not_freeze_it(bench: Bench) -> None:
@@ -507,7 +507,7 @@ def test_a_fault_that_stands(bench: Bench, nfo: Nfo) -> None:
     bench.simulator.inject('fault', 5, address=1)
     done = nfo('run', 10)
     assert done.status == 1
-    assert 'fault 5 Overload stands' in done.err and 'type nfo-sinus ack' in done.err
+    assert 'fault 5 Overload is active' in done.err and 'type nfo-sinus ack' in done.err
     assert nothing_commanded(bench)
 
 
@@ -542,7 +542,7 @@ def test_what_makes_no_sense(
 
 def test_nobody_answers(nfo: Nfo) -> None:
     done = nfo('run', 10, '--address', 9, '--response-timeout', 0.1, '--retries', 0)
-    assert done.status == 1 and 'nobody answers at address 9' in done.err
+    assert done.status == 1 and 'no response from address 9' in done.err
 
 
 def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:

@@ -142,7 +142,7 @@ def test_options_stand_before_and_behind_the_verb(nfo: Nfo, bench: Bench) -> Non
 def test_nobody_answers(nfo: Nfo) -> None:
     done = nfo('info', '--address', 9, '--response-timeout', 0.1, '--retries', 0)
     assert done.status == 1 and done.out == ''
-    assert 'nobody answers at address 9' in done.err
+    assert 'no response from address 9' in done.err
 
 
 def test_there_is_no_such_port(nfo: Nfo) -> None:

@@ -41,6 +41,7 @@ from any_order_rig import RESPONSE_TIMEOUT
 from any_order_rig import Rig
 from support import trace_laws
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.simulator.sinus.variant import ALL
@@ -203,12 +204,12 @@ class Laws(History):
         since = max(self._running_since, self.lost_at)
         # the line that is lost was broken before
         from_when = since if self._broken_since is None else min(since, self._broken_since)
-        if self.now > since + SAID and not self._said(from_when, 'CANNOT STOP'):
+        if self.now > since + SAID and not self._said(from_when, Cause.CANNOT_STOP):
             raise Broken(f'it runs since {since:.3f}, and nobody says that it cannot be stopped')
 
-    def _said(self, since: float, what: str) -> bool:
+    def _said(self, since: float, what: Cause) -> bool:
         return any(
-            at >= since and severity is Severity.ERROR and what in text
+            at >= since and severity is Severity.ERROR and what in text.causes
             for at, severity, text in self._rig.notes.events
         )
 

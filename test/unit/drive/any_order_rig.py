@@ -39,11 +39,14 @@ from unittest import mock
 from support.addresses import Words
 from support.addresses import packed
 from support.addresses import words_of
+from support.said import Said
+from support.said import said
 from support.wire import crc
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
@@ -107,7 +110,7 @@ class Notes:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self.snapshot: Snapshot | None = None
-        self.events: list[tuple[float, Severity, str]] = []
+        self.events: list[tuple[float, Severity, Said]] = []
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         self.snapshot = snapshot
@@ -121,8 +124,8 @@ class Notes:
     def on_log_entry(self, entry: LogEntry) -> None:
         pass
 
-    def on_event(self, severity: Severity, text: str) -> None:
-        self.events.append((self._clock.now, severity, text))
+    def on_event(self, event: Event) -> None:
+        self.events.append((self._clock.now, event.severity, said(event)))
 
 
 class _Told:
@@ -367,13 +370,13 @@ class Rig:
     def gave(self, value: float) -> None:
         """Take note of a set-point that was given; whoever wants to know puts himself here."""
 
-    def answer(self, future: Future[Any], patience: float = 60.0) -> str:
+    def answer(self, future: Future[Any], patience: float = 60.0) -> Said:
         """Let time pass until a command is answered; return what it says, done or not."""
         end = self.clock.now + patience
         while not future.done():
             assert self.clock.now < end, 'no answer'
             self.pass_time(_SLICE)
-        return str(future.exception() or future.result())
+        return said(future.exception() or future.result())
 
     def elapse(self, seconds: float) -> None:
         """Let time pass while the driver waits."""

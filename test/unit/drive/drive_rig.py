@@ -31,12 +31,17 @@ import pytest
 from support import trace_laws
 from support.addresses import Words
 from support.addresses import words_of
+from support.said import Said
+from support.said import said
+from support.said import says
 from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
@@ -75,7 +80,7 @@ class Notes:
     def __init__(self) -> None:
         self.snapshots: list[Snapshot] = []
         self.telemetry: list[Telemetry] = []
-        self.events: list[tuple[Severity, str]] = []
+        self.events: list[tuple[Severity, Said]] = []
         self.news: list[str] = []
         self.entries: list[LogEntry] = []
 
@@ -91,12 +96,12 @@ class Notes:
     def on_log_entry(self, entry: LogEntry) -> None:
         self.entries.append(entry)
 
-    def on_event(self, severity: Severity, text: str) -> None:
-        self.events.append((severity, text))
+    def on_event(self, event: Event) -> None:
+        self.events.append((event.severity, said(event)))
 
-    def told(self, part: str, severity: Severity | None = None) -> bool:
+    def told(self, what: str | Cause, severity: Severity | None = None) -> bool:
         """Whether an event says this."""
-        return any(part in text for grave, text in self.events if severity in (None, grave))
+        return any(says(text, what) for grave, text in self.events if severity in (None, grave))
 
 
 class Tap:
@@ -228,23 +233,23 @@ class Rig:
         """Connect and activate."""
         identity = self.drive.connect().result(PATIENCE)
         self.drive.activate()
-        return identity
+        return str(identity)
 
     def enable(self) -> str:
-        return self.drive.enable().result(PATIENCE)
+        return said(self.drive.enable().result(PATIENCE))
 
-    def refused(self, future: Any) -> str:
+    def refused(self, future: Any) -> Said:
         """The message with which a command fails."""
         with pytest.raises(DriveError) as error:
             future.result(PATIENCE)
-        return str(error.value)
+        return said(error.value)
 
-    def answer(self, future: Any) -> str:
+    def answer(self, future: Any) -> Said:
         """What a command answers, done or not."""
         try:
-            return str(future.result(PATIENCE))
+            return said(future.result(PATIENCE))
         except DriveError as error:
-            return str(error)
+            return said(error)
 
     def publish(self, value: float, period: float = 0.005) -> None:
         """Send a set-point again and again, as a program of a user does."""

@@ -27,6 +27,8 @@ from unittest import mock
 
 from any_order_rig import Clock
 from noise_rig import TimedNotes
+from support.said import Said
+from support.said import said
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
@@ -195,13 +197,13 @@ class LineRig:
         for far in self.fars.values():
             far.advance_to(self.clock.now)
 
-    def answer(self, future: Future[Any], patience: float = 60.0) -> str:
+    def answer(self, future: Future[Any], patience: float = 60.0) -> Said:
         """Let time pass until a command is answered; return what it says, done or not."""
         end = self.clock.now + patience
         while not future.done():
             assert self.clock.now < end, 'no answer'
             self.pass_time(_SLICE)
-        return str(future.exception() or future.result())
+        return said(future.exception() or future.result())
 
     def polls(self, seconds: float) -> Counter[int]:
         """Let time pass; return how many statuses of each drive were told meanwhile."""

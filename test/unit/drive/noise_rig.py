@@ -27,8 +27,10 @@ from unittest import mock
 from any_order_rig import Clock
 from any_order_rig import Notes
 from any_order_rig import Rig
+from support.said import says
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
@@ -182,8 +184,8 @@ class NoiseRig(Rig):
         """Why the driver gave the motor up since the ride began, each time."""
         return [text for _, _, text in self.notes.events if text.startswith(_ENDS)]
 
-    def said(self, part: str, severity: Severity | None = None) -> bool:
+    def said(self, what: str | Cause, severity: Severity | None = None) -> bool:
         """Whether an event says this."""
         return any(
-            part in text for _, grave, text in self.notes.events if severity in (None, grave)
+            says(text, what) for _, grave, text in self.notes.events if severity in (None, grave)
         )

@@ -31,6 +31,7 @@ from test_any_order import G2ModeScmd
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
@@ -98,8 +99,8 @@ def test_a_serial_fault_that_stands_keeps_nobody_from_acknowledging_it(
     rig = make_virtual(drive_timeout=2.0)
     timed_out(rig)
     assert 'firmware' in rig.connect()
-    assert rig.said('drive_timeout cannot be set yet', Severity.WARNING)
-    assert 'Sio Fail stands' in rig.answer(rig.drive.enable())
+    assert rig.said(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
+    assert 'Sio Fail is active' in rig.answer(rig.drive.enable())
     assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
     writes: list[tuple[int, Words]] = []
     rig.wrote = lambda register, words: writes.append((register, words))
@@ -186,7 +187,7 @@ def test_why_it_stops_is_told_although_the_line_is_lost_at_once(
     rig.send(10.0)
     rig.pass_time(2.0)
     assert rig.said('stopping: it refused set-point 10', Severity.WARNING)
-    assert rig.said('tried again for ever, and stopped as soon as it answers', Severity.ERROR)
+    assert rig.said('retrying, and stopped as soon as it answers', Severity.ERROR)
     rig.before = lambda register, words: None
     rig.link.mend()
     rig.pass_time(5.0)

@@ -26,8 +26,10 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 from support.addresses import Words
+from support.said import said
 from virtual_rig import MakeVirtual
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
@@ -81,7 +83,7 @@ def test_one_that_is_busy_for_ever_is_told_of(rig: Rig) -> None:
 def test_a_stop_is_tried_on(rig: Rig) -> None:
     rig.turn()
     busy = Busy(rig, 3, SCMD)
-    assert rig.drive.stop().result(PATIENCE).startswith(('stopping', 'stopped'))
+    assert said(rig.drive.stop().result(PATIENCE)).startswith(('stopping', 'stopped'))
     assert busy.said == 3
     rig.wait_until_still()
 
@@ -156,7 +158,7 @@ def test_one_that_was_busy_was_not_switched_off(make_virtual: MakeVirtual) -> No
     rig.pass_time(0.03)
     rig.far.control_unit.press('stop')
     rig.pass_time(0.5)
-    assert rig.said('Somebody pressed STOP', Severity.WARNING)
+    assert rig.said(Cause.CONTROL_LOST, Severity.WARNING)
     assert not rig.said('did not answer')
     assert not rig.said('switched off')
 
@@ -175,7 +177,7 @@ def test_one_that_did_not_answer_a_setpoint_may_have_been(make_virtual: MakeVirt
     rig.before = miss
     rig.send(10.0)
     rig.pass_time(0.5)
-    assert rig.said('the drive did not answer for a moment', Severity.WARNING)
+    assert rig.said(Cause.POWER_CYCLED, Severity.WARNING)
 
 
 def test_one_that_is_busy_while_connected_to_is_no_other_model(

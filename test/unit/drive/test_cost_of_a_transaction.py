@@ -27,8 +27,8 @@ from support.addresses import register
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link import rtu
@@ -58,7 +58,7 @@ class Nobody:
     def on_log_entry(self, entry: LogEntry) -> None:
         pass
 
-    def on_event(self, severity: Severity, text: str) -> None:
+    def on_event(self, event: Event) -> None:
         pass
 
 

@@ -28,10 +28,12 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.said import said
 from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import confirmation
@@ -58,10 +60,10 @@ def test_connect_says_who_answers(rig: Rig) -> None:
     assert 'firmware 4.38 / 4018' in identity
     assert rig.drive.identity is not None
     assert rig.drive.identity.firmware == pytest.approx(4.38)
-    assert rig.notes.told('connected: ', Severity.INFO)
+    assert rig.notes.told(Cause.CONNECTED, Severity.INFO)
     assert rig.notes.told(identity, Severity.INFO)
     # a second time is no harm
-    assert rig.drive.connect().result(PATIENCE) == identity
+    assert str(rig.drive.connect().result(PATIENCE)) == identity
     assert not rig.drive.armed
 
 
@@ -83,13 +85,13 @@ def is_request(frame: dict[str, Any]) -> bool:
 def test_missing_time_out_is_mentioned(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.connect()
-    assert rig.notes.told('SioTot is 0', Severity.WARNING)
+    assert rig.notes.told(Cause.OWN_TIMEOUT_OFF, Severity.WARNING)
 
 
 def test_nobody_at_this_address(make_rig: MakeRig) -> None:
     rig = make_rig(address=7, response_timeout=0.05, retries=0)
     message = rig.refused(rig.drive.connect())
-    assert message.startswith('nobody answers at address 7: check in this order')
+    assert message.startswith('no response from address 7: check in this order')
     # what is wrong most often stands first [C93]
     hints = [message.index(word) for word in ('BusType', 'S5', 'address, baud', 'parity')]
     assert hints == sorted(hints)
@@ -172,10 +174,10 @@ def test_a_ride(rig: Rig) -> None:
     for frequency in (20.0, -15.0, 0.0, 7.5):
         rig.publish(frequency)
         rig.wait_for_frequency(frequency)
-    assert rig.drive.stop().result(PATIENCE) == 'stopping: it ramps down'
+    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
     assert not rig.drive.armed
     rig.assert_stays_still()
-    assert rig.drive.stop().result(PATIENCE) == 'stopped (37 Bus Stby)'
+    assert said(rig.drive.stop().result(PATIENCE)) == 'stopped (37 Bus Stby)'
     # control is kept
     assert rig.far.control_unit.mode is Mode.BUS
     assert rig.enable().startswith('enabled')
@@ -186,7 +188,7 @@ def test_stop_that_coasts_says_so(make_rig: MakeRig) -> None:
     # a slow ramp would be noticed: it is not used
     rig = make_rig(parameters={'control.st_mode': 'Release', 'control.retard': 60.0})
     rig.turn()
-    answer = rig.drive.stop().result(PATIENCE)
+    answer = said(rig.drive.stop().result(PATIENCE))
     assert answer == 'stopping: it coasts' or answer.startswith('stopped (')
     rig.assert_stays_still()
 
@@ -194,7 +196,7 @@ def test_stop_that_coasts_says_so(make_rig: MakeRig) -> None:
 def test_quick_stop_lets_the_motor_coast(make_rig: MakeRig) -> None:
     rig = make_rig(parameters={'control.retard': 60.0})
     rig.turn()
-    assert rig.drive.quick_stop().result(PATIENCE) == 'released: the motor coasts'
+    assert said(rig.drive.quick_stop().result(PATIENCE)) == 'released: the motor coasts'
     assert not rig.far.motor.driven
     assert rig.writes(MODE)[-1] == Mode.STOP
     rig.assert_stays_still()
@@ -209,7 +211,7 @@ def test_stops_of_a_drive_with_a_fault(rig: Rig) -> None:
     rig.simulator.inject('fault', 5)
     wait_until(lambda: not rig.drive.armed)
     for command in (rig.drive.stop, rig.drive.quick_stop):
-        assert command().result(PATIENCE).startswith('stopped by fault 5 Overload')
+        assert said(command().result(PATIENCE)).startswith('stopped by fault 5 Overload')
 
 
 def test_stop_of_a_drive_that_is_not_ours(rig: Rig) -> None:
@@ -228,7 +230,7 @@ def test_enable_needs_an_active_drive(rig: Rig) -> None:
     assert rig.refused(rig.drive.enable()) == 'the drive is not active'
     rig.drive.activate()
     rig.enable()
-    assert rig.drive.deactivate().result(PATIENCE).startswith('stop')
+    assert said(rig.drive.deactivate().result(PATIENCE)).startswith('stop')
     assert not rig.drive.armed
     assert rig.refused(rig.drive.enable()) == 'the drive is not active'
     rig.wait_until_still()
@@ -262,7 +264,7 @@ def test_fault_that_stands(rig: Rig) -> None:
     rig.connect()
     rig.simulator.inject('fault', OVERLOAD)
     message = rig.refused(rig.drive.enable())
-    assert message.startswith('fault 5 Overload stands: The power monitor has tripped')
+    assert message.startswith('fault 5 Overload is active: The power monitor has tripped')
     assert 'Reduce the load' in message
     assert message.endswith('then call ~/fault_ack')
     assert RUN not in rig.writes(SCMD)
@@ -350,7 +352,7 @@ def test_acknowledge(rig: Rig) -> None:
     assert rig.drive.snapshot.remedy
     assert rig.notes.told('fault 5 Overload')
     rig.acknowledged = 1
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert rig.far.control_unit.ack_reads == 1
     rig.assert_stays_still()
     assert rig.enable().startswith('enabled')
@@ -362,14 +364,14 @@ def test_acknowledge_what_still_stands(rig: Rig) -> None:
     rig.simulator.inject('fault', OVERLOAD, standing=True)
     rig.acknowledged = 1
     message = rig.refused(rig.drive.acknowledge())
-    assert message.startswith('5 Overload still stands: The power monitor has tripped')
+    assert message.startswith('5 Overload is still active: The power monitor has tripped')
     assert 'Reduce the load' in message
     assert rig.far.faults.codes == [OVERLOAD]
 
 
 def test_nothing_to_acknowledge(rig: Rig) -> None:
     rig.connect()
-    answer = rig.drive.acknowledge().result(PATIENCE)
+    answer = said(rig.drive.acknowledge().result(PATIENCE))
     assert answer.startswith('nothing to acknowledge (')
     assert rig.far.control_unit.ack_reads == 0
 
@@ -381,7 +383,7 @@ def test_serial_fault_is_acknowledged(make_rig: MakeRig, code: int) -> None:
     rig.simulator.inject('fault', code)
     wait_until(lambda: not rig.drive.armed)
     rig.acknowledged = 1
-    assert rig.drive.acknowledge().result(PATIENCE).startswith(f'acknowledged {code} ')
+    assert said(rig.drive.acknowledge().result(PATIENCE)).startswith(f'acknowledged {code} ')
     assert rig.far.faults.codes == []
     rig.assert_stays_still()
 
@@ -409,7 +411,7 @@ def test_monitor_writes_nothing_at_all(make_rig: MakeRig) -> None:
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: rig.drive.snapshot.kind is Kind.FAULT)
     rig.drive.deactivate().result(PATIENCE)
-    assert rig.drive.disconnect(1.0).result(PATIENCE) == 'only watched'
+    assert said(rig.drive.disconnect(1.0).result(PATIENCE)) == 'only watched'
     assert functions(rig) <= ONLY_READ
     assert rig.far.control_unit.ack_reads == 0
 
@@ -466,9 +468,9 @@ def test_set_point_is_clamped(
     assert rig.far.memory.raw('status.frq_set') == 10 * given
     rig.next_snapshots(5)
     # said once, not with every message
-    said = [text for _, text in rig.notes.events if 'is limited to' in text]
-    assert len(said) == 1
-    assert said[0].startswith(f'set-point {asked:g} is limited to {given:g}')
+    texts = [text for _, text in rig.notes.events if 'is limited to' in text]
+    assert len(texts) == 1
+    assert texts[0].startswith(f'set-point {asked:g} is limited to {given:g}')
     rig.publish(5.0)
     wait_until(lambda: rig.drive.snapshot.setpoint == 5.0)
     assert not rig.drive.snapshot.setpoint_clamped
@@ -516,7 +518,7 @@ def test_set_points_stop_coming(make_rig: MakeRig) -> None:
     assert rig.far.motor.driven
     rig.publish(8.0)
     rig.wait_for_frequency(8.0)
-    wait_until(lambda: rig.notes.told('set-points arrive again', Severity.INFO))
+    wait_until(lambda: rig.notes.told(Cause.SETPOINTS_AGAIN, Severity.INFO))
 
 
 def test_set_points_may_stop_coming_for_ever(make_rig: MakeRig) -> None:
@@ -546,10 +548,11 @@ def test_drive_timeout_is_set(make_rig: MakeRig) -> None:
     assert rig.far.writes == {'serial.sio_tot': 1, 'serial.auto_stop': 1}
     assert rig.notes.told('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
     assert rig.notes.told('serial.auto_stop: false -> true (drive_timeout)')
-    assert not rig.notes.told('SioTot is 0')
+    assert not rig.notes.told(Cause.OWN_TIMEOUT_OFF)
     # parameters live in EEPROM: what is right is not written again
-    assert rig.drive.set_drive_timeout(2.5).result(PATIENCE) == ''
-    assert 'serial.sio_tot: 2.5 -> 3 s' in rig.drive.set_drive_timeout(3.0).result(PATIENCE)
+    assert rig.drive.set_drive_timeout(2.5).result(PATIENCE) == ()
+    (change,) = rig.drive.set_drive_timeout(3.0).result(PATIENCE)
+    assert str(change) == 'serial.sio_tot: 2.5 -> 3 s'
     assert rig.far.writes == {'serial.sio_tot': 2, 'serial.auto_stop': 1}
 
 
@@ -557,7 +560,7 @@ def test_drive_timeout_may_be_left_as_it_is(make_rig: MakeRig) -> None:
     rig = make_rig(parameters={'serial.sio_tot': 7.0})
     rig.connect()
     assert timeouts(rig) == (70, 0)
-    assert rig.drive.set_drive_timeout(0.0).result(PATIENCE) == ''
+    assert rig.drive.set_drive_timeout(0.0).result(PATIENCE) == ()
     assert not rig.far.writes
 
 
@@ -623,8 +626,8 @@ def test_bus_is_never_silent_for_long(make_rig: MakeRig) -> None:
 def test_clean_exit(make_rig: MakeRig) -> None:
     rig = make_rig(drive_timeout=5.0)
     rig.turn()
-    answer = rig.drive.disconnect(PATIENCE).result(PATIENCE)
-    assert answer == 'stopping: it ramps down; control given back'
+    answer = said(rig.drive.disconnect(PATIENCE).result(PATIENCE))
+    assert answer == 'stopping: it ramps down; control released'
     assert not rig.far.motor.driven
     assert rig.far.control_unit.mode is Mode.STOP
     assert rig.far.control_unit.mode_ext_writes == 0
@@ -641,7 +644,7 @@ def test_clean_exit(make_rig: MakeRig) -> None:
 def test_exit_of_one_who_never_had_control(rig: Rig) -> None:
     rig.connect()
     rig.simulator.inject('keypad', 'start')
-    assert rig.drive.disconnect(1.0).result(PATIENCE) == 'control is not ours'
+    assert said(rig.drive.disconnect(1.0).result(PATIENCE)) == 'not under bus control'
     assert rig.far.motor.driven
     assert functions(rig) <= ONLY_READ
 
@@ -649,7 +652,7 @@ def test_exit_of_one_who_never_had_control(rig: Rig) -> None:
 def test_exit_leaves_a_slow_motor_to_its_ramp(make_rig: MakeRig) -> None:
     rig = make_rig(parameters={'control.retard': 60.0})
     rig.turn()
-    answer = rig.drive.disconnect(0.1).result(PATIENCE)
+    answer = said(rig.drive.disconnect(0.1).result(PATIENCE))
     assert answer == 'stopping: it ramps down; it was left to its ramp, under bus control'
     assert rig.far.motor.driven
     assert rig.writes(SCMD)[-1] == 0
@@ -659,7 +662,7 @@ def test_exit_leaves_a_slow_motor_to_its_ramp(make_rig: MakeRig) -> None:
 def test_exit_releases_a_slow_motor_that_would_end_in_a_fault(make_rig: MakeRig) -> None:
     rig = make_rig(parameters={'control.retard': 60.0}, drive_timeout=5.0)
     rig.turn()
-    answer = rig.drive.disconnect(0.1).result(PATIENCE)
+    answer = said(rig.drive.disconnect(0.1).result(PATIENCE))
     assert answer.startswith('released to coast')
     assert not rig.far.motor.driven
     rig.skip(10.0)
@@ -713,7 +716,7 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
 def test_settings_that_make_no_sense(setting: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=next(iter(setting))) as error:
         DriveSettings(**setting)
-    assert message in str(error.value)
+    assert message in said(error.value)
 
 
 def test_settings_that_do() -> None:

@@ -31,6 +31,7 @@ from drive_rig import wait_until
 import pytest
 from support.addresses import Words
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import confirmation
@@ -110,7 +111,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('run', 'off')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('its RUN input (DIN1) was lost or', Severity.WARNING)
+    assert rig.notes.told(Cause.STOPPED_BY_ITSELF, Severity.WARNING)
     rig.assert_stays_still()
     rig.simulator.inject('run', 'on')
     assert_only_enable_helps(rig)
@@ -130,7 +131,7 @@ def test_stop_key(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('keypad', 'stop')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('pressed STOP at the keypad, or', Severity.WARNING)
+    assert rig.notes.told(Cause.CONTROL_LOST, Severity.WARNING)
     assert_only_enable_helps(rig)
 
 
@@ -178,7 +179,7 @@ def test_long_power_cycle(make_rig: MakeRig) -> None:
     rig.simulator.inject('power-cycle', 3600)
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: not rig.drive.snapshot.connected)
-    assert rig.notes.told('tried again for ever', Severity.ERROR)
+    assert rig.notes.told('retrying', Severity.ERROR)
     rig.set_response_timeout(2.0)
     rig.boot()
     wait_until_connected(rig)
@@ -356,7 +357,7 @@ def test_motor_that_somebody_else_starts_is_stopped(rig: Rig) -> None:
     rig.publish(20.0)
     run_by_somebody_else(rig)
     rig.wait_until_still()
-    assert rig.notes.told('although nobody enabled it', Severity.WARNING)
+    assert rig.notes.told(Cause.RUNS_UNASKED, Severity.WARNING)
     rig.assert_stays_still()
 
 
@@ -446,10 +447,10 @@ def test_stop_when_nobody_answers_is_tried_on_and_on(
     rig.simulator.inject('line-dead', 3600)
     message = rig.refused(rig.drive.stop())
     assert 'the stop is NOT confirmed' in message
-    assert 'it is tried again' in message
+    assert 'retrying' in message
     assert not rig.drive.armed
     assert rig.drive.stop_unconfirmed
-    wait_until(lambda: rig.notes.told('CANNOT STOP THE MOTOR', Severity.ERROR))
+    wait_until(lambda: rig.notes.told(Cause.CANNOT_STOP, Severity.ERROR))
     assert rig.notes.told('emergency stop')
     rig.set_response_timeout(2.0)
     rig.simulator.inject('heal')

@@ -25,6 +25,7 @@ from drive_rig import wait_until
 import pytest
 from ros.ways import WAYS
 from ros.ways import Way
+from support.said import said
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
@@ -96,7 +97,7 @@ class Rig:
     def refused(self, future) -> str:
         with pytest.raises(DriveError) as error:
             future.result(PATIENCE)
-        return str(error.value)
+        return said(error.value)
 
 
 @pytest.fixture(params=WAYS.values(), ids=WAYS)
@@ -126,17 +127,17 @@ def test_acknowledging(rig: Rig) -> None:
     rig.trip(5)
     wait_until(lambda: rig.drive.snapshot.text == 'Overload')
     assert rig.far.control_unit.ack_reads == 0
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert not rig.far.faults
     unit = rig.far.control_unit
     assert (unit.ack_reads, unit.sio_err_reads, unit.mode_ext_writes) == (1, 0, 0)
-    assert 'nothing to acknowledge' in rig.drive.acknowledge().result(PATIENCE)
+    assert 'nothing to acknowledge' in said(rig.drive.acknowledge().result(PATIENCE))
 
 
 def test_a_fault_whose_cause_lasts(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.trip(5, cause_present=True)
-    assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+    assert '5 Overload is still active' in rig.refused(rig.drive.acknowledge())
 
 
 @pytest.mark.parametrize(
@@ -159,7 +160,7 @@ def test_a_drive_that_takes_no_word_while_a_fault_stands(
         rig.drive.enable().result(PATIENCE)
         rig.trip(code)
         wait_until(lambda: not rig.drive.armed)
-        assert rig.drive.acknowledge().result(PATIENCE) == f'acknowledged {code} {text}'
+        assert said(rig.drive.acknowledge().result(PATIENCE)) == f'acknowledged {code} {text}'
         assert not rig.far.faults
         # what was refused of the stops before and after it is no fault of its own
         assert not rig.far.faults.sio_err & ~(LineError.BLOCKED | LineError.NOT_PERMITTED)
@@ -180,7 +181,7 @@ def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
         with rig.simulator.lock:
             rig.far.trip(5, cause_present=True)
         wait_until(lambda: not rig.drive.armed)
-        assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+        assert '5 Overload is still active' in rig.refused(rig.drive.acknowledge())
     finally:
         rig.stop()
 
@@ -204,7 +205,7 @@ def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(
             assert 'keypad or terminals have control' in rig.refused(rig.drive.acknowledge())
             assert rig.far.faults
         else:
-            assert 'acknowledged 14 Sio Fail' in rig.drive.acknowledge().result(PATIENCE)
+            assert 'acknowledged 14 Sio Fail' in said(rig.drive.acknowledge().result(PATIENCE))
             assert not rig.far.faults
         assert rig.far.control_unit.mode == Mode.EXT
     finally:
@@ -222,7 +223,7 @@ def test_the_reason_of_a_serial_fault_is_told(name: str, method: str) -> None:
         rig.drive.enable().result(PATIENCE)
         rig.simulator.inject('sio-error', 4)
         wait_until(lambda: not rig.drive.armed)
-        answer = rig.drive.acknowledge().result(PATIENCE)
+        answer = said(rig.drive.acknowledge().result(PATIENCE))
         # there is no SioErr over Modbus, and MODE = Stop clears it where it is obeyed [C9], [C99]
         reason = ' (time-out of the serial communication)' if name == 'classic_v5' else ''
         assert answer == f'acknowledged 14 Sio Fail{reason}'
@@ -245,7 +246,7 @@ def test_the_error_log(rig: Rig) -> None:
     # only the older firmware has more of them [C4]
     every = rig.drive.error_log(1000).result(PATIENCE)
     assert len(every) == (128 if rig.way.name == 'classic_v5' else 32)
-    assert rig.drive.erase_error_log().result(PATIENCE) == 'the error log is erased'
+    assert said(rig.drive.erase_error_log().result(PATIENCE)) == 'the error log is erased'
     assert rig.far.faults.log == []
     assert not rig.far.faults
     assert rig.drive.error_log().result(PATIENCE) == ()
@@ -273,7 +274,7 @@ def test_the_energy(rig: Rig) -> None:
         assert 'came with firmware 4.38; this drive has an older one' in message
         assert rig.far.counters.energy > 1
     else:
-        assert rig.drive.reset_energy().result(PATIENCE) == 'status.e_out: 1.234 -> 0.000 kWh'
+        assert said(rig.drive.reset_energy().result(PATIENCE)) == 'status.e_out: 1.234 -> 0.000 kWh'
         assert rig.far.counters.energy == 0
     assert rig.far.control_unit.mode_ext_writes == 0
     assert not rig.far.faults
@@ -311,7 +312,7 @@ def test_a_tuning_is_cancelled(rig: Rig) -> None:
     wait_until(lambda: rig.far.control_unit.status_code == _TUNING)
     rig.drive.cancel_tuning().result(PATIENCE)
     result = future.result(PATIENCE)
-    assert not result.success and 'was stopped' in result.text
+    assert not result.success and 'was stopped' in said(result.how)
     assert rig.far.control_unit.tuning is None
     assert rig.far.control_unit.mode == 1
     assert not rig.far.faults
@@ -322,10 +323,10 @@ def test_a_tuning_that_fails(rig: Rig) -> None:
         pytest.skip('nothing can fail')
     rig.simulator.inject('tuning-fails', 17)
     result = rig.drive.tune(Procedure.STATOR_RESISTANCE).result(PATIENCE)
-    assert not result.success and '17 TunFailM' in result.text
+    assert not result.success and '17 TunFailM' in said(result.how)
     # nothing begins while a fault stands
-    assert '17 TunFailM stands' in rig.refused(rig.drive.tune(Procedure.FULL))
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 17 TunFailM'
+    assert '17 TunFailM is active' in rig.refused(rig.drive.tune(Procedure.FULL))
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 17 TunFailM'
 
 
 def test_tuning_is_refused_while_the_motor_runs(rig: Rig) -> None:

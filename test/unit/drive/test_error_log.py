@@ -25,6 +25,7 @@ from drive_rig import SCMD
 from drive_rig import MakeRig
 from drive_rig import Rig
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.simulator.faults import LogEntry
 
@@ -120,7 +121,7 @@ def test_erasing(rig: Rig, found: int) -> None:
     if found == 3:
         with rig.simulator.lock:
             rig.far.write_raw('fieldbus.mode', 3)
-    assert rig.drive.erase_error_log().result(PATIENCE) == 'the error log is erased'
+    assert said(rig.drive.erase_error_log().result(PATIENCE)) == 'the error log is erased'
     assert rig.far.faults.log == []
     assert rig.far.control_unit.mode == found
     assert rig.drive.error_log().result(PATIENCE) == ()
@@ -145,7 +146,7 @@ def test_the_energy_counter(rig: Rig) -> None:
     rig.connect()
     assert rig.far.counters.energy > 1
     total = rig.far.counters.total_energy
-    answer = rig.drive.reset_energy().result(PATIENCE)
+    answer = said(rig.drive.reset_energy().result(PATIENCE))
     assert answer == 'status.e_out: 1.234 -> 0.000 kWh'
     assert rig.far.counters.energy == 0
     assert rig.far.counters.total_energy == total

@@ -23,11 +23,13 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
@@ -82,11 +84,11 @@ def test_every_fault(make_rig: MakeRig, model: str, method: str, reference: str)
             f'fault {code} {listed.text}: {listed.description}. {listed.remedy}; '
             'then call ~/fault_ack'
         ]
-        assert f'fault {code} {listed.text} stands' in rig.refused(rig.drive.enable())
+        assert f'fault {code} {listed.text} is active' in rig.refused(rig.drive.enable())
         # a serial fault of a G2 is acknowledged by MODE = Stop alone [C99]
         by_mode = model == 'sinus_g2' and code == SIO_FAIL
         rig.acknowledged += method == 'mode_scmd' and not by_mode
-        answer = rig.drive.acknowledge().result(PATIENCE)
+        answer = said(rig.drive.acknowledge().result(PATIENCE))
         assert answer == f'acknowledged {code} {listed.text}'
         assert rig.far.faults.codes == []
         wait_until(lambda: rig.notes.snapshots[-1].kind is Kind.STATUS)
@@ -144,13 +146,13 @@ def test_what_was_acknowledged_and_what_still_stands(
     show(rig, OVERLOAD)
     rig.acknowledged = 10
     message = rig.refused(rig.drive.acknowledge())
-    assert message.startswith('acknowledged 5 Overload, but 3 Temp Hi still stands: ')
+    assert message.startswith('acknowledged 5 Overload, but 3 Temp Hi is still active: ')
     assert 'Let it cool' in message
     message = rig.refused(rig.drive.acknowledge())
-    assert message.startswith('3 Temp Hi still stands: ')
+    assert message.startswith('3 Temp Hi is still active: ')
     rig.simulator.inject('ack-cause-gone')
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 3 Temp Hi'
-    assert rig.drive.acknowledge().result(PATIENCE).startswith('nothing to acknowledge')
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 3 Temp Hi'
+    assert said(rig.drive.acknowledge().result(PATIENCE)).startswith('nothing to acknowledge')
 
 
 def test_reading_the_status_with_ack_acknowledges_once(make_rig: MakeRig) -> None:
@@ -169,7 +171,7 @@ def test_mode_stop_ends_a_serial_fault(make_rig: MakeRig) -> None:
     rig.simulator.inject('fault', SIO_FAIL)
     wait_until(lambda: not rig.drive.armed)
     rig.acknowledged = 1
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 14 Sio Fail'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 14 Sio Fail'
     assert rig.writes(MODE)[-1] == 1
     rig.assert_stays_still()
 
@@ -243,8 +245,8 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP)
     assert len(rig.notes.snapshots) - before <= 2
     rig.assert_stays_still()
-    assert not rig.notes.told('CANNOT STOP')
-    assert not rig.notes.told('nobody enabled it')
+    assert not rig.notes.told(Cause.CANNOT_STOP)
+    assert not rig.notes.told(Cause.RUNS_UNASKED)
     assert rig.notes.told('the motor started by the run command that stood there')
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(20.0)
@@ -295,5 +297,5 @@ def test_a_fault_whose_cause_lasts_is_named_by_a_drive_that_refuses_everything(
         rig.far.trip(OVERHEATED, cause_present=True)
     wait_until(lambda: not rig.drive.armed)
     rig.acknowledged = 1
-    assert '3 Temp Hi still stands' in rig.refused(rig.drive.acknowledge())
+    assert '3 Temp Hi is still active' in rig.refused(rig.drive.acknowledge())
     assert rig.far.control_unit.ack_reads == 1

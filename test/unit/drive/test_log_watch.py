@@ -29,6 +29,7 @@ import pytest
 from support.addresses import packed
 from virtual_rig import MakeVirtual
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import log_watch
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
@@ -204,7 +205,7 @@ def test_a_drive_that_has_no_log_is_asked_once(
 
     rig.tap.before = refuse
     rig.connect()
-    wait_until(lambda: rig.notes.told('error log is not watched'))
+    wait_until(lambda: rig.notes.told(Cause.LOG_NOT_WATCHED))
     rig.next_snapshots(20)
     assert asked == [LOG]
     assert rig.drive.snapshot.connected

@@ -36,12 +36,14 @@ from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
 import pytest
+from support.said import raises
+from support.said import said
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.link import PROTOCOLS
@@ -172,7 +174,7 @@ def test_of_two_that_tell_nothing_a_person_has_to_say(
 ) -> None:
     silent = dataclasses.replace(load_family('acme').profile, told_by='')
     monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
-    with pytest.raises(DriveError, match='set model to acme or sinus_optimal'):
+    with raises(Cause.SEVERAL_MODELS):
         bus.run(detect_model(bus, 1)).result(PATIENCE)
 
 
@@ -200,7 +202,7 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
     assert dict(drive.parameters.values) == {'ramp.up': 5.0}
     assert not acme.writes
 
-    assert 'enabled' in drive.enable().result(PATIENCE)
+    assert 'enabled' in said(drive.enable().result(PATIENCE))
     runs = acme.writes.index((WORD, REMOTE | RUN))
     # with control and set-point 0, and only then
     assert {(WORD, REMOTE), (TURN, 0), (SIZE, 0), (SIZE + 1, 0)} <= {*acme.writes[:runs]}
@@ -224,15 +226,15 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
     wait_until(lambda: not drive.armed)
     wait_until(lambda: acme.registers[WORD] == REMOTE)
     wait_until(lambda: notes.told('Too hot. Let it cool'))
-    assert drive.acknowledge().result(PATIENCE) == 'acknowledged 70 Hot'
+    assert said(drive.acknowledge().result(PATIENCE)) == 'acknowledged 70 Hot'
     assert acme.hertz == 0
 
     drive.enable().result(PATIENCE)
     drive.set_setpoint(-30.0)
     wait_until(lambda: acme.hertz == -30.0)
-    assert 'stopped' in drive.stop().result(PATIENCE)
+    assert 'stopped' in said(drive.stop().result(PATIENCE))
     assert (acme.hertz, acme.registers[WORD]) == (0, REMOTE)
-    assert 'given back' in drive.disconnect(1.0).result(PATIENCE)
+    assert 'released' in said(drive.disconnect(1.0).result(PATIENCE))
     assert acme.registers[WORD] == 0
 
 
@@ -267,4 +269,5 @@ def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:
 
 def test_it_follows_no_set_point_for_all(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, Notes())
-    assert drive.setpoint.why_not_shared == 'takes a set-point in several writes'
+    refused = said(drive.setpoint.why_not_shared('acme'))
+    assert refused == 'acme takes a set-point in several writes'

@@ -22,13 +22,15 @@ from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
 import pytest
+from support.said import raises
+from support.said import said
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
@@ -50,12 +52,12 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
             drive.enable().result(PATIENCE)
             drive.set_setpoint(40.0)
             wait_until(lambda: far.drives[1].motor.frequency > 30.0)
-            assert drive.stop().result(PATIENCE) == 'stopping: it ramps down'
+            assert said(drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
             polls = len(notes.snapshots)
             wait_until(lambda: len(notes.snapshots) > polls + 20)
             assert far.drives[1].motor.driven, 'the ramp was too short to see anything'
-            assert not notes.told('nobody enabled it')
-            assert not notes.told('CANNOT STOP')
+            assert not notes.told(Cause.RUNS_UNASKED)
+            assert not notes.told(Cause.CANNOT_STOP)
             assert not drive.stop_unconfirmed
         finally:
             bus.close()
@@ -149,7 +151,7 @@ def test_a_motor_that_starts_against_its_current_limit(
     code = type(far.drives[1].control_unit).inv_st
     limited = property(lambda unit: 27 if unit.motor.driven else code.fget(unit))
     monkeypatch.setattr(type(far.drives[1].control_unit), 'inv_st', limited)
-    assert 'enabled' in drive.enable().result(PATIENCE)
+    assert 'enabled' in said(drive.enable().result(PATIENCE))
     assert drive.armed
 
 
@@ -161,7 +163,7 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(
     monkeypatch.setattr(unit, 'command', lambda self, scmd: None)
     show_only = property(lambda _: 27)
     monkeypatch.setattr(unit, 'inv_st', show_only)
-    with pytest.raises(DriveError, match='NOT confirmed'):
+    with raises(Cause.STOP_UNCONFIRMED):
         drive.stop().result(PATIENCE)
     monkeypatch.undo()
     wait_until(lambda: not drive.stop_unconfirmed)
@@ -175,13 +177,13 @@ def test_a_motor_that_others_run_is_seen_to_run(
     with far.lock:
         far.drives[1].control_unit.press(press)
     wait_until(lambda: drive.snapshot.status.driven)
-    with pytest.raises(DriveError, match='stop it where it is controlled, by keypad or RUN input'):
+    with raises(Cause.RUN_BY_OTHERS):
         drive.stop().result(PATIENCE)
     assert far.drives[1].motor.driven
     assert not drive.snapshot.status.runs_by_bus
     polls(notes, 5)
     # it is left alone
-    assert not notes.told('nobody enabled it')
+    assert not notes.told(Cause.RUNS_UNASKED)
     assert far.drives[1].motor.driven
 
 
@@ -227,9 +229,9 @@ def test_current_limit_is_no_stop() -> None:
             assert drive.armed
             status = notes.snapshots[-1].status
             assert status is not None and status.runs_by_bus and status.kind is Kind.ALARM
-            said = [text for _, text in notes.events if 'the current limit' in text]
-            assert len(said) == 1
-            assert drive.stop().result(PATIENCE).startswith('stop')
+            texts = [text for _, text in notes.events if 'the current limit' in text]
+            assert len(texts) == 1
+            assert said(drive.stop().result(PATIENCE)).startswith('stop')
             # somebody who takes it away is noticed all the same
             with far.lock:
                 far.drives[1].motor.load = 0.3

@@ -29,8 +29,11 @@ from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
 import pytest
+from support.said import raises
+from support.said import said
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
@@ -129,7 +132,7 @@ class Rig:
         with pytest.raises(DriveError) as error:
             self.change(**values)
         assert (dict(self.far.writes), self.modes, self.far.control_unit.status_code) == before
-        return str(error.value)
+        return said(error.value)
 
 
 @pytest.fixture
@@ -222,9 +225,9 @@ def test_a_write_that_fails_half_way_gives_control_back(
     monkeypatch.setattr(
         rig.far, '_store', lambda key, raw: key == 'control.retard' or store(key, raw)
     )
-    with pytest.raises(DriveError, match='the drive keeps') as error:
+    with raises(Cause.DRIVE_KEEPS_OTHER) as error:
         rig.change(accel=6.0, retard=7.0)
-    assert 'put back: control.accel' in str(error.value)
+    assert 'put back: control.accel' in said(error.value)
     assert rig.far.peek('control.accel') == pytest.approx(0.3)
     assert rig.modes == [BUS, STOP]
     assert not rig.energised
@@ -243,7 +246,7 @@ def test_a_value_that_is_refused_puts_all_back(rig: Rig, monkeypatch: pytest.Mon
     monkeypatch.setattr(rig.far, 'write_raw', refuse)
     with pytest.raises(DriveError) as error:
         rig.change(accel=6.0, retard=7.0)
-    assert 'put back: control.accel' in str(error.value)
+    assert 'put back: control.accel' in said(error.value)
     assert rig.far.peek('control.accel') == pytest.approx(0.3)
     wait_until(lambda: rig.far.control_unit.mode == STOP)
     assert not rig.energised
@@ -253,7 +256,7 @@ def test_an_enable_waits_until_settings_are_written(rig: Rig) -> None:
     rig.connect()
     rig.drive.parameters.change({'control.accel': 6.0, 'control.retard': 7.0})
     wait_until(lambda: rig.modes == [BUS])
-    with pytest.raises(DriveError, match=r'is going on: wait for its end'):
+    with raises(Cause.PROCEDURE_GOES_ON):
         rig.drive.enable().result(PATIENCE)
     wait_until(lambda: rig.modes == [BUS, STOP])
     assert not rig.energised
@@ -296,7 +299,7 @@ def test_the_drives_time_out_is_set_when_the_bus_gets_control(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.control_unit.press('ext')
     rig.connect(drive_timeout=4.0)
-    assert rig.notes.told('drive_timeout cannot be set yet', Severity.WARNING)
+    assert rig.notes.told(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
     assert rig.far.peek('serial.sio_tot') == 0
     assert rig.far.control_unit.mode == EXT
     with rig.simulator.lock:

@@ -33,8 +33,10 @@ from parameters_rig import on_write
 from parameters_rig import watch_only
 from parameters_rig import written
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 
@@ -180,7 +182,7 @@ def test_values_that_no_drive_can_have(rig: Rig, key: str, value: Value, says: s
     ):
         with pytest.raises(ParameterError) as error:
             method()
-        assert str(error.value).startswith(says)
+        assert said(error.value).startswith(says)
     assert written(rig) == {}
 
 
@@ -203,7 +205,7 @@ def test_values_that_bound_each_other_come_in_any_order(
         assert len(parameters.change(wanted).result(PATIENCE)) == 2
     else:
         parameters.apply(wanted, write=True).result(PATIENCE)
-        assert not rig.notes.told('not applied')
+        assert not rig.notes.told(Cause.WANTED_BUT_REFUSED)
     assert far(rig, *wanted) == list(wanted.values())
     assert written(rig) == {'motor.i_magn': 1, 'motor.i_limt': 1}
 

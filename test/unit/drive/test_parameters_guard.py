@@ -27,8 +27,11 @@ from parameters_rig import far
 from parameters_rig import on_write
 from parameters_rig import written
 import pytest
+from support.said import raises
+from support.said import said
 
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 
@@ -63,7 +66,7 @@ def test_settings_of_the_line_are_guarded(rig: Rig, key: str, value: Value) -> N
     parameters = connect(rig)
     message = rig.refused(parameters.change({'control.accel': 7, key: value}))
     assert message.startswith(f'{key}: communication settings are not changed unless allow_')
-    with pytest.raises(ParameterError, match='allow_communication_changes'):
+    with raises(Cause.COMMUNICATION_PROTECTED):
         parameters.admit(key, value)
     assert written(rig) == {}
     # a saved state of the same drive loads all the same
@@ -99,7 +102,7 @@ def test_new_address_that_counts_at_once(make_rig: MakeRig) -> None:
     parameters = connect(rig)
     with pytest.raises(ParameterError) as error:
         parameters.change({'serial.address': 9, 'control.accel': 7}).result(PATIENCE)
-    message = str(error.value)
+    message = said(error.value)
     assert message.startswith('serial.address: ')
     assert 'whether the drive took 9 is not known' in message
     assert 'serial.address is NOT put back to 1' in message

@@ -31,6 +31,7 @@ from parameters_rig import far
 from parameters_rig import on_read
 from parameters_rig import on_write
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
@@ -163,7 +164,7 @@ def test_all_new_or_all_old(
                 left = error.left
                 expected = old
                 for key in left:
-                    assert f'{key} is NOT put back' in str(error)
+                    assert f'{key} is NOT put back' in said(error)
                 ends['left' if left else 'undone'] += 1
             else:
                 expected = {**old, **wanted}

@@ -33,8 +33,12 @@ from parameters_rig import put_raw
 from parameters_rig import watch_only
 from parameters_rig import written
 import pytest
+from support.said import raises
+from support.said import said
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import parameters as parameters_module
 from nfo_sinus_driver.simulator.refusal import Reason
@@ -129,7 +133,7 @@ def test_drive_that_refuses_every_third_request(
     parameters = connect(rig)
     assert list(parameters.values.values()) == far(rig, *parameters.values)
     assert parameters.progress == '119 read'
-    assert not rig.notes.told('cannot be read')
+    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
 
 
 def test_switch_that_is_neither_on_nor_off(
@@ -216,11 +220,11 @@ def test_change_at_the_keypad_shows_within_a_round_and_is_told_once(
 def test_refresh_says_what_has_changed(rig: Rig) -> None:
     parameters = connect(rig)
     rig.drive.parameters._keys = tuple(parameters.values)
-    answer = parameters.refresh().result(PATIENCE)
+    answer = said(parameters.refresh().result(PATIENCE))
     assert answer == '119 parameters read, changed: none'
     at_keypad(rig, 'control.accel', 9)
     at_keypad(rig, 'control.st_mode', 'Release')
-    answer = parameters.refresh().result(PATIENCE)
+    answer = said(parameters.refresh().result(PATIENCE))
     assert answer == '119 parameters read, changed: control.accel, control.st_mode'
     assert parameters.values['control.st_mode'] == 'Release'
 
@@ -235,9 +239,9 @@ def test_refresh_of_a_drive_that_refuses_one(rig: Rig, monkeypatch: pytest.Monke
     on_read(rig, monkeypatch, refuse)
     at_keypad(rig, 'control.accel', 9)
     at_keypad(rig, 'control.retard', 9)
-    answer = parameters.refresh().result(PATIENCE)
+    answer = said(parameters.refresh().result(PATIENCE))
     assert answer == '119 parameters read, changed: control.retard'
-    assert not rig.notes.told('cannot be read')
+    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
 
 
 def test_watch_goes_on_when_the_drive_is_back(
@@ -295,7 +299,9 @@ def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig
     assert rig.drive._inverter.auto_stop
 
 
-@pytest.mark.parametrize('error', [DriveError('it is wrong'), RuntimeError('a mistake')])
+@pytest.mark.parametrize(
+    'error', [DriveError(Report(Cause.NOT_ACTIVE)), RuntimeError('a mistake')]
+)
 def test_a_first_reading_that_fails_leaves_nothing_connected(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
@@ -305,7 +311,7 @@ def test_a_first_reading_that_fails_leaves_nothing_connected(
     monkeypatch.setattr(rig.drive.parameters, 'read_now', fail)
     with pytest.raises(type(error)):
         rig.drive.connect(parameters=True).result(PATIENCE)
-    with pytest.raises(DriveError, match='is not connected'):
+    with raises(Cause.NOT_CONNECTED):
         rig.drive.acknowledge().result(PATIENCE)
     monkeypatch.undo()
     assert connect(rig).values

@@ -33,7 +33,9 @@ from parameters_rig import far
 from parameters_rig import on_write
 from parameters_rig import written
 import pytest
+from support.said import said
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 
 
@@ -69,8 +71,8 @@ def test_write_gets_lost(quick: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
 
     on_write(quick, monkeypatch, lose)
     error = error_of(parameters.change(THREE))
-    assert str(error).startswith('freque.f_fix1: unit 1 did not answer')
-    assert '; it is 10 Hz as before; put back: control.accel, control.retard' in str(error)
+    assert said(error).startswith('freque.f_fix1: unit 1 did not answer')
+    assert '; it is 10 Hz as before; put back: control.accel, control.retard' in said(error)
     assert error.left == ()
     assert far(quick, *THREE) == THREE_BEFORE
 
@@ -90,7 +92,7 @@ def test_silence_in_the_middle(
     on_write(quick, monkeypatch, vanish)
     sent = len(quick.trace())
     error = error_of(parameters.change(THREE))
-    message = str(error)
+    message = said(error)
     assert message.startswith('freque.f_fix1: unit 1 did not answer')
     assert 'whether the drive took 7 Hz is not known' in message
     assert 'freque.f_fix1 is NOT put back to 10 Hz' in message
@@ -116,7 +118,7 @@ def test_silence_from_the_beginning(quick: Rig) -> None:
         quick.far.silence(SILENCE)
     for key, value in (('control.accel', 7), ('motor.i_magn', 2)):
         error = error_of(parameters.change({key: value}))
-        assert str(error).startswith(f'{key}: unit 1 did not answer')
+        assert said(error).startswith(f'{key}: unit 1 did not answer')
         assert error.left == ()
     parameters.apply({'motor.i_magn': 2, 'control.accel': 7}, write=True).result(PATIENCE)
     told = [text for _, text in quick.notes.events if text.startswith('not applied from')]
@@ -138,10 +140,10 @@ def test_port_that_is_lost_in_the_middle(
 
     on_write(rig, monkeypatch, unplug)
     error = error_of(parameters.change(THREE))
-    assert str(error).startswith('freque.f_fix1: ')
-    assert 'control.accel is NOT put back to 0.2 s' in str(error)
+    assert said(error).startswith('freque.f_fix1: ')
+    assert 'control.accel is NOT put back to 0.2 s' in said(error)
     assert 'control.accel' in error.left
-    assert not rig.notes.told('error in the driver')
+    assert not rig.notes.told(Cause.DRIVER_ERROR)
     monkeypatch.undo()
     wait_until(lambda: rig.drive.snapshot.connected and rig.bus.port_error is None)
     parameters.change(dict(zip(THREE, THREE_BEFORE, strict=True))).result(PATIENCE)
@@ -159,8 +161,8 @@ def test_end_of_the_driver_in_the_middle(rig: Rig, monkeypatch: pytest.MonkeyPat
     on_write(rig, monkeypatch, end)
     first = parameters.change(THREE)
     second = parameters.change({'control.accel': 9})
-    assert rig.refused(first) == 'the driver is ending'
-    assert rig.refused(second) == 'the driver is ending'
+    assert rig.refused(first) == 'this driver is ending'
+    assert rig.refused(second) == 'this driver is ending'
     rig.bus.close()
     text = 'ended half-way, NOT put back: control.accel: 0.2 -> 7 s'
     assert rig.notes.told(text, Severity.WARNING)

@@ -33,6 +33,7 @@ from parameters_rig import on_read
 from parameters_rig import on_write
 from parameters_rig import written
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.simulator.refusal import Reason
 from nfo_sinus_driver.simulator.refusal import Refused
@@ -67,8 +68,8 @@ def test_refusal(
     if faulted:
         says += f'; fault {OVERLOAD} '
     error = error_of(parameters.change({'control.accel': 7}))
-    assert str(error).startswith(f'control.accel: {says}')
-    assert str(error).endswith('stands: acknowledge it first (~/fault_ack)') is faulted
+    assert said(error).startswith(f'control.accel: {says}')
+    assert said(error).endswith('is active: call ~/fault_ack first') is faulted
     assert error.left == ()
     assert parameters.values['control.accel'] == ACCEL
     assert written(rig) == {}
@@ -112,7 +113,7 @@ def test_drive_that_keeps_another_value(rig: Rig, monkeypatch: pytest.MonkeyPatc
 
     on_write(rig, monkeypatch, clamp)
     error = error_of(parameters.change({'control.accel': 7}))
-    assert str(error) == (
+    assert said(error) == (
         'control.accel: the drive keeps 5 s where 7 s was written; it is 0.2 s as before'
     )
     assert error.left == ()
@@ -134,7 +135,7 @@ def test_drive_that_keeps_another_value_for_good(
     parameters = connect(rig)
     on_write(rig, monkeypatch, lambda write, key, raw: write(key, 5000))
     error = error_of(parameters.change({'control.accel': 7}))
-    assert str(error) == (
+    assert said(error) == (
         'control.accel: the drive keeps 5 s where 7 s was written; '
         'control.accel is NOT put back to 0.2 s: the drive keeps 5 s'
     )
@@ -169,8 +170,8 @@ def test_roll_back_in_reverse_order(rig: Rig, monkeypatch: pytest.MonkeyPatch) -
 
     on_write(rig, monkeypatch, work)
     error = error_of(parameters.change(THREE))
-    assert str(error).startswith('freque.f_fix1: the drive cannot do this')
-    assert str(error).endswith('; put back: control.accel, control.retard')
+    assert said(error).startswith('freque.f_fix1: the drive cannot do this')
+    assert said(error).endswith('; put back: control.accel, control.retard')
     accel, retard, fix = THREE
     assert order == [accel, retard, fix, retard, accel]
     assert far(rig, *THREE) == THREE_BEFORE
@@ -189,8 +190,8 @@ def test_roll_back_that_fails_names_what(rig: Rig, monkeypatch: pytest.MonkeyPat
 
     on_write(rig, monkeypatch, work)
     error = error_of(parameters.change(THREE))
-    assert 'put back: control.retard;' in str(error)
-    assert 'control.accel is NOT put back to 0.2 s: the drive cannot do this' in str(error)
+    assert 'put back: control.retard;' in said(error)
+    assert 'control.accel is NOT put back to 0.2 s: the drive cannot do this' in said(error)
     assert error.left == ('control.accel',)
     assert far(rig, *THREE) == [7, ACCEL, 10]
 
@@ -227,8 +228,8 @@ def test_reading_back_is_refused(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> N
 
     on_read(rig, monkeypatch, refuse)
     error = error_of(parameters.change(THREE))
-    assert 'freque.f_fix1: ' in str(error)
-    assert 'it is 10 Hz as before' in str(error)
+    assert 'freque.f_fix1: ' in said(error)
+    assert 'it is 10 Hz as before' in said(error)
     assert error.left == ()
     assert far(rig, *THREE) == THREE_BEFORE
 

@@ -23,6 +23,8 @@ from typing import Any
 from line_rig import LineRig
 from line_rig import MakeLine
 import pytest
+from support.said import Said
+from support.said import said
 
 from nfo_sinus_driver.drive.setpoint_all import SetpointAll
 from nfo_sinus_driver.drive.setpoint_all import Told
@@ -64,8 +66,8 @@ class Conveyor:
         return sum(frame == asked for _, frame in self.rig.line.frames)
 
     @property
-    def refused(self) -> str:
-        return self.told[-1].refused
+    def refused(self) -> Said:
+        return said(self.told[-1].refused)
 
     @property
     def frequencies(self) -> list[float]:
@@ -212,7 +214,7 @@ def test_it_is_limited_to_the_least_that_a_drive_allows(make: MakeConveyor) -> N
     conveyor.keep(-60.0)
     conveyor.rig.pass_time(2.0)
     assert conveyor.frequencies == [-15.0] * 4
-    assert {told.limited for told in conveyor.told} == {
+    assert {said(told.limited) for told in conveyor.told} == {
         '-60 is limited to -15, the least that a drive allows (drive3)'
     }
     assert all(drive.snapshot.setpoint_clamped for drive in conveyor.rig.drives.values())

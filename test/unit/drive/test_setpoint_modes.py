@@ -26,6 +26,7 @@ from drive_rig import wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import watch as watch_module
@@ -145,8 +146,8 @@ def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: flo
     rig.publish(limit)
     wait_until(lambda: rig.drive.snapshot.setpoint == limit)
     assert not rig.drive.snapshot.setpoint_clamped
-    said = [text for _, text in rig.notes.events if 'is limited to' in text]
-    assert len(said) == 1, said
+    texts = [text for _, text in rig.notes.events if 'is limited to' in text]
+    assert len(texts) == 1, texts
 
 
 # --- the control mode changes ---------------------------------------------------------------------
@@ -175,11 +176,11 @@ def test_mode_that_is_changed_at_the_keypad_disarms(
     assert {one.unit for one in told} == {MODES[after].unit}
     assert not any(one.enabled for one in told)
     assert all(math.isnan(one.setpoint) for one in told)
-    said = [text for _, text in rig.notes.events if 'control mode' in text]
-    assert len(said) == 1
-    assert f'the control mode was changed to {after} at the drive' in said[0]
-    assert f'set-points are in {MODES[after].unit} now: check what sends them' in said[0]
-    assert said[0].endswith('call ~/enable to go on')
+    texts = [text for _, text in rig.notes.events if 'control mode' in text]
+    assert len(texts) == 1
+    assert f'the control mode was changed to {after} at the drive' in texts[0]
+    assert f'set-points are in {MODES[after].unit} now: check what sends them' in texts[0]
+    assert texts[0].endswith('call ~/enable to go on')
     # what it was enabled for does not hold any more
     message = rig.refused(rig.drive.enable())
     assert message.startswith(f'the drive is in control mode {after}, expected is {before}')
@@ -238,4 +239,4 @@ def test_newest_set_point_counts(make_rig: MakeRig) -> None:
         rig.drive.set_setpoint(math.nan)
     rig.wait_for_frequency(20.0)
     assert rig.drive.snapshot.setpoint == 20.0
-    assert not rig.notes.told('limited', Severity.WARNING)
+    assert not rig.notes.told(Cause.SETPOINT_LIMITED, Severity.WARNING)

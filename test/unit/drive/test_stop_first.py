@@ -25,8 +25,8 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
 from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link import LineSettings
@@ -48,7 +48,7 @@ class _Deaf:
 
     def on_log_entry(self, entry: LogEntry) -> None: ...
 
-    def on_event(self, severity: Severity, text: str) -> None: ...
+    def on_event(self, event: Event) -> None: ...
 
 
 def test_a_stop_goes_ahead_of_all_that_waits(tmp_path) -> None:

@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 import contextlib
 import itertools
+from typing import Any
 from unittest import mock
 
 from drive_rig import MODE
@@ -29,9 +30,11 @@ from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
 from support.addresses import Words
+from support.said import said
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure
@@ -42,7 +45,7 @@ from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator.sinus_g2 import control_unit
 
-WAYS: dict[str, Callable[[Drive], Future[str]]] = {
+WAYS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'quick stop': lambda drive: drive.quick_stop(),
     'deactivate': lambda drive: drive.deactivate(),
@@ -58,7 +61,7 @@ WORDS = (
 
 
 @contextlib.contextmanager
-def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[object]]:
+def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[Any]]:
     """Have a drive tune that refuses everything until it is over; its status word is this."""
 
     def refuse(register: int, words: Words | None) -> None:
@@ -74,7 +77,7 @@ def tuning(rig: VirtualRig, word: Status) -> Iterator[Future[object]]:
         yield future
 
 
-def answered(rig: VirtualRig, future: Future[str]) -> bool:
+def answered(rig: VirtualRig, future: Future[Any]) -> bool:
     """Wait for an answer; tell whether it is a success."""
     rig.answer(future)
     error = future.exception()
@@ -93,7 +96,7 @@ def test_a_stop_of_a_tuning_that_is_refused_is_no_success(
         success = answered(rig, stop)
         assert success == (rig.far.control_unit.tuning is None)
         assert not success
-        assert 'NOT confirmed' in str(stop.exception()) and '28 Tuning' in str(stop.exception())
+        assert 'NOT confirmed' in said(stop.exception()) and '28 Tuning' in said(stop.exception())
         while rig.far.control_unit.tuning is not None:
             rig.pass_time(0.01)
         # it was tried until it was over
@@ -144,7 +147,7 @@ def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
 def test_an_enable_is_refused_until_every_quick_stop_has_ended(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     rig.ride()
-    stops: list[Future[str]] = [rig.drive.quick_stop()]
+    stops: list[Future[Any]] = [rig.drive.quick_stop()]
     releases = itertools.count()
 
     def be_busy_with_the_second(register: int, words: Words | None) -> None:
@@ -200,7 +203,7 @@ def test_a_lost_stop_is_repeated_at_once(make_virtual: MakeVirtual) -> None:
     assert [stops for _, stops in asked[:4]] == [True] * 4
     times = [at for at, _ in asked[:4]]
     assert max(later - at for at, later in itertools.pairwise(times)) < 0.12
-    assert not rig.said('CANNOT STOP')
+    assert not rig.said(Cause.CANNOT_STOP)
 
 
 def test_a_stop_that_ends_with_the_driver_is_no_success(make_virtual: MakeVirtual) -> None:
@@ -289,6 +292,6 @@ def test_many_callers_share_one_stop(make_virtual: MakeVirtual) -> None:
     rig.pass_time(5.0)
     assert not rig.drive.stop_unconfirmed
     assert not rig.far.motor.driven
-    assert rig.said('CANNOT STOP', Severity.ERROR)
+    assert rig.said(Cause.CANNOT_STOP, Severity.ERROR)
     assert RUN not in rig.written(SCMD)[asked:]
     assert Mode.EXT not in rig.written(MODE)

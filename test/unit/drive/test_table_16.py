@@ -30,8 +30,10 @@ from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
 from support.addresses import Words
+from support.said import said
 
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.simulator import motor as motor_module
@@ -146,7 +148,7 @@ def enables(rig: Rig) -> None:
 
 def stops(rig: Rig) -> None:
     enables(rig)
-    assert rig.drive.stop().result(PATIENCE).startswith('stop')
+    assert said(rig.drive.stop().result(PATIENCE)).startswith('stop')
     wait_until(lambda: phase(rig) is Phase.READY_TO_SWITCH_ON)
 
 
@@ -159,7 +161,7 @@ def stops_and_coasts(rig: Rig) -> None:
 
 def stops_quickly(rig: Rig) -> None:
     enables(rig)
-    assert rig.drive.quick_stop().result(PATIENCE) == 'released: the motor coasts'
+    assert said(rig.drive.quick_stop().result(PATIENCE)) == 'released: the motor coasts'
     wait_until(lambda: phase(rig) is Phase.SWITCH_ON_DISABLED)
 
 
@@ -167,13 +169,13 @@ def stops_down_a_ramp(rig: Rig) -> None:
     enables(rig)
     with rig.simulator.lock:
         rig.far.memory.set('control.retard', 20.0)
-    assert rig.drive.stop().result(PATIENCE) == 'stopping: it ramps down'
+    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
     assert phase(rig) is Phase.SHUTDOWN
 
 
 def stops_quickly_on_a_ramp(rig: Rig) -> None:
     stops_down_a_ramp(rig)
-    assert rig.drive.quick_stop().result(PATIENCE) == 'released: the motor coasts'
+    assert said(rig.drive.quick_stop().result(PATIENCE)) == 'released: the motor coasts'
     with rig.simulator.lock:
         rig.far.memory.set('control.retard', 0.2)
 
@@ -183,7 +185,7 @@ def enables_on_a_ramp(rig: Rig) -> None:
     assert rig.enable().startswith('enabled')
     assert phase(rig) is Phase.OPERATION_ENABLED
     assert rig.far.motor.frequency > 1.0, 'it came to its end'
-    assert rig.drive.stop().result(PATIENCE) == 'stopping: it ramps down'
+    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
     with rig.simulator.lock:
         rig.far.memory.set('control.retard', 0.2)
 
@@ -251,7 +253,7 @@ def test_table_16_led(make_rig: MakeRig, exits: Exits, wanted: Exits, lead) -> N
     if rig.drive.armed:
         rig.drive.stop().result(PATIENCE)
     assert_it_can_be_enabled(rig)
-    assert not rig.notes.told('CANNOT STOP')
+    assert not rig.notes.told(Cause.CANNOT_STOP)
 
 
 def masks(rig: Rig) -> list[tuple[int, int]]:
@@ -476,7 +478,7 @@ def test_table_16_fault(make_rig: MakeRig, exits: Exits, state: Phase) -> None:
     assert sum('fault 5 Overload' in text for _, text in rig.notes.events) == 1
     if state is N:
         initialise(rig)
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert (F, D) in exits
     assert rig.far.control_unit.ack_reads == 0
     assert_it_can_be_enabled(rig)
@@ -491,7 +493,7 @@ def test_table_16_fault_reaction_active_leaves_when_the_voltage_is_off(
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: shown(rig) is State.FAULT_REACTION_ACTIVE)
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert [exit for exit in exits if A in exit] == [(E, A), (A, F)]
     assert_it_can_be_enabled(rig)
 
@@ -501,12 +503,12 @@ def test_table_16_faulted_stays_while_the_fault_stands(make_rig: MakeRig, exits:
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD, standing=True)
     wait_until(lambda: phase(rig) is F)
-    assert '5 Overload still stands' in rig.refused(rig.drive.acknowledge())
+    assert '5 Overload is still active' in rig.refused(rig.drive.acknowledge())
     assert phase(rig) is F
-    assert 'fault 5 Overload stands' in rig.refused(rig.drive.enable())
+    assert 'fault 5 Overload is active' in rig.refused(rig.drive.enable())
     rig.simulator.inject('ack-cause-gone')
     rig.next_snapshots(3)
     # bit 7 has to rise again
     assert phase(rig) is F
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     assert_it_can_be_enabled(rig)

@@ -28,8 +28,10 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.said import raises
+from support.said import said
 
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive.settings import REFERENCES
@@ -84,10 +86,10 @@ def run(rig: Rig, reference: str, code: int, frequency: float) -> None:
         assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == 0
         rig.publish(12.5)
     else:
-        with pytest.raises(DriveError, match=f'reference is {reference}'):
+        with raises(Cause.OWN_REFERENCE):
             rig.drive.set_setpoint(12.5)
     rig.wait_for_frequency(frequency)
-    assert rig.drive.stop().result(PATIENCE) == 'stopping: it ramps down'
+    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
     assert rig.writes(SCMD)[:3] == [Scmd.STOP, code, Scmd.STOP]
     rig.wait_until_still()
 
@@ -125,7 +127,7 @@ def test_scmd_tunes(rig: Rig, procedure: Procedure) -> None:
     rig.skip(10.0)
     result = tuning.result(PATIENCE)
     code, shown = TUNES[procedure]
-    assert result.success and shown in result.text
+    assert result.success and shown in said(result.how)
     assert rig.writes(SCMD)[:2] == [Scmd.STOP, code]
 
 
@@ -182,8 +184,8 @@ def test_mode_1_stop_releases_the_motor_and_gives_control_back(rig: Rig) -> None
 def test_mode_1_gives_control_back_when_the_motor_stands(make_rig: MakeRig, model: str) -> None:
     rig = make_rig(model=model)
     rig.turn()
-    answer = rig.drive.disconnect(PATIENCE).result(PATIENCE)
-    assert answer.endswith('; control given back')
+    answer = said(rig.drive.disconnect(PATIENCE).result(PATIENCE))
+    assert answer.endswith('; control released')
     assert rig.writes(MODE) == [Mode.BUS, 1]
     assert (rig.far.motor.driven, rig.far.control_unit.mode) == (False, 1)
 

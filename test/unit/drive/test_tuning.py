@@ -25,8 +25,10 @@ from drive_rig import Notes
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
@@ -72,13 +74,13 @@ def test_each_procedure_is_done_and_what_it_changed_is_told(rig: Rig, procedure)
     result = finish(rig, begin(rig, procedure))
     command, shown = COMMANDS[procedure]
     assert result.success
-    assert shown in result.text
+    assert shown in said(result.how)
     assert int(command) in rig.writes(SCMD)
     after = {key: rig.far.peek(key) for key in rig.far.settings}
     changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
     assert changed
     assert {change.key: (change.old, change.new) for change in result.changes} == changed
-    assert str(result.changes[0]) in str(result)
+    assert str(result.changes[0]) in said(result)
 
 
 def test_control_is_given_back_as_it_was_found(rig: Rig) -> None:
@@ -119,7 +121,7 @@ def test_the_parameters_are_known_anew(rig: Rig) -> None:
     assert new == rig.far.peek('motor.r_stat') != old
     assert 'motor.r_stat' in rig.notes.news
     # told once, as the result, and not as a change by somebody else
-    assert not rig.notes.told('changed at the drive')
+    assert not rig.notes.told(Cause.CHANGED_AT_DRIVE)
 
 
 def test_parameters_are_not_changed_meanwhile(rig: Rig) -> None:
@@ -138,7 +140,7 @@ def test_a_failure_is_told_in_the_words_of_the_drive(rig: Rig, code: int, text: 
     rig.simulator.inject('tuning-fails', code)
     result = finish(rig, begin(rig))
     assert not result.success
-    assert text in result.text and 'fault_ack' in result.text
+    assert text in said(result.how) and 'fault_ack' in said(result.how)
     assert result.changes == ()
     # the fault keeps the next one from beginning, until somebody acknowledges it
     assert text in rig.refused(rig.drive.tune(Procedure.FULL))
@@ -155,7 +157,7 @@ def test_cancelling_stops_it(rig: Rig) -> None:
     assert rig.far.control_unit.status_code != 28
     result = future.result(PATIENCE)
     assert not result.success
-    assert 'was stopped' in result.text
+    assert 'was stopped' in said(result.how)
     assert mode(rig) == 1
     # with nothing to cancel, nothing happens: not even to a motor that runs
     rig.turn()
@@ -205,7 +207,7 @@ def test_the_keypad_ends_it(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.control_unit.press('stop')
     result = future.result(PATIENCE)
-    assert not result.success and '24 Stop' in result.text
+    assert not result.success and '24 Stop' in said(result.how)
     assert mode(rig) == 1
 
 
@@ -213,7 +215,7 @@ def test_without_the_run_input_it_does_not_begin(make_rig: MakeRig) -> None:
     rig = make_rig(run_input=False)
     rig.connect()
     result = rig.drive.tune(Procedure.FULL).result(PATIENCE)
-    assert not result.success and 'RUN input' in result.text
+    assert not result.success and 'RUN input' in said(result.how)
     assert mode(rig) == 1
 
 
@@ -224,7 +226,7 @@ def test_the_run_input_lost_ends_it(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.set_run_input(False)
     result = future.result(PATIENCE)
-    assert not result.success and 'does not say that it has finished' in result.text
+    assert not result.success and 'does not say that it has finished' in said(result.how)
 
 
 def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back(
@@ -274,7 +276,7 @@ def test_refused_while_the_motor_ramps_down(make_rig: MakeRig) -> None:
 def test_refused_while_a_fault_stands(rig: Rig) -> None:
     rig.connect()
     rig.simulator.inject('fault', 5)
-    assert 'fault 5 Overload stands' in rig.refused(rig.drive.tune(Procedure.FULL))
+    assert 'fault 5 Overload is active' in rig.refused(rig.drive.tune(Procedure.FULL))
 
 
 def test_refused_while_the_terminals_have_control(rig: Rig) -> None:
@@ -333,9 +335,9 @@ def test_over_classic(dialect: str) -> None:
             assert len(entries) == (40 if dialect == '5.0' else 32)
             assert entries[0].operating_time == 1200.0
             assert entries[0].age == pytest.approx(34.5, abs=0.2)
-            assert drive.erase_error_log().result(PATIENCE)
+            assert said(drive.erase_error_log().result(PATIENCE))
             tuned = drive.tune(Procedure.CALCULATE).result(PATIENCE)
-            assert tuned.success and '47 ParClcOK' in tuned.text
+            assert tuned.success and '47 ParClcOK' in said(tuned.how)
             assert tuned.changes
             assert simulator.drives[1].control_unit.mode == 1
             assert not simulator.drives[1].faults

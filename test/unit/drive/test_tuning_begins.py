@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 import itertools
+from typing import Any
 
 from drive_rig import SCMD
 import pytest
@@ -31,7 +32,7 @@ from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import Refused
 
-STOPS: dict[str, Callable[[Drive], Future[str]]] = {
+STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'cancel': lambda drive: drive.cancel_tuning(),
     'deactivate': lambda drive: drive.deactivate(),
@@ -42,7 +43,7 @@ STOPS: dict[str, Callable[[Drive], Future[str]]] = {
 def tuned_until_stopped(rig: VirtualRig, way: str, moment: int) -> bool:
     """Have a drive tune, and stop it at so many requests; tell whether it had begun by then."""
     requests = itertools.count()
-    stops: list[Future[str]] = []
+    stops: list[Future[Any]] = []
     begun = False
 
     def stop(register: int, words: Words | None) -> None:

@@ -29,6 +29,7 @@ from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
 import pytest
+from support.said import said
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
@@ -71,7 +72,7 @@ def write(key: str, raw: int) -> Act:
 
 def acknowledge(rig: Rig) -> None:
     rig.acknowledged += 1
-    assert rig.drive.acknowledge().result(PATIENCE) == 'acknowledged 5 Overload'
+    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
 
 
 def keypad_stop(rig: Rig) -> None:
@@ -175,7 +176,7 @@ def polls_until(rig: Rig, before: int, tells: Tells) -> int:
     return told.index(True) + 1
 
 
-def said(rig: Rig) -> list[str]:
+def warnings(rig: Rig) -> list[str]:
     """What the log has that a person should look at."""
     return [text for grave, text in rig.notes.events if grave is not Severity.INFO]
 
@@ -198,7 +199,7 @@ def test_what_ends_a_ride(
 
     # told once, with cause and remedy
     rig.next_snapshots(5)
-    lines = said(rig)
+    lines = warnings(rig)
     assert len(lines) == 1, lines
     assert lines[0].startswith('stopped: ')
     assert event.cause in lines[0]
@@ -212,7 +213,7 @@ def test_what_ends_a_ride(
     rig.wait_until_still()
     rig.next_snapshots(5)
     assert not rig.far.motor.driven
-    assert said(rig) == lines
+    assert warnings(rig) == lines
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(25.0)
 
@@ -227,7 +228,7 @@ def test_what_ends_a_ride_by_a_stop_of_somebody_else(make_rig: MakeRig, method: 
     before = happens(rig, stop)
     assert polls_until(rig, before, lambda told: not told.enabled) <= POLLS
     rig.next_snapshots(5)
-    lines = said(rig)
+    lines = warnings(rig)
     assert len(lines) == 1, lines
     assert 'or another master stopped it' in lines[0], lines
     assert '~/enable to go on' in lines[0]
@@ -312,7 +313,7 @@ def test_set_points_that_stop_coming(make_rig: MakeRig, model: str, method: str)
     assert len(late) + 1 <= POLLS
     rig.wait_for_frequency(0.0)
     rig.next_snapshots(5)
-    lines = said(rig)
+    lines = warnings(rig)
     assert len(lines) == 1, lines
     assert lines[0].startswith('no set-point for 0.2 s: the motor ramps to a stop')
     assert lines[0].endswith('until the next one arrives; check what publishes them')
@@ -337,7 +338,7 @@ def test_fault_that_shows_first_as_a_refused_set_point(make_rig: MakeRig) -> Non
     rig.drive.set_setpoint(20.0)
     wait_until(lambda: rig.drive.snapshot.kind is Kind.FAULT)
     rig.next_snapshots(5)
-    lines = said(rig)
+    lines = warnings(rig)
     assert len(lines) == 1, lines
     assert lines[0].startswith('stopped: fault 5 Overload: ')
     assert not rig.drive.armed
@@ -354,7 +355,7 @@ def test_drive_that_was_off_for_long(make_rig: MakeRig) -> None:
     rig.boot()
     wait_until(lambda: rig.drive.snapshot.connected)
     rig.next_snapshots(3)
-    lines = said(rig)
+    lines = warnings(rig)
     assert len([text for text in lines if text.startswith('lost: ')]) == 1
     assert 'check the cable and that the drive has power' in lines[0]
     assert 'then call ~/enable to go on' in lines[0]
@@ -393,6 +394,6 @@ def test_refused_set_point_does_not_end_the_ride_after_it(make_rig: MakeRig) -> 
     assert rig.enable().startswith('enabled')
     rig.next_snapshots(2)
     assert rig.drive.armed
-    lines = said(rig)
+    lines = warnings(rig)
     assert len(lines) == 1, lines
     assert 'it refused set-point 30: ' in lines[0]

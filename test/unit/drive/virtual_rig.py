@@ -23,9 +23,11 @@ from typing import Any
 import any_order_rig
 from support.addresses import Words
 from support.addresses import words_of
+from support.said import says
 from support.variants import hardest
 from support.wire import understand
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.link import Address
@@ -121,10 +123,10 @@ class VirtualRig(any_order_rig.Rig):
             if one is not None and one.words is not None and one.place == register
         ]
 
-    def said(self, part: str, severity: Severity | None = None) -> bool:
+    def said(self, what: str | Cause, severity: Severity | None = None) -> bool:
         """Whether an event says this."""
         return any(
-            part in text for _, grave, text in self.notes.events if severity in (None, grave)
+            says(text, what) for _, grave, text in self.notes.events if severity in (None, grave)
         )
 
 

@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a drive command can fail with."""
+"""The English sentences for what drives report, with what an operator types where it is read."""
 
-from __future__ import annotations
+from nfo_sinus_driver.wording.sentence import Calls
+from nfo_sinus_driver.wording.sentence import sentence
 
-
-class DriveError(Exception):
-    """A command was not carried out; the message says why and what to do."""
+__all__ = ['Calls', 'sentence']

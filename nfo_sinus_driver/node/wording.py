@@ -1,0 +1,56 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a node says: sentences with the full names of its services."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.wording import Calls
+from nfo_sinus_driver.wording import sentence
+
+
+class NodeError(Exception):
+    """The node itself refuses; the message says why and what to do."""
+
+
+class Wording:
+    """
+    Makes sentences for the node of one drive.
+
+    :ivar enable: how the drive is enabled.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.enable = f'call {node.resolve_service_name("~/enable")}'
+        self._calls = Calls(
+            acknowledge=f'call {node.resolve_service_name("~/fault_ack")}',
+            enable=self.enable,
+            program='driver',
+            drive_timeout='drive_timeout',
+            set_drive_timeout='set drive_timeout',
+            set_control_mode='expected_control_mode in the driver',
+            set_model='set model to auto or to what it is',
+        )
+
+    def say(self, what: Report | Exception | None) -> str:
+        """Return what there is to say; an error that is no drive's speaks for itself."""
+        if isinstance(what, DriveError):
+            what = what.report
+        if isinstance(what, Report):
+            return sentence(what, self._calls)
+        return '' if what is None else str(what)

@@ -1,0 +1,271 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The sentence for each cause; a field is a value of the report, ``call`` is :class:`.Calls`.
+
+Short and active, the important word first: what happened, why, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nfo_sinus_driver.drive.events import Cause
+
+_CHECK_LINE = (
+    'check in this order: BusType in the drive (NFO, which is classic, is the factory setting; '
+    'MbusRtu or MbusAsc for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
+)
+_NO_TIMEOUT = (
+    'the drive has no time-out of its own ({why}): if this {{call.program}} is killed or the cable '
+    'is cut, the motor runs on; {remedy}'
+)
+_REMEDY = '{fault.description}. {fault.remedy}'
+_GO_ON = 'then {call.enable} to go on'
+_EMERGENCY = 'Use the RUN input or the emergency stop if it turns'
+
+TEMPLATES: Mapping[Cause, str] = {
+    # --- the line and who answers
+    Cause.CONNECTED: 'connected: {drive}',
+    Cause.DRIVER_ERROR: 'error in the driver: {error}',
+    Cause.LINE_FAILED: '{error}',
+    Cause.NOT_REACHED: '{error}: check the cable and that the drive has power',
+    Cause.NO_RESPONSE: f'no response from address {{address}}: {_CHECK_LINE}',
+    Cause.NO_VALID_ANSWER: 'what comes from address {address} is no answer ({error}): check baud '
+    'rate and parity, that no other master is on the line, and the wiring',
+    Cause.TOO_LATE: 'no answer within {timeout:g} s',
+    Cause.LOST: 'lost: {why}; retrying',
+    Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
+    Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
+    Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
+    Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
+    '{call.set_model}',
+    Cause.SEVERAL_MODELS: 'the drive at address {address} does not tell what it is: '
+    'set model to {models}',
+    Cause.FIRMWARE_NOT_ASKED: 'its firmware is not asked for while the bus has control, which '
+    'firmware before {before:g} takes for a fault: it is treated like that one until it is '
+    'connected to while the bus has no control; set classic_dialect to v2.03 or {dialect} to know '
+    'it at once',
+    # --- why a command is not carried out
+    Cause.MONITOR_ONLY: 'control_method is monitor: this driver only reads; set control_method to '
+    'mode_scmd',
+    Cause.NOT_CONNECTED: 'the drive at address {address} is not connected',
+    Cause.NOT_ACTIVE: 'the drive is not active',
+    Cause.ENDING: 'this {call.program} is ending',
+    Cause.NOT_POSSIBLE: '{why}',
+    Cause.ENABLING_ALREADY: 'it is being enabled already',
+    Cause.STOP_PENDING: 'a stop is on its way and not confirmed yet: wait for it, then enable',
+    Cause.PROCEDURE_GOES_ON: '{what} is going on: wait for its end, or stop it',
+    Cause.FAULT_FORBIDS: f'fault {{status}} is active: {_REMEDY}; then {{call.acknowledge}}',
+    Cause.OTHER_METHOD_RUNS: 'the motor still runs by control_method {method} ({status}): another '
+    'one has to wait until it stands',
+    Cause.WRONG_CONTROL_MODE: 'the drive is in control mode {mode}, expected is {expected}: set '
+    '{key} in the drive or {call.set_control_mode}',
+    Cause.NO_RUN_INPUT: 'the drive stays in standby: its RUN input is not active '
+    '(DIN1; strap it to +24 V or close its safety contact)',
+    Cause.START_FAULTED: 'the drive did not start: {status}',
+    Cause.NOT_STARTED: 'the drive does not start: {status}',
+    Cause.STOPPED_WHILE_ENABLING: 'it was stopped while it was being enabled',
+    Cause.NOT_CONFIRMED: 'the drive does not do it; it says {status}',
+    # --- enable, stop, acknowledge, release
+    Cause.ENABLED: 'enabled; it follows set-points that arrive from now on',
+    Cause.ENABLED_BY_OWN_REFERENCE: 'enabled; it follows its own reference ({reference})',
+    Cause.ENABLED_ALREADY: 'is enabled already',
+    Cause.STOPPED: 'stopped ({status})',
+    Cause.STOPPED_BY_FAULT: 'stopped by fault {status}',
+    Cause.STOP_BLOCKED: 'stopped by fault {status}; what the drive refuses now is done when it is '
+    'over',
+    Cause.STOPPING: 'stopping ({status})',
+    Cause.COASTING: 'stopping: it coasts',
+    Cause.RAMPING: 'stopping: it ramps down',
+    Cause.QUICK_STOPPED: 'released: the motor coasts',
+    Cause.NO_QUICK_STOP: '{stop} (this drive has no quick stop)',
+    Cause.QUICK_STOP_UNCONFIRMED: 'the quick stop is NOT confirmed: {why} ({status}); trying a '
+    'stop',
+    Cause.NO_CONTROL: 'the bus has no control of this drive ({status}), and it does not run',
+    Cause.RUN_BY_OTHERS: 'the bus has no control of this drive ({status}): stop it where it is '
+    'controlled, by keypad or RUN input',
+    Cause.STOP_UNCONFIRMED: 'the stop is NOT confirmed: {why}; retrying',
+    Cause.STOP_UNCONFIRMED_AT_END: 'the stop is NOT confirmed: this {call.program} is ending',
+    Cause.CANNOT_STOP: f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}',
+    Cause.STOP_CONFIRMED_LATE: 'the stop is confirmed now: {status}',
+    Cause.NOTHING_TO_ACKNOWLEDGE: 'nothing to acknowledge ({status})',
+    Cause.ACKNOWLEDGED: 'acknowledged {status}',
+    Cause.ACKNOWLEDGED_DETAILED: 'acknowledged {status} ({details})',
+    Cause.STILL_FAULTED: f'{{status}} is still active: {_REMEDY}',
+    Cause.NEXT_FAULT: 'acknowledged {acknowledged}, but {still}',
+    Cause.NOT_IN_CONTROL: 'not under bus control',
+    Cause.CONTROL_RELEASED: '{stop}; control released',
+    Cause.COASTED_AND_RELEASED: 'released to coast, for the time-out of the drive would end the '
+    'ramp; control released',
+    Cause.LEFT_TO_RAMP: '{stop}; it was left to its ramp, under bus control',
+    Cause.RELEASE_BLOCKED: 'fault {status} is active and the drive takes no command: a run command '
+    'may still stand in it when the fault is acknowledged',
+    Cause.ONLY_WATCHED: 'only watched',
+    # --- what a stop that is not confirmed waits for
+    Cause.NO_ANSWER_YET: 'no answer yet',
+    Cause.TUNING_ENERGISES: 'the motor is energised by a tuning ({status})',
+    Cause.TUNING_REFUSES: 'the motor is energised by a tuning ({status}): {error}',
+    Cause.DRIVE_SAYS: 'the drive says {status}',
+    # --- the motor is stopped without a command, and why
+    Cause.STOPPED_BECAUSE: f'stopped: {{why}}; {_GO_ON}',
+    Cause.STOPPED_BECAUSE_OF_FAULT: f'stopped: {{why}}; then {{call.acknowledge}}, {_GO_ON}',
+    Cause.STOPPING_BECAUSE: 'stopping: {why}',
+    Cause.FAULT: f'fault {{status}}: {_REMEDY}',
+    Cause.FAULT_APPEARED: '{fault}; then {call.acknowledge}',
+    Cause.CONTROL_MODE_CHANGED: 'the control mode was changed to {mode} at the drive, and '
+    'set-points are in {unit} now: check what sends them',
+    Cause.DRIVE_STARTING: 'the drive is starting ({status}): it was switched off and on; check its '
+    'mains',
+    Cause.RUN_INPUT_LOST: 'the RUN input (DIN1) of the drive was lost ({status}): close it',
+    Cause.STOPPED_BY_ITSELF: 'the drive stopped by itself ({status}). Either its RUN input (DIN1) '
+    'was lost or another master stopped it: close the input',
+    Cause.TERMINALS_IN_CONTROL: 'the terminals have control now ({status}): press STOP at the '
+    'drive',
+    Cause.KEYPAD_IN_CONTROL: 'the keypad has control now and runs the motor ({status}): press STOP '
+    'there',
+    Cause.OTHERS_IN_CONTROL: 'keypad or terminals have control now and run the motor ({status}): '
+    'press STOP there',
+    Cause.POWER_CYCLED: 'the drive did not answer for a moment, and the bus has lost control '
+    '({status}). It was switched off and on: check its mains',
+    Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
+    'or another master took it away: find out who',
+    Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
+    f'switched off and on, or somebody used its keypad: check its mains; {_GO_ON}',
+    Cause.RUNS_UNASKED: 'it runs under bus control although nobody enabled it: find out whether '
+    'another master commands it',
+    Cause.FOUND_RUNNING: 'the motor runs under bus control, started by an earlier session '
+    f'({{status}}): stopping it; {_GO_ON}',
+    Cause.STARTED_AFTER_FAULT: 'the fault ended by itself or at the drive, and the motor started '
+    f'by the run command that stood there ({{status}}): stopping it; {_GO_ON}',
+    # --- set-points
+    Cause.SETPOINT_REFUSED: 'it refused set-point {value:g}: {error}',
+    Cause.OWN_REFERENCE: 'set-point refused: reference is {reference}, so the drive follows none; '
+    'set reference to fieldbus, where its control method has that',
+    Cause.SETPOINT_LIMITED: 'set-point {value:g} is limited to {limited:g} (setpoint_max, or the '
+    'limit of the drive)',
+    Cause.SETPOINT_TIMED_OUT: 'no set-point for {timeout:g} s: the motor ramps to a stop until the '
+    'next one arrives; check what publishes them',
+    Cause.SETPOINTS_AGAIN: 'set-points arrive again',
+    Cause.BROADCAST_MISSED: 'it did not take the set-point for all drives: it keeps {value:g}; it '
+    'is given its own',
+    Cause.NO_BROADCAST: 'only the Classic protocol has set-points for all drives at once: publish '
+    'one to each drive',
+    Cause.MEMBER_MONITORED: '{name} is only monitored',
+    Cause.MEMBER_BY_OWN_REFERENCE: '{name} follows a reference of its own ({reference})',
+    Cause.MEMBER_NOT_ENABLED: '{name} is not enabled',
+    Cause.MEMBER_TAKES_SEVERAL_WRITES: '{name} takes a set-point in several writes',
+    Cause.MEMBERS_DIFFER: 'it would not mean the same to all drives ({meanings})',
+    Cause.SHARED_SETPOINT_LIMITED: '{value:g} is limited to {limited:g}, the least that a drive '
+    'allows ({name})',
+    # --- what the drive says of itself
+    Cause.CURRENT_LIMITED: 'the current limit holds the motor back ({status}). {limit.remedy}',
+    Cause.ALARM: 'alarm {status}: {alarm.description}. {alarm.remedy}',
+    Cause.ALARM_UNNAMED: 'alarm, the status does not say which ({status}): see its display',
+    Cause.ASLEEP: 'the drive sleeps ({status}), for its set-point is below its sleep frequency: a '
+    'greater one wakes it',
+    Cause.IMPOSSIBLE_VALUE: 'it says that {key} is {value}, which cannot be: that is not '
+    'published; check motor and scaling in the drive, and that no other master is on the line',
+    # --- the time-out of the drive itself
+    Cause.NO_OWN_TIMEOUT: _NO_TIMEOUT.format(
+        why='none is known of this model', remedy='use the RUN input'
+    ),
+    Cause.OWN_TIMEOUT_OFF: _NO_TIMEOUT.format(
+        why='SioTot is 0', remedy='{call.set_drive_timeout}'
+    ),
+    Cause.OWN_TIMEOUT_STOPS_NOTHING: _NO_TIMEOUT.format(
+        why='AutoStop is OFF', remedy='{call.set_drive_timeout}'
+    ),
+    Cause.OWN_TIMEOUT_SHORT: 'the time-out of the drive itself (SioTot {timeout:g} s) is less than '
+    'lost_after + {margin:g} s: noise that this {call.program} waits out may stop the '
+    'motor; {call.set_drive_timeout}, at least {least:g} s',
+    Cause.OWN_TIMEOUT_LATER: '{call.drive_timeout} cannot be set yet, and will be when it is '
+    'enabled: {why}',
+    Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no SioTot, so it must be 0',
+    # --- procedures
+    Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
+    'command for it; do it at the keypad',
+    Cause.OTHER_METHOD_NEEDED: '{what} needs {means}, and one session does not mix control '
+    'methods: clean up, set control_method to {method} and configure again',
+    Cause.OTHER_PROCEDURE_GOES_ON: '{what}: {other} is going on already',
+    Cause.MOTOR_ENABLED: '{what}: the motor is enabled: stop it first',
+    Cause.STOP_NOT_CONFIRMED_YET: '{what}: a stop is not confirmed yet',
+    Cause.MOTOR_RUNS: '{what}: the motor runs ({status}): stop it first',
+    Cause.CONTROL_INHIBITED: '{what}: the drive lets nobody take control now ({status}; MODE is '
+    'Inhibit)',
+    Cause.CONTROLLED_LOCALLY: '{what}: keypad or terminals have control ({status}), and giving it '
+    'back to them could start the motor: press STOP at the drive first',
+    Cause.NO_STANDBY: '{what}: the drive does not stand by: {status}',
+    Cause.PROCEDURE_STOPPED: '{what} was stopped',
+    Cause.PROCEDURE_NOT_BEGUN: '{what} was stopped before it began',
+    Cause.INTERRUPTED: '{signal}: not begun',
+    Cause.TUNING_BEGINS: '{what} begins: the motor is energised',
+    Cause.TUNING_NEEDS: '{what} needs {key}: set it as the motor plate says',
+    Cause.TUNED: '{what} finished ({status})',
+    Cause.TUNING_FAILED: f'{{what}} failed, {{status}}: {_REMEDY}; {{call.acknowledge}} first',
+    Cause.TUNING_STOPPED: '{what} was stopped before it was finished ({status})',
+    Cause.TUNING_CUT_SHORT: '{what} ended, and the drive does not say that it has finished '
+    '({status}): was the RUN input lost, or STOP pressed?',
+    Cause.TUNING_DOES_NOT_BEGIN: '{what} does not begin ({status}): is its RUN input (DIN1) '
+    'active?',
+    Cause.TUNING_ENDLESS: '{what} has no end ({status}): stopping it',
+    Cause.TUNING_CHANGED: '{how}; changed: {changes}',
+    Cause.LOG_ERASED: 'the error log is erased',
+    Cause.LOG_NOT_ERASED: 'the drive took the command, but its error log is not empty',
+    Cause.ENERGY_RESET: '{key}: {before:.3f} -> {after:.3f} kWh',
+    Cause.ENERGY_NOT_RESET: 'the drive took the command, but {key} is {energy:g} kWh',
+    Cause.ENERGY_RESET_UNKNOWN: '{what} came with firmware {since:.2f}; this drive has {firmware}',
+    # --- the error log
+    Cause.LOG_ENTRY: 'error log: {entry}',
+    Cause.LOG_ENTRY_UNSEEN: 'error log: {entry}; no poll saw it',
+    Cause.LOG_UNDOCUMENTED: 'the error log of this model ({model}) is not documented [M1]',
+    Cause.LOG_NOT_WATCHED: 'its error log is not watched: {error}',
+    Cause.LOG_CHANGES: 'the drive writes into its error log all the time: try again',
+    # --- the settings of the drive
+    Cause.SETTINGS_READ: 'parameters: {progress} in {seconds:.1f} s',
+    Cause.SETTINGS_BEING_READ: 'parameters: {progress}',
+    Cause.SETTINGS_REFRESHED: '{count} parameters read, changed: {changed}',
+    Cause.SETTING_UNREADABLE: '{key} cannot be read: {error}',
+    Cause.BAD_VALUE: '{error}',
+    Cause.CHANGED: '{change}',
+    Cause.CHANGED_FOR_TIMEOUT: '{change} ({call.drive_timeout})',
+    Cause.CHANGED_AS_WANTED: '{change}, as the parameter file says',
+    Cause.CHANGED_AT_DRIVE: 'changed at the drive: {change}',
+    Cause.NOT_AS_WANTED: '{key} is {has} in the drive, but {wanted} was asked for: it is left so',
+    Cause.WANTED_BUT_MISSING: 'this drive has no {keys}: not applied',
+    Cause.WANTED_BUT_REFUSED: 'not applied from the parameter file: {why}',
+    Cause.NO_SETTING: '{key} is no parameter that can be changed here',
+    Cause.NOT_CHANGED: '{key}: {why}',
+    Cause.CHANGE_WHILE_TUNING: 'the drive is tuning: wait for its end, or stop it',
+    Cause.COMMUNICATION_PROTECTED: 'communication settings are not changed unless '
+    'allow_communication_changes is true, for the driver may lose the drive',
+    Cause.CODES_UNCERTAIN: 'what its codes mean in firmware {firmware:.2f} is not known for sure: '
+    'change it at the keypad',
+    Cause.FOLLOW_THE_LINE: 'the drive uses the new settings of the line from its next power-up on, '
+    'or at once: then start this driver with the {settings} that it has',
+    Cause.STANDSTILL_NEEDED: 'only while the motor is stopped, but it is not ({status})',
+    Cause.VALUE_NOT_ACCEPTED: 'the drive does not accept {value}{behind}',
+    Cause.REFUSED_WHILE_RUNNING: '{why}: the motor must be stopped for this, and it runs',
+    Cause.REFUSED_WHILE_FAULTED: '{why}; fault {status} is active: {call.acknowledge} first',
+    Cause.DRIVE_KEEPS: 'the drive keeps {value}',
+    Cause.DRIVE_KEEPS_OTHER: 'the drive keeps {value} where {written} was written',
+    Cause.AS_BEFORE: 'it is {value} as before',
+    Cause.PERHAPS_CHANGED: 'whether the drive took {value} is not known',
+    Cause.PUT_BACK: 'put back: {keys}',
+    Cause.NOT_PUT_BACK: '{key} is NOT put back to {value}: {why}',
+    Cause.NOT_TRIED_ANY_MORE: 'not tried any more',
+    Cause.ENDED_HALF_WAY: 'ended half-way, NOT put back: {changes}',
+    Cause.SEVERAL: '{reports}',
+}

@@ -1,0 +1,83 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the driver reports, as sentences that tests may look into and with all their causes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from typing import Any
+
+import pytest
+
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Event
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.wording import Calls
+from nfo_sinus_driver.wording import sentence
+
+CALLS = Calls(
+    acknowledge='call ~/fault_ack',
+    enable='call ~/enable',
+    program='driver',
+    drive_timeout='drive_timeout',
+    set_drive_timeout='set drive_timeout',
+    set_control_mode='expected_control_mode in the driver',
+    set_model='set model to auto or to what it is',
+)
+
+
+class Said(str):
+    """
+    A sentence.
+
+    :ivar causes: what it says, and why.
+    """
+
+    causes: frozenset[Cause] = frozenset()
+
+
+def said(what: Any) -> Said:
+    """What a report, a result or an error says; whatever else it is, as it shows itself."""
+    if isinstance(what, (DriveError, Event, Tuned)):
+        what = what.report
+    if not isinstance(what, Report):
+        return Said(what)
+    text = Said(sentence(what, CALLS))
+    text.causes = frozenset(_causes(what))
+    return text
+
+
+def _causes(report: Report) -> Iterator[Cause]:
+    yield report.cause
+    for value in report.values.values():
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, Report):
+                yield from _causes(one)
+
+
+@contextlib.contextmanager
+def raises(cause: Cause) -> Iterator[pytest.ExceptionInfo[DriveError]]:
+    """Have a command fail, and for this."""
+    with pytest.raises(DriveError) as error:
+        yield error
+    assert cause in said(error.value).causes
+
+
+def says(text: Said, what: str | Cause) -> bool:
+    """Whether a sentence has this part, or this cause."""
+    return what in text.causes if isinstance(what, Cause) else what in text

@@ -1,0 +1,175 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is told is a value where it is noticed, and has a sentence where it is shown."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+import itertools
+from pathlib import Path
+import re
+import string
+
+import pytest
+from support.said import CALLS
+
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.cli import wording as cli
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.wording import sentence
+from nfo_sinus_driver.wording.templates import TEMPLATES
+
+PACKAGE = Path(__file__).resolve().parents[3] / 'nfo_sinus_driver'
+DRIVE = sorted((PACKAGE / 'drive').glob('*.py'))
+REPORTING = [*DRIVE, *(path for room in ('cli', 'node') for path in (PACKAGE / room).glob('*.py'))]
+#: What the table of control means, drawn in the docs; and how to write a setting that is wrong.
+WITH_SENTENCES = {'control_state.py', 'settings.py'}
+#: Mistakes in the program, and wrong values: they are reported as BAD_VALUE.
+SPEAKING = {'AssertionError', 'ValueError', 'debug', 'exception'}
+WORD = re.compile(r"(?:^| )\(?[a-z][a-z'-]*[:,.;)]?(?= |$)")
+
+
+def trees(paths: list[Path]) -> Iterator[tuple[str, ast.Module]]:
+    for path in paths:
+        yield path.name, ast.parse(path.read_text(encoding='utf-8'))
+
+
+def name_of(call: ast.Call) -> str:
+    return getattr(call.func, 'id', '') or getattr(call.func, 'attr', '')
+
+
+def texts(node: ast.AST) -> Iterator[str]:
+    """What a program says, but for docstrings, its own mistakes and its log of these."""
+    mistake = isinstance(node, ast.Call) and name_of(node) in SPEAKING
+    docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    if mistake or docstring or isinstance(node, ast.Assert):
+        return
+    if isinstance(node, ast.JoinedStr):
+        yield ''.join(
+            str(part.value) if isinstance(part, ast.Constant) else '0' for part in node.values
+        )
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    else:
+        for child in ast.iter_child_nodes(node):
+            yield from texts(child)
+
+
+def causes_in(node: ast.AST) -> set[Cause]:
+    return {
+        Cause[one.attr]
+        for one in ast.walk(node)
+        if isinstance(one, ast.Attribute) and getattr(one.value, 'id', '') == 'Cause'
+    }
+
+
+def fields_of(cause: Cause) -> set[str]:
+    parts = string.Formatter().parse(TEMPLATES[cause])
+    return {re.split(r'[.\[]', name)[0] for _, name, _, _ in parts if name} - {'call'}
+
+
+def test_drive_has_no_sentence() -> None:
+    found = [
+        (name, text)
+        for name, tree in trees(DRIVE)
+        if name not in WITH_SENTENCES
+        for text in texts(tree)
+        if len(WORD.findall(text)) >= 4
+    ]
+    assert found == []
+
+
+def test_a_sentence_would_be_found() -> None:
+    tree = ast.parse("'''Such as this one here.'''\nx = f'{a}: the motor is enabled'")
+    assert [text for text in texts(tree) if len(WORD.findall(text)) >= 4]
+
+
+def test_every_cause_has_a_sentence_and_is_reported() -> None:
+    assert set(TEMPLATES) == set(Cause)
+    reported = {cause for _, tree in trees(REPORTING) for cause in causes_in(tree)}
+    assert reported == set(Cause)
+
+
+def test_every_sentence_is_given_what_it_needs() -> None:
+    """Also where the cause is chosen before: some report without one has what it needs."""
+    given: list[tuple[Cause, set[str]]] = []
+    chosen: set[Cause] = set()
+    general: list[set[str]] = []
+    for _, tree in trees(REPORTING):
+        named: set[Cause] = set()
+        for call in ast.walk(tree):
+            if isinstance(call, ast.Call) and name_of(call) in ('Report', 'report'):
+                values = {str(keyword.arg) for keyword in call.keywords}
+                values |= {'status'} if name_of(call) == 'report' else set()
+                causes = causes_in(call.args[0])
+                given += [(cause, values) for cause in causes]
+                general += [] if causes else [values]
+                named |= causes
+        chosen |= causes_in(tree) - named
+    assert [(cause, values) for cause, values in given if not fields_of(cause) <= values] == []
+    never = chosen - {cause for cause, _ in given}
+    assert never
+    for cause in never:
+        assert any(fields_of(cause) <= values for values in general), cause
+
+
+@pytest.mark.parametrize('cause', Cause)
+def test_every_sentence_can_be_made(cause: Cause) -> None:
+    code = load_family('sinus_g2').status_code(5)
+    special = {'fault': code, 'alarm': code, 'limit': code}
+    parts = string.Formatter().parse(TEMPLATES[cause])
+    numbers = {name: 1.0 for _, name, spec, _ in parts if name and spec}
+    values = {name: name for name in fields_of(cause)} | special | numbers
+    text = sentence(Report(cause, **values), CALLS)
+    assert text and not set(text) & set('{}')
+
+
+def test_a_report_within_a_report() -> None:
+    fault = Report(Cause.FAULT, status='5 Overload', fault=load_family('sinus_g2').status_code(5))
+    text = cli.say(Report(Cause.STOPPED_BECAUSE_OF_FAULT, why=fault))
+    assert text.startswith('stopped: fault 5 Overload: The power monitor has tripped')
+    assert text.endswith('; then type nfo-sinus ack, then run it again to go on')
+
+
+def test_several_reports_and_several_values() -> None:
+    back = Report(Cause.PUT_BACK, keys=('a', 'b'))
+    keeps = Report(Cause.DRIVE_KEEPS, value='7 s')
+    text = sentence(Report(Cause.SEVERAL, reports=(keeps, back)), CALLS)
+    assert text == 'the drive keeps 7 s; put back: a, b'
+    changes = tuple(itertools.repeat(Change('a', 1, 2, 's'), 2))
+    report = Report(Cause.TUNING_CHANGED, how=keeps, changes=changes)
+    assert sentence(report, CALLS).endswith('; changed: a: 1 -> 2 s, a: 1 -> 2 s')
+
+
+def test_what_is_not_known_is_said_so() -> None:
+    text = sentence(Report(Cause.STOP_CONFIRMED_LATE, status=''), CALLS)
+    assert text == 'the stop is confirmed now: its status is not known'
+    text = sentence(Report(Cause.SETTINGS_REFRESHED, count=3, changed=()), CALLS)
+    assert text == '3 parameters read, changed: none'
+
+
+def test_reports_are_compared_by_what_they_say() -> None:
+    assert Report(Cause.LOST, why=Report(Cause.ENDING)) == Report(
+        Cause.LOST, why=Report(Cause.ENDING)
+    )
+    assert Report(Cause.NO_RESPONSE, address=1) != Report(Cause.NO_RESPONSE, address=2)
+
+
+def test_what_is_called_is_named_by_who_is_called() -> None:
+    assert [cause for cause, template in TEMPLATES.items() if '~/' in template] == []
