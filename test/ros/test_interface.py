@@ -334,7 +334,8 @@ def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> No
     assert client.change_state(Transition.TRANSITION_CLEANUP)
     assert client.set_parameters(control_method='drive_control').successful
     assert not client.change_state(Transition.TRANSITION_CONFIGURE)
-    assert 'the motor still runs by control_method mode_scmd' in driver.text
+    why = 'the motor still runs by control_method mode_scmd'
+    wait_until(lambda: why in driver.text, 'the log says why')
     drive.inject('set', 'control.retard', 0.2)
     wait_until(lambda: drive.state()['state'] == 'READY_TO_SWITCH_ON', 'it stands')
     assert client.change_state(Transition.TRANSITION_CONFIGURE), driver.text

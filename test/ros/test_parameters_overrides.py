@@ -182,7 +182,7 @@ def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -
     assert Wire(bench).writes() == [written('control.accel', (6000, 0))]
     assert client.parameter('control.accel') == 6.0
     says_once(driver, 'control.acel was given')
-    assert 'did you mean control.accel' in driver.text
+    wait_until(lambda: 'did you mean control.accel' in driver.text, 'the log says why')
 
 
 @pytest.mark.parametrize('allowed', [False, True])
@@ -207,7 +207,7 @@ def test_communication_settings_need_permission_in_a_file_too(bench: Bench, allo
     if not allowed:
         text = 'not applied from the parameter file: serial.sio_tot: communication settings'
         says_once(driver, text)
-        assert 'allow_communication_changes is true' in driver.text
+        wait_until(lambda: 'allow_communication_changes is true' in driver.text, 'the log says why')
     assert driver.text.count('not applied') == (not allowed)
 
 

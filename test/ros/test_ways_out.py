@@ -330,4 +330,4 @@ def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Ben
         drive.inject('line-dead', 60.0)
         driver.signal(signal.SIGINT)
         assert driver.wait() == 1
-    assert 'NOT confirmed' in driver.text
+    wait_until(lambda: 'NOT confirmed' in driver.text, 'the log says why')
