@@ -15,10 +15,10 @@
 
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled
+from nfo_sinus_driver.bus.tasks import LatestValue
 from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Slot
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
 from nfo_sinus_driver.bus.worker import Bus
 
-__all__ = ['Bus', 'Cancelled', 'Priority', 'Slot', 'Statistics', 'Task', 'Transfer']
+__all__ = ['Bus', 'Cancelled', 'LatestValue', 'Priority', 'Statistics', 'Task', 'Transfer']

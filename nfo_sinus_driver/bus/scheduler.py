@@ -26,8 +26,8 @@ from collections.abc import Iterator
 from typing import Literal
 from typing import NamedTuple
 
+from nfo_sinus_driver.bus.tasks import LatestValue
 from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Slot
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
 
@@ -101,7 +101,7 @@ class Scheduler:
         self._is_silent = is_silent
         self._is_missing = is_missing
         #: In order; the values say nothing.
-        self._queues: dict[_Rank, dict[Slot | Waiting, None]] = {
+        self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
@@ -114,7 +114,7 @@ class Scheduler:
         #: Units that were told to stop since they were last known to answer, and said nothing.
         self._told_in_vain: set[int] = set()
 
-    def add(self, entry: Slot | Waiting) -> None:
+    def add(self, entry: LatestValue | Waiting) -> None:
         """Let a slot or a transaction wait for its turn, behind its equals."""
         self._queues[self._rank(entry)][entry] = None
 
@@ -123,7 +123,7 @@ class Scheduler:
         """Something waits that is for a missing unit."""
         return bool(self._queues[_MISSING])
 
-    def take(self, *, missing: bool = True) -> Slot | Waiting | None:
+    def take(self, *, missing: bool = True) -> LatestValue | Waiting | None:
         """
         Take out what goes next; ``None`` if nothing waits.
 
@@ -135,7 +135,7 @@ class Scheduler:
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank
-                unit = None if isinstance(entry, Slot) else entry.transfer.unit
+                unit = None if isinstance(entry, LatestValue) else entry.transfer.unit
                 self._told_to_stop = unit if rank in _STOPS else None
                 return entry
         if self._unheard is None:
@@ -151,7 +151,7 @@ class Scheduler:
             del self._queues[_MISSING][entry]
             self.add(entry)
 
-    def _first(self, rank: _Rank) -> Slot | Waiting | None:
+    def _first(self, rank: _Rank) -> LatestValue | Waiting | None:
         """Return what goes next of one rank; what is for a unit that is missing by now waits."""
         queue = self._queues[rank]
         while True:
@@ -161,7 +161,7 @@ class Scheduler:
             del queue[entry]
             self._queues[_MISSING][entry] = None
 
-    def _is_unheard(self, entry: Slot | Waiting) -> bool:
+    def _is_unheard(self, entry: LatestValue | Waiting) -> bool:
         """Tell whether it is for the unit that did not answer the stop just now."""
         return isinstance(entry, Waiting) and entry.transfer.unit == self._unheard
 
@@ -195,7 +195,7 @@ class Scheduler:
                 if isinstance(entry, Waiting) and entry.task is task:
                     del queue[entry]
 
-    def clear(self) -> list[Slot | Waiting]:
+    def clear(self) -> list[LatestValue | Waiting]:
         """Take out everything."""
         entries = [entry for queue in self._queues.values() for entry in queue]
         for queue in self._queues.values():
@@ -221,8 +221,8 @@ class Scheduler:
         yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background
 
-    def _rank(self, entry: Slot | Waiting) -> _Rank:
-        if isinstance(entry, Slot):
+    def _rank(self, entry: LatestValue | Waiting) -> _Rank:
+        if isinstance(entry, LatestValue):
             return _SLOT
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):

@@ -227,7 +227,7 @@ class Sleepers:
         return self._pauses[0][0] if self._pauses else math.inf
 
 
-class Slot:
+class LatestValue:
     """
     A place for one pending write of which only the latest counts, such as a set-point.
 

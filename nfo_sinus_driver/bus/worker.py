@@ -43,16 +43,16 @@ from nfo_sinus_driver.bus.silence import Silences
 from nfo_sinus_driver.bus.statistics import Recorder
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled
+from nfo_sinus_driver.bus.tasks import LatestValue
 from nfo_sinus_driver.bus.tasks import Pause
 from nfo_sinus_driver.bus.tasks import Priority
 from nfo_sinus_driver.bus.tasks import Sleepers
-from nfo_sinus_driver.bus.tasks import Slot
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
 from nfo_sinus_driver.bus.tasks import consistent_read
 from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
-from nfo_sinus_driver.bus.timers import set_timer_slack
+from nfo_sinus_driver.bus.timer_slack import set_timer_slack
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LineProtocol
@@ -80,7 +80,7 @@ class Bus:
     def __init__(self, link: Link) -> None:
         self._link = link
         self._port = Reconnect(link)
-        self._inbox: deque[Task | Slot | Callable[[], None]] = deque()
+        self._inbox: deque[Task | LatestValue | Callable[[], None]] = deque()
         self._awake = threading.Event()
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
@@ -133,7 +133,7 @@ class Bus:
         """Have the worker call a short function between two transactions."""
         self._enter(function)
 
-    def request(self, slot: Slot) -> None:
+    def request(self, slot: LatestValue) -> None:
         """Ask for a slot to be written; asking again before it is written changes nothing."""
         if not slot.pending:
             slot.pending = True
@@ -297,7 +297,7 @@ class Bus:
 
     # --- the worker ---------------------------------------------------------------------------
 
-    def _enter(self, item: Task | Slot | Callable[[], None]) -> None:
+    def _enter(self, item: Task | LatestValue | Callable[[], None]) -> None:
         self._inbox.append(item)
         self._awake.set()
         if self._closed:
@@ -345,7 +345,7 @@ class Bus:
             item = self._inbox.popleft()
             if isinstance(item, Task):
                 self._advance(item, None, Cancelled() if self._closed else None)
-            elif isinstance(item, Slot):
+            elif isinstance(item, LatestValue):
                 self._scheduler.add(item)
             else:
                 item()
@@ -388,13 +388,13 @@ class Bus:
     def _send_next(self) -> bool:
         """Send what is most urgent; false if there is nothing to send."""
         entry = self._scheduler.take(missing=time.monotonic() >= self.silences.missing_from)
-        if isinstance(entry, Slot):
+        if isinstance(entry, LatestValue):
             self._write_slot(entry)
         elif entry is not None:
             self._exchange(*entry)
         return entry is not None
 
-    def _write_slot(self, slot: Slot) -> None:
+    def _write_slot(self, slot: LatestValue) -> None:
         slot.pending = False
         transfer = slot.make()
         if transfer is None:
@@ -474,13 +474,13 @@ class Bus:
     def _fail_all(self, error: PortError) -> None:
         """Tell everyone who waits that the port is not there."""
         for entry in self._scheduler.clear():
-            if isinstance(entry, Slot):
+            if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
             elif entry.task.awaited is entry.transfer:
                 # else who was told before has ended it
                 self._advance(entry.task, None, error)
 
-    def _fail_slot(self, slot: Slot, error: PortError) -> None:
+    def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
         slot.pending = False
         try:
             transfer = slot.make()

@@ -23,13 +23,13 @@ import time
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.cli.helm import NO_TIMEOUT
-from nfo_sinus_driver.cli.helm import Helm
-from nfo_sinus_driver.cli.helm import at_the_helm
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import ControlSession
+from nfo_sinus_driver.cli.control_session import control_session
+from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.status_line import as_line
 from nfo_sinus_driver.cli.stopping import RELEASED
 from nfo_sinus_driver.cli.stopping import Stopping
-from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
@@ -46,7 +46,7 @@ _STATUS_PERIOD = 0.2
 
 def stop(options: argparse.Namespace) -> int:
     """Stop a motor that the bus runs."""
-    with at_the_helm(options, mute=_MUTE, live=not options.json) as helm:
+    with control_session(options, mute=_MUTE, live=not options.json) as helm:
         try:
             done, answer = _stop(helm, options)
         except DriveError as error:
@@ -60,11 +60,11 @@ def stop(options: argparse.Namespace) -> int:
         elif done:
             helm.screen.put(answer)
     if not done:
-        raise Trouble(answer)
+        raise CliError(answer)
     return 0
 
 
-def _stop(helm: Helm, options: argparse.Namespace) -> tuple[bool, str]:
+def _stop(helm: ControlSession, options: argparse.Namespace) -> tuple[bool, str]:
     """Return whether it is stopped, and what to say of it."""
     remote = helm.remote
     remote.identify(thoroughly=False)
@@ -100,7 +100,7 @@ def _stop(helm: Helm, options: argparse.Namespace) -> tuple[bool, str]:
     return True, say(stopping.answer)
 
 
-def _in_charge(helm: Helm) -> Drive:
+def _in_charge(helm: ControlSession) -> Drive:
     """Return the drive, to be commanded by whichever method has control of it already."""
     method = helm.remote.method_in_charge()
     # the reference does not matter to who starts nothing; this one goes with the control word
@@ -110,12 +110,12 @@ def _in_charge(helm: Helm) -> Drive:
 
 def ack(options: argparse.Namespace) -> int:
     """Acknowledge a fault or an alarm."""
-    with at_the_helm(options, mute=_MUTE) as helm:
+    with control_session(options, mute=_MUTE) as helm:
         remote = helm.remote
         remote.identify(thoroughly=False)
         seen = remote.look()
         told = remote.inverter.describe()
-        error: DriveError | Trouble | None = None
+        error: DriveError | CliError | None = None
         acknowledged = False
         if not seen.faulted and seen.kind is Kind.STATUS:
             answer = say(Report(Cause.NOTHING_TO_ACKNOWLEDGE, status=told))
@@ -123,7 +123,7 @@ def ack(options: argparse.Namespace) -> int:
             try:
                 answer = say(_acknowledge(helm, seen))
                 acknowledged = True
-            except (DriveError, Trouble) as failure:
+            except (DriveError, CliError) as failure:
                 error, answer = failure, say(failure)
         if options.json:
             now = remote.look()
@@ -139,20 +139,20 @@ def ack(options: argparse.Namespace) -> int:
         elif not error:
             helm.screen.put(answer)
     if error is not None:
-        raise Trouble(answer)
+        raise CliError(answer)
     return 0
 
 
-def _acknowledge(helm: Helm, seen: InverterStatus) -> Report:
+def _acknowledge(helm: ControlSession, seen: InverterStatus) -> Report:
     """
     Acknowledge, and leave nothing behind that could start the motor.
 
     :raises DriveError: the fault is still active.
-    :raises Trouble: the motor runs.
+    :raises CliError: the motor runs.
     """
     remote = helm.remote
     if seen.driven:
-        raise Trouble(
+        raise CliError(
             f'the motor runs ({remote.inverter.describe()}), and to acknowledge would stop it: '
             'type nfo-sinus stop first'
         )

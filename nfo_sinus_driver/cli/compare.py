@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.cli.errors import UsageError
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import read_file
 from nfo_sinus_driver.cli.progress import put
@@ -32,7 +33,6 @@ from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.table import columns
-from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
 

@@ -22,9 +22,9 @@ from datetime import datetime
 import json
 from pathlib import Path
 
+from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.options import DEFAULTS
 from nfo_sinus_driver.cli.parameter_file import STANDARD
-from nfo_sinus_driver.cli.trouble import Trouble
 
 _HEAD = """\
 # {count} found by nfo-sinus scan on {date}.
@@ -58,10 +58,10 @@ def require_new(name: str, *, force: bool) -> None:
     """
     See to it that no file is replaced that somebody may have edited since.
 
-    :raises Trouble: there is one.
+    :raises CliError: there is one.
     """
     if name != STANDARD and not force and Path(name).exists():
-        raise Trouble(f'{name} exists already: choose another name, or say --force to replace it')
+        raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
 
 def driver_params(

@@ -20,10 +20,10 @@ import argparse
 from collections.abc import Sequence
 import json
 
-from nfo_sinus_driver.cli.helm import NO_TIMEOUT
-from nfo_sinus_driver.cli.helm import at_the_helm
+from nfo_sinus_driver.cli.confirm import require_yes
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.progress import put
-from nfo_sinus_driver.cli.question import require_yes
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import LogEntry
 
@@ -41,7 +41,7 @@ def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object
     count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
     if entries:
         require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
-        with at_the_helm(options, mute=_MUTE) as helm:
+        with control_session(options, mute=_MUTE) as helm:
             drive = helm.drive()
             helm.finish(drive.connect(), _LONGEST)
             helm.finish(drive.erase_error_log(), _LONGEST)

@@ -26,24 +26,24 @@ import signal
 import sys
 import threading
 
-from nfo_sinus_driver.cli.change import set_
 from nfo_sinus_driver.cli.command import ack
 from nfo_sinus_driver.cli.command import stop
 from nfo_sinus_driver.cli.compare import diff
-from nfo_sinus_driver.cli.look import errors
-from nfo_sinus_driver.cli.look import get
-from nfo_sinus_driver.cli.look import info
-from nfo_sinus_driver.cli.look import list_
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import UsageError
+from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
 from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.read import errors
+from nfo_sinus_driver.cli.read import get
+from nfo_sinus_driver.cli.read import info
+from nfo_sinus_driver.cli.read import list_
 from nfo_sinus_driver.cli.run import run
 from nfo_sinus_driver.cli.scan import scan
+from nfo_sinus_driver.cli.set import set_
 from nfo_sinus_driver.cli.transfer import dump
 from nfo_sinus_driver.cli.transfer import load
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.tune import tune
-from nfo_sinus_driver.cli.watch import monitor
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 
@@ -85,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UsageError as error:
         remark(str(error))
         return _USAGE
-    except (Trouble, DriveError) as error:
+    except (CliError, DriveError) as error:
         remark(say(error))
         return failed
     except BrokenPipeError:

@@ -35,8 +35,8 @@ import yaml
 
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import listed
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import listed
 
 #: What the header says, in this order.
 HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')
@@ -85,7 +85,7 @@ def write_file(name: str, text: str) -> None:
     """
     Write a parameter file; ``-`` is the standard output.
 
-    :raises Trouble: it cannot be written.
+    :raises CliError: it cannot be written.
     """
     if name == STANDARD:
         sys.stdout.write(text)
@@ -101,21 +101,21 @@ def write_file(name: str, text: str) -> None:
         else:
             path.write_text(text, encoding='utf-8')
     except OSError as error:
-        raise Trouble(f'{name} cannot be written: {error.strerror}') from error
+        raise CliError(f'{name} cannot be written: {error.strerror}') from error
 
 
 def read_file(name: str) -> ParameterFile:
     """
     Read a parameter file; ``-`` is the standard input.
 
-    :raises Trouble: it cannot be read, or is none.
+    :raises CliError: it cannot be read, or is none.
     """
     try:
         text = sys.stdin.read() if name == STANDARD else Path(name).read_text(encoding='utf-8')
     except OSError as error:
-        raise Trouble(f'{name} cannot be read: {error.strerror}') from error
+        raise CliError(f'{name} cannot be read: {error.strerror}') from error
     except UnicodeDecodeError as error:
-        raise Trouble(f'{name} is no text in UTF-8: is it a parameter file?') from error
+        raise CliError(f'{name} is no text in UTF-8: is it a parameter file?') from error
     return parse_file(text, 'the standard input' if name == STANDARD else name)
 
 
@@ -123,12 +123,12 @@ def parse_file(text: str, name: str) -> ParameterFile:
     """
     Return what a parameter file says.
 
-    :raises Trouble: it is none, or not clear.
+    :raises CliError: it is none, or not clear.
     """
     try:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:
-        raise Trouble(f'{name} is no parameter file: {_one_line(str(error))}') from error
+        raise CliError(f'{name} is no parameter file: {_one_line(str(error))}') from error
     header = dict(_header(text))
     found = {}
     skipped: dict[str, None] = {}
@@ -138,11 +138,11 @@ def parse_file(text: str, name: str) -> ParameterFile:
         if drive:
             found[section] = drive
     if len(found) > 1:
-        raise Trouble(
+        raise CliError(
             f'{name} has parameters of several drives ({", ".join(found)}): leave one of them in it'
         )
     if not found:
-        raise Trouble(f'{name} has no parameters of a drive, below {_PARAMETERS} of a node')
+        raise CliError(f'{name} has no parameters of a drive, below {_PARAMETERS} of a node')
     return ParameterFile(name, next(iter(found.values())), header, tuple(skipped))
 
 
@@ -183,7 +183,7 @@ def _flatten(tree: Any, file: str) -> dict[str, Any]:
     """
     Return parameters by their full names.
 
-    :raises Trouble: one stands twice, once with its group and once below it.
+    :raises CliError: one stands twice, once with its group and once below it.
     """
     found: dict[str, Any] = {}
     for key, value in tree.items() if isinstance(tree, dict) else ():
@@ -191,7 +191,7 @@ def _flatten(tree: Any, file: str) -> dict[str, Any]:
         for name, item in below.items():
             full = f'{key}.{name}' if name else str(key)
             if full in found:
-                raise Trouble(f'{file} is no parameter file: {full} stands twice in it')
+                raise CliError(f'{file} is no parameter file: {full} stands twice in it')
             found[full] = item
     return found
 
@@ -200,13 +200,13 @@ def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Value], list[str]]:
     """
     Tell the parameters of the drive from those of the node; the latter have no group.
 
-    :raises Trouble: some have no value that a parameter can have; all of those are listed.
+    :raises CliError: some have no value that a parameter can have; all of those are listed.
     """
     own = [name for name in parameters if '.' not in name or name.startswith(_ROS_OWN)]
     drive = {name: value for name, value in parameters.items() if name not in own}
     strange = [name for name, value in drive.items() if not isinstance(value, Value)]
     if strange:
-        raise Trouble(listed('these have no value that a parameter can have:', strange))
+        raise CliError(listed('these have no value that a parameter can have:', strange))
     return drive, own
 
 

@@ -22,16 +22,16 @@ import math
 import time
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.helm import Ended
-from nfo_sinus_driver.cli.helm import Helm
-from nfo_sinus_driver.cli.helm import at_the_helm
-from nfo_sinus_driver.cli.helm import spoken
+from nfo_sinus_driver.cli.control_session import ControlSession
+from nfo_sinus_driver.cli.control_session import Ended
+from nfo_sinus_driver.cli.control_session import control_session
+from nfo_sinus_driver.cli.control_session import spoken
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import UsageError
 from nfo_sinus_driver.cli.status_line import as_json
 from nfo_sinus_driver.cli.status_line import as_line
 from nfo_sinus_driver.cli.stopping import SHUTDOWN_TIMEOUT
 from nfo_sinus_driver.cli.stopping import Stopping
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
@@ -61,15 +61,15 @@ def run(options: argparse.Namespace) -> int:
             f'with --reference {options.reference} the drive follows its own reference: '
             'leave the set-point out'
         )
-    with at_the_helm(options, live=not options.json) as helm:
+    with control_session(options, live=not options.json) as helm:
         return _Ride(helm, options).go()
 
 
 class _Ride:
     """One motor that runs, from enable to stop."""
 
-    def __init__(self, helm: Helm, options: argparse.Namespace) -> None:
-        self._helm = helm
+    def __init__(self, helm: ControlSession, options: argparse.Namespace) -> None:
+        self._session = helm
         self._options = options
         self._screen = helm.screen
         self._drive = helm.drive(
@@ -86,7 +86,7 @@ class _Ride:
         """
         Run the motor and stop it; return the exit status.
 
-        :raises Trouble: it cannot be run, and nothing was written.
+        :raises CliError: it cannot be run, and nothing was written.
         """
         self._require_admitted()
         # whatever happens from here on, it is stopped
@@ -105,16 +105,16 @@ class _Ride:
 
     def _require_admitted(self) -> None:
         """See to it that the motor may be run so; nothing is written."""
-        remote, options = self._helm.remote, self._options
+        remote, options = self._session.remote, self._options
         remote.identify(thoroughly=False)
         seen = remote.look()
         told = remote.inverter.describe()
         if seen.driven:
             by = 'the bus: nfo-sinus stop stops it' if seen.from_bus else 'keypad or terminals'
-            raise Trouble(f'the motor runs already ({told}), by {by}')
+            raise CliError(f'the motor runs already ({told}), by {by}')
         if seen.faulted:
             fault = seen.listed
-            raise Trouble(
+            raise CliError(
                 f'fault {told} is active: {fault.description}. {fault.remedy}; '
                 'then type nfo-sinus ack'
             )
@@ -123,7 +123,7 @@ class _Ride:
             # nothing tells it, so it is what was typed
             mode = options.control_mode or mode
         if options.control_mode not in ('', mode):
-            raise Trouble(
+            raise CliError(
                 f'the drive is in control mode {mode}, not {options.control_mode}: set '
                 'control.mode, or give another --control-mode'
             )
@@ -131,17 +131,17 @@ class _Ride:
             return
         target = remote.model.profile.setpoints.get(mode)
         if target is None:
-            raise Trouble(f'the drive takes no set-point over the bus in control mode {mode}')
+            raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
         most = target.most
         if abs(options.setpoint) > most:
             unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
-            raise Trouble(
+            raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
                 f'in control mode {mode} {-most:g} to {most:g} {unit}'
             )
 
     def _start(self) -> None:
-        helm, drive = self._helm, self._drive
+        helm, drive = self._session, self._drive
         helm.wait(drive.connect())
         drive.activate()
         helm.wait(drive.enable(), self._show)
@@ -159,7 +159,7 @@ class _Ride:
             if options.setpoint is not None:
                 drive.set_setpoint(options.setpoint)
             self._show()
-            name = self._helm.signal(max(0.0, min(_PERIOD, self._left)))
+            name = self._session.signal(max(0.0, min(_PERIOD, self._left)))
             if name:
                 # without --for this is how one ends it
                 wanted = name == 'SIGINT' and options.seconds is None
@@ -179,10 +179,10 @@ class _Ride:
         """Return why the motor follows set-points no more; a person has been told."""
         deadline = time.monotonic() + _LONGEST_WORD
         while time.monotonic() < deadline:
-            for report in reversed(self._helm.ear.told):
+            for report in reversed(self._session.ear.told):
                 if report.cause in _ENDS:
                     return say(report)
-            self._helm.signal(0.01)
+            self._session.signal(0.01)
         return 'it was stopped'
 
     def _end(self, why: str, signal: str) -> bool:
@@ -211,7 +211,7 @@ class _Ride:
 
     def _show(self) -> None:
         now = time.monotonic()
-        seen, values = self._drive.snapshot, self._helm.ear.values
+        seen, values = self._drive.snapshot, self._session.ear.values
         nothing_yet = seen.status is None and self._shown_at < 0
         if nothing_yet or now < self._shown_at + self._options.period:
             return

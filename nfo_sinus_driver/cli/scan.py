@@ -28,6 +28,8 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.driver_params import driver_params
 from nfo_sinus_driver.cli.driver_params import require_new
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import listed
 from nfo_sinus_driver.cli.parameter_file import STANDARD
 from nfo_sinus_driver.cli.parameter_file import write_file
 from nfo_sinus_driver.cli.progress import progress
@@ -35,8 +37,6 @@ from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
@@ -93,7 +93,7 @@ def scan(options: argparse.Namespace) -> int:
         drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
         show(json.dumps(drives, ensure_ascii=False, indent=2))
     if not found:
-        raise Trouble(_ADVICE)
+        raise CliError(_ADVICE)
     if options.params:
         _write_params(options, found, lines_of)
     return 0
@@ -107,11 +107,11 @@ def _write_params(
     """
     Write what the driver needs to start with the drives that were found.
 
-    :raises Trouble: they do not speak alike, so that no line could have them all.
+    :raises CliError: they do not speak alike, so that no line could have them all.
     """
     if len(set(lines.values())) > 1:
         told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
-        raise Trouble(
+        raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
                 'drives have several; set them alike (nfo-sinus set serial.si_baud=...)',

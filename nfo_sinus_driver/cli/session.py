@@ -30,10 +30,10 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import UsageError
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import UsageError
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
@@ -102,7 +102,7 @@ class Remote:
         """Read the settings of the drive, or some of them, and return those that it has."""
         keys = self.parameters.available(only)
         if not self.model.settings:
-            raise Trouble(f'of a {self.model.name} no settings are known')
+            raise CliError(f'of a {self.model.name} no settings are known')
         with progress(f'reading {self}', len(keys)) as self._step:
             self.parameters.read(only).result()
         return self.parameters.values

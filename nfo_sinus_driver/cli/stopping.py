@@ -21,7 +21,7 @@ from concurrent.futures import Future
 import math
 import time
 
-from nfo_sinus_driver.cli.helm import Helm
+from nfo_sinus_driver.cli.control_session import ControlSession
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
@@ -51,8 +51,8 @@ class Stopping:
     :param show: called again and again meanwhile.
     """
 
-    def __init__(self, helm: Helm, drive: Drive, show: Callable[[], object]) -> None:
-        self._helm = helm
+    def __init__(self, helm: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
+        self._session = helm
         self._drive = drive
         self._show = show
         #: What the drive answered, or what became of its stop.
@@ -60,7 +60,7 @@ class Stopping:
 
     def stop(self, *, quick: bool = False) -> bool:
         """Stop it; true when the drive has confirmed it. It says loudly when it has not."""
-        show, drive = self._helm.screen.say, self._drive
+        show, drive = self._session.screen.say, self._drive
         try:
             self.answer = self._finish(drive.quick_stop() if quick else drive.stop())
         except DriveError as error:
@@ -78,14 +78,14 @@ class Stopping:
         begun = time.monotonic()
         while self._may_turn(begun) and time.monotonic() < begun + patience:
             self._show()
-            if self._helm.signal(_LOOK_PERIOD):
+            if self._session.signal(_LOOK_PERIOD):
                 break
         try:
             # what is still on its ramp has had its time
             patience = 0.0 if self._may_turn(begun) else 1.0
             released = self._finish(self._drive.disconnect(patience))
         except DriveError as error:
-            self._helm.screen.say(f'control was not released: {say(error)}')
+            self._session.screen.say(f'control was not released: {say(error)}')
             return False
         if released.cause in (*RELEASED, Cause.LEFT_TO_RAMP):
             self.answer = released
@@ -101,11 +101,11 @@ class Stopping:
 
     def confirmed_late(self) -> bool:
         """Let a stop be tried on for a while; true when the drive has confirmed it."""
-        show, drive = self._helm.screen.say, self._drive
+        show, drive = self._session.screen.say, self._drive
         deadline = time.monotonic() + _LAST_TRIES
         while drive.stop_unconfirmed and time.monotonic() < deadline:
             self._show()
-            if self._helm.signal(_LOOK_PERIOD):
+            if self._session.signal(_LOOK_PERIOD):
                 break
         if drive.stop_unconfirmed:
             show(
@@ -120,4 +120,4 @@ class Stopping:
         return True
 
     def _finish(self, future: Future[Report]) -> Report:
-        return self._helm.finish(future, _LONGEST_ANSWER, self._show)
+        return self._session.finish(future, _LONGEST_ANSWER, self._show)

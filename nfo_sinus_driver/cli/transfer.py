@@ -23,7 +23,9 @@ from importlib import metadata
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.loading import Loading
+from nfo_sinus_driver.cli.bulk_write import Loading
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import listed
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import format_file
 from nfo_sinus_driver.cli.parameter_file import read_file
@@ -32,8 +34,6 @@ from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.values import is_barred
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import same
@@ -133,7 +133,7 @@ def _differing(
     """
     Return what has to be written.
 
-    :raises Trouble: the drive cannot have some of it, or it may not be changed; all is listed.
+    :raises CliError: the drive cannot have some of it, or it may not be changed; all is listed.
     """
     found: dict[str, bytes] = {}
     wrong, kept = [], []
@@ -154,7 +154,7 @@ def _differing(
         else:
             found[key] = data
     if wrong:
-        raise Trouble(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
+        raise CliError(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
     if kept:
         remark(_left_as_it_is(file, drive, kept))
     return found
@@ -178,9 +178,9 @@ def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
     """
     See to it that what only a standing motor allows is not tried while it runs.
 
-    :raises Trouble: it runs.
+    :raises CliError: it runs.
     """
     keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.look().driven:
         head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
-        raise Trouble(listed(head, keys))
+        raise CliError(listed(head, keys))

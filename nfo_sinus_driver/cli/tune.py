@@ -20,15 +20,15 @@ import argparse
 import json
 import time
 
-from nfo_sinus_driver.cli.helm import NO_TIMEOUT
-from nfo_sinus_driver.cli.helm import Ended
-from nfo_sinus_driver.cli.helm import Helm
-from nfo_sinus_driver.cli.helm import at_the_helm
-from nfo_sinus_driver.cli.helm import spoken
-from nfo_sinus_driver.cli.question import require_yes
+from nfo_sinus_driver.cli.confirm import require_yes
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import ControlSession
+from nfo_sinus_driver.cli.control_session import Ended
+from nfo_sinus_driver.cli.control_session import control_session
+from nfo_sinus_driver.cli.control_session import spoken
+from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.stopping import Stopping
-from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
@@ -66,10 +66,10 @@ def tune(options: argparse.Namespace) -> int:
         drive.identify(thoroughly=False)
         require_known(procedure, drive.model)
         if drive.look().driven:
-            raise Trouble(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
+            raise CliError(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
     require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
     mute = {*NO_TIMEOUT, Cause.FAULT_APPEARED, *_OUTCOMES}
-    with at_the_helm(options, mute=mute, live=not options.json) as helm:
+    with control_session(options, mute=mute, live=not options.json) as helm:
         return _Tuning(helm, options, procedure).go()
 
 
@@ -83,9 +83,9 @@ class _Tuning:
     """One procedure, from beginning to end."""
 
     def __init__(
-        self, helm: Helm, options: argparse.Namespace, procedure: Procedure
+        self, helm: ControlSession, options: argparse.Namespace, procedure: Procedure
     ) -> None:
-        self._helm = helm
+        self._session = helm
         self._options = options
         self._procedure = procedure
         self._drive = helm.drive()
@@ -95,7 +95,7 @@ class _Tuning:
 
     def go(self) -> int:
         """Tune; return the exit status."""
-        screen, status = self._helm.screen, 1
+        screen, status = self._session.screen, 1
         try:
             tuned, status = self._tuned()
         except Ended as end:
@@ -107,7 +107,7 @@ class _Tuning:
         if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
             # a fault keeps it still; else nobody tries on when this command has ended
             screen.say(text)
-            Stopping(self._helm, self._drive, self._show).confirmed_late()
+            Stopping(self._session, self._drive, self._show).confirmed_late()
             status = status or 1
         if self._options.json:
             facts = {
@@ -130,7 +130,7 @@ class _Tuning:
 
     def _tuned(self) -> tuple[Tuned, int]:
         """Return how it ended, and the exit status."""
-        helm, drive = self._helm, self._drive
+        helm, drive = self._session, self._drive
         helm.wait(drive.connect())
         drive.activate()
         future = drive.tune(self._procedure)
@@ -147,7 +147,7 @@ class _Tuning:
         seen = self._drive.snapshot
         if seen.status is None:
             return
-        screen, now = self._helm.screen, time.monotonic()
+        screen, now = self._session.screen, time.monotonic()
         stage = f'{seen.status.code} {seen.text}'
         line = f'{self._procedure.value}  {stage}  {now - self._begun:.0f} s'
         if screen.live and now > self._shown_at + _STATUS_PERIOD:

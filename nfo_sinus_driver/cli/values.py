@@ -25,8 +25,8 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import listed
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import listed
 from nfo_sinus_driver.drive.parameter_writer import show
 
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
@@ -98,14 +98,14 @@ def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: s
     """
     See to it that all names are known.
 
-    :raises Trouble: some are not; all of those are listed.
+    :raises CliError: some are not; all of those are listed.
     """
     known = list(known)
     strange = [name for name in dict.fromkeys(names) if name not in known]
     if strange:
         what = 'no parameter of this name' if len(strange) == 1 else 'no parameters of these names'
         lines = (f'{name}{_did_you_mean(name, known)}' for name in strange)
-        raise Trouble(listed(f'{whose} has {what}{end}:', lines))
+        raise CliError(listed(f'{whose} has {what}{end}:', lines))
 
 
 def _did_you_mean(name: str, known: list[str]) -> str:

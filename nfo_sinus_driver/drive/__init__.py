@@ -16,12 +16,12 @@
 
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.drive.drive import Drive
+from nfo_sinus_driver.drive.drive_state import Identity
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Identity
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS

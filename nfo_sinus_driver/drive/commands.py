@@ -37,7 +37,7 @@ from nfo_sinus_driver.catalog import profile
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
@@ -54,7 +54,7 @@ async def _not_reached(condition: Callable[[InverterStatus], bool]) -> None:
 
 async def carry_out(
     steps: profile.Steps[_T],
-    registers: Registers,
+    registers: ParameterAccess,
     priority: Priority,
     reached: Reached = _not_reached,
 ) -> _T:
@@ -105,7 +105,7 @@ class Commands:
     :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
     """
 
-    def __init__(self, settings: DriveSettings, registers: Registers) -> None:
+    def __init__(self, settings: DriveSettings, registers: ParameterAccess) -> None:
         method = registers.model.profile.methods[settings.control_method]
         self._method = method(settings.reference, registers.reaches)
         self._registers = registers

@@ -20,9 +20,9 @@ import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: How long a drive may take to do what it was told, its start delay not counted, s.
@@ -34,7 +34,7 @@ LOOK_PERIOD = 0.02
 class Confirmation:
     """What the status of one drive confirms; used on the bus alone."""
 
-    def __init__(self, bus: Bus, inverter: Inverter) -> None:
+    def __init__(self, bus: Bus, inverter: DriveState) -> None:
         self._bus = bus
         self._inverter = inverter
 

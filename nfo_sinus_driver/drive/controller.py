@@ -35,20 +35,20 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import control_state
-from nfo_sinus_driver.drive.advice import explain_fault
-from nfo_sinus_driver.drive.advice import explain_stop
-from nfo_sinus_driver.drive.advice import report_of
-from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.diagnosis import explain_fault
+from nfo_sinus_driver.drive.diagnosis import explain_stop
+from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.diagnosis import require_no_fault
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.start_sequence import StartSequence
@@ -91,7 +91,7 @@ class Controller:
     """Enables, stops and judges one drive."""
 
     def __init__(
-        self, bus: Bus, inverter: Inverter, method: Commands, setpoint: Setpoint
+        self, bus: Bus, inverter: DriveState, method: Commands, setpoint: Setpoint
     ) -> None:
         self._bus = bus
         self._inverter = inverter

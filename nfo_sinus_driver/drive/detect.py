@@ -22,7 +22,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive.advice import explain
+from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report

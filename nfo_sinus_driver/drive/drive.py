@@ -36,26 +36,27 @@ from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive.advice import explain
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import carry_out
+from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.drive_state import Identity
 from nfo_sinus_driver.drive.error_log import ErrorLog
+from nfo_sinus_driver.drive.error_log_monitor import ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Identity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.log_watch import LogWatch
-from nfo_sinus_driver.drive.own_timeout import OwnTimeout
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.picture import take_picture
+from nfo_sinus_driver.drive.picture import take_snapshot
+from nfo_sinus_driver.drive.poller import Poller
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -64,7 +65,6 @@ from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
 from nfo_sinus_driver.drive.tuning import Tuning
-from nfo_sinus_driver.drive.watch import Watch
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -91,8 +91,8 @@ class Drive:
         self._unit = settings.address
         self._listener = listener
         model = load_family(settings.model)
-        self._registers = Registers(bus, self._unit, model, settings.retries)
-        self._inverter = Inverter(model, self._registers, listener, settings)
+        self._registers = ParameterAccess(bus, self._unit, model, settings.retries)
+        self._inverter = DriveState(model, self._registers, listener, settings)
         self._setpoint = Setpoint(
             bus,
             self._unit,
@@ -105,7 +105,7 @@ class Drive:
         if settings.control_method != 'monitor':
             commands = Commands(settings, self._registers)
             self._controller = Controller(bus, self._inverter, commands, self._setpoint)
-        self._watch = Watch(
+        self._watch = Poller(
             bus,
             self._inverter,
             self._registers,
@@ -119,11 +119,11 @@ class Drive:
         self.parameters = Parameters(
             bus, self._inverter, self._registers, procedures, self.run, self._take_parameters
         )
-        self._own_timeout = OwnTimeout(
+        self._watchdog = CommunicationWatchdog(
             self._inverter, self.parameters, commanded=self._controller is not None
         )
         self._error_log = ErrorLog(self._inverter, self._registers, procedures)
-        self._log_watch = LogWatch(bus, self._inverter, self._error_log, listener)
+        self._error_log_monitor = ErrorLogMonitor(bus, self._inverter, self._error_log, listener)
         self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, procedures)
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -148,12 +148,12 @@ class Drive:
         return self._inverter.model
 
     @property
-    def inverter(self) -> Inverter:
+    def inverter(self) -> DriveState:
         """What is known of it; its methods are for coroutines on the bus."""
         return self._inverter
 
     @property
-    def registers(self) -> Registers:
+    def registers(self) -> ParameterAccess:
         """Its parameters, for coroutines on the bus."""
         return self._registers
 
@@ -190,7 +190,7 @@ class Drive:
     @property
     def last_error(self) -> LogEntry | None:
         """The newest entry of the error log that was read in the background."""
-        return self._log_watch.newest
+        return self._error_log_monitor.newest
 
     @property
     def powered_since(self) -> float:
@@ -340,7 +340,7 @@ class Drive:
 
     def set_drive_timeout(self, seconds: float) -> Future[Sequence[Change]]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return self.run(lambda: self._own_timeout.set_now(seconds))
+        return self.run(lambda: self._watchdog.set_now(seconds))
 
     def set_setpoint(self, value: float) -> None:
         """
@@ -385,7 +385,7 @@ class Drive:
         if not self._watch.active:
             raise DriveError(Report(Cause.NOT_ACTIVE))
         answer = await self._command(
-            lambda controller: controller.enable(self._own_timeout.require_set), connected=True
+            lambda controller: controller.enable(self._watchdog.require_set), connected=True
         )
         self._watch.wake()
         return answer
@@ -409,7 +409,7 @@ class Drive:
 
         def tell(seen: InverterStatus, elapsed: float) -> None:
             if progress is not None:
-                progress(take_picture(self._inverter, self._setpoint, seen), elapsed)
+                progress(take_snapshot(self._inverter, self._setpoint, seen), elapsed)
 
         return await self._tuning.tune_now(procedure, tell)
 
@@ -427,7 +427,7 @@ class Drive:
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
-            self._log_watch.begin()
+            self._error_log_monitor.begin()
         assert self._inverter.identity is not None
         return self._inverter.identity
 
@@ -446,7 +446,7 @@ class Drive:
         await inverter.look(Priority.SERVICE)
         if self._controller is not None:
             await self._controller.secure_found()
-            await self._own_timeout.prepare()
+            await self._watchdog.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
         self._setpoint.connected()
@@ -460,7 +460,7 @@ class Drive:
             inverter.tell(Severity.WARNING, unexpected)
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, Report(Cause.CONNECTED, drive=told))
-        self._own_timeout.warn_if_unfit()
+        self._watchdog.warn_if_unfit()
 
     async def _disconnect(self, timeout: float) -> Report:
         # nobody may enable it while it is awaited that the motor stands
@@ -476,7 +476,7 @@ class Drive:
             self._inverter.connected = False
             if self._controller is not None:
                 self._controller.disconnected()
-            self._log_watch.end()
+            self._error_log_monitor.end()
             self._watch.end()
 
     async def _require_standing(self) -> None:

@@ -25,15 +25,15 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
@@ -60,7 +60,9 @@ def hours_of(entry: int) -> float:
 class ErrorLog:
     """The error log and the kWh counter of one drive; used on the bus alone."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
+    def __init__(
+        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
+    ) -> None:
         self._inverter = inverter
         self._registers = registers
         self._procedures = procedures

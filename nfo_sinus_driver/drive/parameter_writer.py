@@ -26,15 +26,15 @@ from dataclasses import dataclass
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.advice import report_of
+from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.write_access import Allow
 from nfo_sinus_driver.drive.write_access import WriteAccess
 from nfo_sinus_driver.link import LinkError
@@ -114,7 +114,9 @@ def not_changed(key: str, why: Report) -> ParameterError:
 class ParameterWriter:
     """Changes parameters of one drive, for coroutines on the bus."""
 
-    def __init__(self, inverter: Inverter, registers: Registers, procedures: Procedures) -> None:
+    def __init__(
+        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
+    ) -> None:
         self._inverter = inverter
         self._registers = registers
         self._access = WriteAccess(inverter, procedures)

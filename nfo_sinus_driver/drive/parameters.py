@@ -32,22 +32,22 @@ from typing import Any
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.desired_config import DesiredConfig
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.lock import Lock
-from nfo_sinus_driver.drive.parameter_guard import after_change
-from nfo_sinus_driver.drive.parameter_guard import followers
-from nfo_sinus_driver.drive.parameter_guard import why_not
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
 from nfo_sinus_driver.drive.parameter_writer import not_changed
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
-from nfo_sinus_driver.drive.wanted_state import WantedState
+from nfo_sinus_driver.drive.write_rules import after_change
+from nfo_sinus_driver.drive.write_rules import followers
+from nfo_sinus_driver.drive.write_rules import why_not
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -81,8 +81,8 @@ class Parameters:
     def __init__(
         self,
         bus: Bus,
-        inverter: Inverter,
-        registers: Registers,
+        inverter: DriveState,
+        registers: ParameterAccess,
         procedures: Procedures,
         run: Run,
         told: Callable[[Collection[str]], None],
@@ -96,7 +96,7 @@ class Parameters:
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
-        self._wanted = WantedState(self, inverter)
+        self._wanted = DesiredConfig(self, inverter)
         self._turn = Lock(bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()

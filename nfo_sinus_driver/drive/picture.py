@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import time
 
-from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
@@ -27,8 +27,8 @@ from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
 
 
-def take_picture(
-    inverter: Inverter,
+def take_snapshot(
+    inverter: DriveState,
     setpoint: Setpoint,
     seen: InverterStatus | None,
     frequency: Measured = NOT_MEASURED,

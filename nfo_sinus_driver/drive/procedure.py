@@ -29,14 +29,14 @@ from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.diagnosis import require_no_fault
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -63,7 +63,7 @@ class Procedures:
     :param controller: who commands the drive else; ``None`` if this driver only reads.
     """
 
-    def __init__(self, bus: Bus, inverter: Inverter, controller: Controller | None) -> None:
+    def __init__(self, bus: Bus, inverter: DriveState, controller: Controller | None) -> None:
         self._bus = bus
         self._inverter = inverter
         self._controller = controller

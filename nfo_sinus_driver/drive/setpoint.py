@@ -25,16 +25,16 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.catalog import SetpointTarget
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
@@ -96,8 +96,8 @@ class Setpoint:
         self,
         bus: Bus,
         unit: int,
-        registers: Registers,
-        inverter: Inverter,
+        registers: ParameterAccess,
+        inverter: DriveState,
         refused: Callable[[Report], None],
         told: Callable[[Reply], None] = lambda reply: None,
     ) -> None:
@@ -106,7 +106,7 @@ class Setpoint:
         self._registers = registers
         self._inverter = inverter
         self._refused = refused
-        self._slot = Slot(self._make, self._done, told)
+        self._slot = LatestValue(self._make, self._done, told)
         self._combining = _Combining.GIVEN_UP
         #: The newest request to this drive; written by any thread, at once.
         self._own = _NONE

@@ -23,8 +23,8 @@ import math
 import time
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
@@ -67,7 +67,7 @@ class SetpointAll:
         self._bus = bus
         self._setpoints = setpoints
         self._tell = tell
-        self._slot = Slot(self._make, self._done)
+        self._slot = LatestValue(self._make, self._done)
         #: The newest request; written by any thread, at once.
         self._request = Request(math.nan, -math.inf)
 

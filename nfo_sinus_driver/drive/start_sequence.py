@@ -26,13 +26,13 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive.advice import require_no_fault
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.confirmation import Confirmation
+from nfo_sinus_driver.drive.diagnosis import require_no_fault
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
 
@@ -40,7 +40,7 @@ from nfo_sinus_driver.link import Refused
 class StartSequence:
     """Starts the motor of one drive; used on the bus alone."""
 
-    def __init__(self, bus: Bus, inverter: Inverter, method: Commands) -> None:
+    def __init__(self, bus: Bus, inverter: DriveState, method: Commands) -> None:
         self._bus = bus
         self._inverter = inverter
         self._method = method

@@ -27,14 +27,14 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive.advice import report_of
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlEvent
+from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import NoAnswer
@@ -76,7 +76,7 @@ class StopSequence:
     def __init__(
         self,
         bus: Bus,
-        inverter: Inverter,
+        inverter: DriveState,
         method: Commands,
         report: Callable[[ControlEvent], None],
     ) -> None:

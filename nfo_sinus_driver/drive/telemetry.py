@@ -22,7 +22,7 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Telemetry
@@ -57,7 +57,7 @@ _OFF_PERIOD = 0.5
 
 
 async def watch_telemetry(
-    bus: Bus, inverter: Inverter, listener: Listener
+    bus: Bus, inverter: DriveState, listener: Listener
 ) -> None:
     """
     Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.

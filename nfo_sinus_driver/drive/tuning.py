@@ -28,15 +28,15 @@ from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.registers import Registers
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
@@ -87,8 +87,8 @@ class Tuning:
     def __init__(
         self,
         bus: Bus,
-        inverter: Inverter,
-        registers: Registers,
+        inverter: DriveState,
+        registers: ParameterAccess,
         parameters: Parameters,
         procedures: Procedures,
     ) -> None:

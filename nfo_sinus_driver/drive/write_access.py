@@ -23,10 +23,10 @@ import contextlib
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.procedure import Procedures
 
 #: Awaited before each write of a setting; raises DriveError if the drive would not take it.
@@ -44,7 +44,7 @@ class WriteAccess:
     else takes settings at any time.
     """
 
-    def __init__(self, inverter: Inverter, procedures: Procedures) -> None:
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
         self._procedures = procedures
 

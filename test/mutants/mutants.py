@@ -29,9 +29,9 @@ _CONTROLLER = 'nfo_sinus_driver/drive/controller.py'
 _STARTING = 'nfo_sinus_driver/drive/start_sequence.py'
 _TABLE = 'nfo_sinus_driver/drive/control_state.py'
 _SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
-_ADVICE = 'nfo_sinus_driver/drive/advice.py'
+_ADVICE = 'nfo_sinus_driver/drive/diagnosis.py'
 _DRIVE = 'nfo_sinus_driver/drive/drive.py'
-_WATCH = 'nfo_sinus_driver/drive/watch.py'
+_WATCH = 'nfo_sinus_driver/drive/poller.py'
 _WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
 _TUNING = 'test/unit/drive/test_tuning.py'
 _COMMANDS = 'nfo_sinus_driver/drive/commands.py'
@@ -77,7 +77,7 @@ MUTANTS = (
     Mutant(
         1,
         'polling acknowledges faults',
-        'nfo_sinus_driver/drive/inverter.py',
+        'nfo_sinus_driver/drive/drive_state.py',
         'read_at(key, priority, once=once',
         "read_at('fieldbus.inv_st_with_ack', priority, once=once",
         (_TRACE,),
@@ -303,7 +303,7 @@ MUTANTS = (
     Mutant(
         5,
         'a request reaches over its parameter',
-        'nfo_sinus_driver/drive/registers.py',
+        'nfo_sinus_driver/drive/parameter_access.py',
         'Address(*self.model[key].at(self.protocol).place)',
         'Address(*self.model[key].at(self.protocol).place[:3], 4)',
         (_TRACE,),
@@ -560,7 +560,7 @@ MUTANTS = (
     Mutant(
         1,
         'in any order: polling acknowledges faults',
-        'nfo_sinus_driver/drive/inverter.py',
+        'nfo_sinus_driver/drive/drive_state.py',
         'read_at(key, priority, once=once',
         "read_at('fieldbus.inv_st_with_ack', priority, once=once",
         (_ANY_ORDER, '-k', 'G2Monitor'),

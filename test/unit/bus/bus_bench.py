@@ -31,8 +31,8 @@ from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.bus import statistics as statistics_module
@@ -81,7 +81,7 @@ class Writer:
         self.bus = bus
         self.wanted: int | None = None
         self.outcomes: list[tuple[bytes | None, LinkError | None]] = []
-        self.slot = Slot(self.make, self.done)
+        self.slot = LatestValue(self.make, self.done)
         self.address = register(number)
         self.unit = unit
 

@@ -36,8 +36,8 @@ from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
+from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.link import DamagedAnswer
@@ -123,7 +123,7 @@ def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> No
     link.opening = raiser(PortError('gone'))
     link.answer = raiser(PortError('gone'))
     failure(ask(bus, 1, Priority.POLL))
-    broken = Slot(raiser(ValueError('oops')), lambda transfer, error: None)
+    broken = LatestValue(raiser(ValueError('oops')), lambda transfer, error: None)
     writer = Writer(bus)
 
     def want_both() -> None:

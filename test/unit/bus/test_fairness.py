@@ -23,8 +23,8 @@ from support.addresses import packed
 from support.addresses import register
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Slot
 from nfo_sinus_driver.bus import Transfer
 
 _SETPOINT = 50
@@ -42,7 +42,7 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
             bus.request(slot)
         return Transfer(1, register(_SETPOINT), Priority.SETPOINT, packed(1))
 
-    slots = [Slot(write, lambda transfer, error: None) for _ in range(8)]
+    slots = [LatestValue(write, lambda transfer, error: None) for _ in range(8)]
 
     async def poll() -> None:
         while True:

@@ -28,8 +28,8 @@ from support.addresses import register
 from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE
 from nfo_sinus_driver.bus.scheduler import Scheduler
 from nfo_sinus_driver.bus.scheduler import Waiting
+from nfo_sinus_driver.bus.tasks import LatestValue
 from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Slot
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
 
@@ -40,15 +40,15 @@ _READ = 0.0064
 _TURNS = 4000
 
 
-def entry(kind: object, name: str = '') -> Slot | Waiting:
+def entry(kind: object, name: str = '') -> LatestValue | Waiting:
     """Something that waits; a name stands for its task."""
     if kind == _SLOT:
-        return Slot(lambda: None, lambda transfer, error: None)
+        return LatestValue(lambda: None, lambda transfer, error: None)
     transfer = Transfer(1, register(1), cast(Priority, kind))
     return Waiting(cast(Task, name), transfer)
 
 
-def kind_of(taken: Slot | Waiting | None) -> object:
+def kind_of(taken: LatestValue | Waiting | None) -> object:
     """What was taken out: ``slot``, a priority, or ``None``."""
     if isinstance(taken, Waiting):
         return taken.transfer.priority

@@ -44,7 +44,7 @@ COUNTS = {
     'Fieldbus': 15,  # without the four set-points of Status, and without what is to be defined
 }
 
-#: Registers that are not the first of their instance, and by how many.
+#: ParameterAccess that are not the first of their instance, and by how many.
 OFFSETS = {
     'control.accel': 2,  # the time of a ramp, behind its speed [C46]
     'control.retard': 2,

@@ -25,10 +25,10 @@ import yaml
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.parameter_file import HEADER
 from nfo_sinus_driver.cli.parameter_file import format_file
 from nfo_sinus_driver.cli.parameter_file import parse_file
-from nfo_sinus_driver.cli.trouble import Trouble
 
 G2 = load_family('sinus_g2')
 
@@ -171,7 +171,7 @@ def test_sections_as_ros_takes_them(text: str) -> None:
     ],
 )
 def test_what_is_no_parameter_file_is_said(text: str, says: str) -> None:
-    with pytest.raises(Trouble) as error:
+    with pytest.raises(CliError) as error:
         parse_file(text, 'cell.yaml')
     assert says in str(error.value)
 

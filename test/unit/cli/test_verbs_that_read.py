@@ -30,7 +30,7 @@ import yaml
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
-from nfo_sinus_driver.cli.trouble import Trouble
+from nfo_sinus_driver.cli.errors import CliError
 
 Nfo = Callable[..., Done]
 G2 = load_family('sinus_g2')
@@ -262,7 +262,7 @@ def test_scan_writes_no_file_of_drives_that_make_no_line(
     assert done.status == 1 and not file.exists()
     found = {1: {'line': '19200 8E1'}, 2: {'line': '9600 8E1'}}
     options = argparse.Namespace(params=str(file))
-    with pytest.raises(Trouble, match='several') as raised:
+    with pytest.raises(CliError, match='several') as raised:
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert '2: 9600 8E1' in str(raised.value)
     assert not file.exists()

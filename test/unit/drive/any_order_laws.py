@@ -55,7 +55,7 @@ LONGEST_COMMAND = 12.0
 #: For so many transactions a motor may have current that an acknowledgement has let go.
 POWERED = 2
 
-#: Registers of one word or two [M0 §7], [M1].
+#: ParameterAccess of one word or two [M0 §7], [M1].
 MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
 #: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
 SETPOINTS = (0x03FC, 0x025C, 0x0408, 0x0410)

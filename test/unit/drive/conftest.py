@@ -33,8 +33,8 @@ from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import poller as watch_module
 from nfo_sinus_driver.drive import stop_sequence
-from nfo_sinus_driver.drive import watch as watch_module
 
 
 @pytest.fixture

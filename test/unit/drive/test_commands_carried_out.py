@@ -38,7 +38,7 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.commands import carry_out
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
@@ -46,7 +46,7 @@ NO = Refused(Refused.ILLEGAL_VALUE, 'no')
 
 
 class Noted:
-    """Registers that note what is asked of them, and answer as they are told."""
+    """ParameterAccess that note what is asked of them, and answer as they are told."""
 
     def __init__(self, *answers: Any) -> None:
         self.asked: list[tuple[Any, ...]] = []
@@ -77,7 +77,7 @@ class Noted:
 
 def carried_out(noted: Noted, steps: Steps[Any], priority: Priority = Priority.SERVICE) -> Any:
     """What a sequence returns, or raises."""
-    done = carry_out(steps, cast(Registers, noted), priority, noted.reached)
+    done = carry_out(steps, cast(ParameterAccess, noted), priority, noted.reached)
     return asyncio.run(done)
 
 

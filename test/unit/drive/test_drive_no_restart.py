@@ -35,7 +35,7 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import confirmation
-from nfo_sinus_driver.drive import watch as watch_module
+from nfo_sinus_driver.drive import poller as watch_module
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.refusal import Reason

@@ -28,7 +28,7 @@ from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import PROTOCOLS
 
 _ON_CLASSIC = [on_classic(ends, '2.03') for ends in ENDS]
@@ -36,15 +36,15 @@ EVERY = pytest.mark.parametrize('ends', _ON_CLASSIC, ids=[ends.name for ends in 
 
 
 @pytest.fixture(scope='module')
-def registers() -> Registers:
+def registers() -> ParameterAccess:
     bus = SimpleNamespace(
         protocol=PROTOCOLS['classic'], use_resync_reads=lambda unit, addresses: None
     )
-    return Registers(bus, 1, load_family('sinus_g2'), 0)  # type: ignore[arg-type]
+    return ParameterAccess(bus, 1, load_family('sinus_g2'), 0)  # type: ignore[arg-type]
 
 
 @EVERY
-def test_both_ends_there_and_back(registers: Registers, ends: Ends) -> None:
+def test_both_ends_there_and_back(registers: ParameterAccess, ends: Ends) -> None:
     for value, words in ((ends.low, ends.low_words), (ends.high, ends.high_words)):
         assert registers.encode(ends.name, value) == packed(*words)
         back = registers.value(ends.name, packed(*words))
@@ -53,7 +53,7 @@ def test_both_ends_there_and_back(registers: Registers, ends: Ends) -> None:
 
 
 @EVERY
-def test_one_step_beyond_each_end_and_between_two(registers: Registers, ends: Ends) -> None:
+def test_one_step_beyond_each_end_and_between_two(registers: ParameterAccess, ends: Ends) -> None:
     for value in (ends.below, ends.above, ends.between):
         if value is not None:
             with pytest.raises(ValueError, match=f'{re.escape(ends.name)}: '):
@@ -63,7 +63,7 @@ def test_one_step_beyond_each_end_and_between_two(registers: Registers, ends: En
 
 
 @pytest.mark.parametrize('name', sorted(OTHER_ON_CLASSIC))
-def test_the_range_that_is_shown(registers: Registers, name: str) -> None:
+def test_the_range_that_is_shown(registers: ParameterAccess, name: str) -> None:
     (ends,) = (ends for ends in _ON_CLASSIC if ends.name == name)
     low, high, step = registers.limits(name)
     assert (low, high) == (ends.low, ends.high)

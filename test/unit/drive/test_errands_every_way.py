@@ -253,7 +253,7 @@ def test_the_error_log(rig: Rig) -> None:
 
 
 def test_a_new_entry(rig: Rig) -> None:
-    wait_until(lambda: rig.optimal or rig.drive._log_watch._known is not None)
+    wait_until(lambda: rig.optimal or rig.drive._error_log_monitor._known is not None)
     rig.trip(5)
     if rig.optimal:
         wait_until(lambda: rig.drive.snapshot.text == 'Overload')

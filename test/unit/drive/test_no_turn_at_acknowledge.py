@@ -51,7 +51,7 @@ _OVERLOAD = 5
 _SIO_FAIL = 14
 
 
-class Watch:
+class Poller:
     """
     Notes when the motor is energised although it should not be.
 
@@ -85,7 +85,7 @@ def disturb(rig: VirtualRig, chance: random.Random) -> None:
         rig.link.doubled = chance.randint(1, 8)
 
 
-def acknowledge(rig: VirtualRig, watch: Watch, chance: random.Random) -> None:
+def acknowledge(rig: VirtualRig, watch: Poller, chance: random.Random) -> None:
     """Run the motor into a fault, and acknowledge it on a line that is not perfect."""
     assert 'enabled' in rig.answer(rig.drive.enable())
     rig.send(20.0)
@@ -123,7 +123,7 @@ def fall_still(rig: VirtualRig) -> None:
 def test_no_turn_at_an_acknowledgement(make_virtual: MakeVirtual, kind: Mapping[str, str]) -> None:
     rig = make_virtual(variant=kind)
     rig.connect()
-    watch = Watch(rig)
+    watch = Poller(rig)
     for number in range(ACKNOWLEDGEMENTS):
         acknowledge(rig, watch, random.Random(number))
         assert not watch.seconds, f'energised at acknowledgement {number}'
@@ -132,7 +132,7 @@ def test_no_turn_at_an_acknowledgement(make_virtual: MakeVirtual, kind: Mapping[
 def test_two_transactions_at_most_where_everything_is_refused(make_virtual: MakeVirtual) -> None:
     rig = make_virtual(variant=_WORST)
     fall_still(rig)
-    watch = Watch(rig)
+    watch = Poller(rig)
     watch.watching = True
     frames = len(rig.link.frames)
     assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
@@ -150,7 +150,7 @@ def test_the_stop_that_everything_depends_on_is_repeated_until_it_is_heard(
 ) -> None:
     rig = make_virtual(variant=_WORST)
     fall_still(rig)
-    watch = Watch(rig)
+    watch = Poller(rig)
     watch.watching = True
 
     def lose(register: int, words: Words | None) -> None:
@@ -230,7 +230,7 @@ def test_a_fault_that_ends_by_itself_turns_nothing(
     rig.ride()
     rig.far.trip(_OVERLOAD)
     rig.pass_time(0.5)
-    watch = Watch(rig)
+    watch = Poller(rig)
     watch.watching = True
     rig.far.faults.acknowledge()
     rig.far.set_run_input(True)

@@ -29,7 +29,7 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import watch as watch_module
+from nfo_sinus_driver.drive import poller as watch_module
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,13 @@ import signal
 import sys
 import threading
 
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import Interrupted
+from nfo_sinus_driver.cli.errors import listed
 from nfo_sinus_driver.cli.options import command_line
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.trouble import Interrupted
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.values import shown
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
@@ -63,7 +63,7 @@ class Loading:
         """
         Write all of it.
 
-        :raises Trouble: it failed; what was written, what not and why has been said, and it was
+        :raises CliError: it failed; what was written, what not and why has been said, and it was
             put back if that was wanted.
         """
         try:
@@ -72,7 +72,7 @@ class Loading:
             doubtful = error.left if isinstance(error, ParameterError) else ()
             self._tell_how_far(error)
             stained = list(dict.fromkeys((*self._written, *doubtful)))
-            raise Trouble(self._clean_up(stained)) from error
+            raise CliError(self._clean_up(stained)) from error
 
     def _write(
         self, what: str, data: Mapping[str, bytes], written: dict[str, Change]

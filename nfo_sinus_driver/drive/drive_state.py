@@ -36,7 +36,7 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
@@ -90,11 +90,11 @@ class Identity:
         return ', '.join(f'{name}{value}' for name, value in told.items() if value)
 
 
-class Inverter:
+class DriveState:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
     def __init__(
-        self, model: Family, registers: Registers, listener: Listener, settings: DriveSettings
+        self, model: Family, registers: ParameterAccess, listener: Listener, settings: DriveSettings
     ) -> None:
         self.model = model
         self.settings = settings

@@ -24,6 +24,7 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import code_of
 from nfo_sinus_driver.drive.error_log import hours_of
@@ -31,7 +32,6 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -52,7 +52,7 @@ _TRIES = 10
 _SOON = 2.0
 
 
-class LogWatch:
+class ErrorLogMonitor:
     """
     Watches the error log of one drive in the background; used on the bus alone.
 
@@ -60,7 +60,7 @@ class LogWatch:
     polls, or while the drive was not reached, has left an entry too. Nothing is acknowledged by it.
     """
 
-    def __init__(self, bus: Bus, inverter: Inverter, log: ErrorLog, listener: Listener) -> None:
+    def __init__(self, bus: Bus, inverter: DriveState, log: ErrorLog, listener: Listener) -> None:
         self._bus = bus
         self._inverter = inverter
         self._error_log = log
@@ -76,7 +76,7 @@ class LogWatch:
         self._tries = 0
 
     def begin(self) -> None:
-        """Watch from now on, where it is documented how to read the log."""
+        """Poller from now on, where it is documented how to read the log."""
         if not self._error_log.documented:
             return
         self._known = None

@@ -19,12 +19,12 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 
-from nfo_sinus_driver.cli.look import as_json
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import UsageError
+from nfo_sinus_driver.cli.errors import listed
 from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.read import as_json
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import UsageError
-from nfo_sinus_driver.cli.trouble import listed
 from nfo_sinus_driver.cli.values import BARRED
 from nfo_sinus_driver.cli.values import is_barred
 from nfo_sinus_driver.cli.values import parse_value
@@ -66,7 +66,7 @@ def set_(options: argparse.Namespace) -> int:
                 except ParameterError as error:
                     wrong.append(say(error))
         if wrong:
-            raise Trouble(listed('nothing was written:', wrong))
+            raise CliError(listed('nothing was written:', wrong))
         changes = drive.parameters.change(wanted).result()
         values = drive.parameters.values
     if options.json:

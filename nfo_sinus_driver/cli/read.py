@@ -27,12 +27,12 @@ from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.cli.erase import erase
+from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.progress import progress
 from nfo_sinus_driver.cli.progress import put
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.table import columns
-from nfo_sinus_driver.cli.trouble import Trouble
 from nfo_sinus_driver.cli.values import measured
 from nfo_sinus_driver.cli.values import readable
 from nfo_sinus_driver.cli.values import require_names
@@ -132,7 +132,7 @@ def errors(options: argparse.Namespace) -> int:
         drive.identify(thoroughly=False)
         entries = drive.error_log(0 if options.erase else options.count)
         if options.erase and drive.look().driven:
-            raise Trouble(f'the motor runs ({drive.inverter.describe()}): stop it first')
+            raise CliError(f'the motor runs ({drive.inverter.describe()}): stop it first')
     rows = [_as_row(entry) for entry in entries]
     if options.erase:
         for line in _as_lines(entries) if not options.json else ():
@@ -196,7 +196,7 @@ def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
     }
     if not found:
         groups = dict.fromkeys(parameter.group for parameter in every)
-        raise Trouble(f'there is no group {name!r}: choose one of {", ".join(groups)}')
+        raise CliError(f'there is no group {name!r}: choose one of {", ".join(groups)}')
     return found
 
 

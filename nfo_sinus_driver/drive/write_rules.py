@@ -21,9 +21,9 @@ from collections.abc import Mapping
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 
 #: The driver's own setting that goes with each setting of the line.
 _FOLLOWERS = {
@@ -40,7 +40,7 @@ def followers(model: Family) -> Mapping[str, str]:
     return {key: setting for key, setting in named.items() if key}
 
 
-def why_not(key: str, inverter: Inverter) -> Report | None:
+def why_not(key: str, inverter: DriveState) -> Report | None:
     """Return why a setting may not be changed, ``None`` if it may."""
     settings = inverter.settings
     if settings.control_method == 'monitor':

@@ -19,15 +19,15 @@ from __future__ import annotations
 import argparse
 import sys
 
-from nfo_sinus_driver.cli.trouble import Trouble
-from nfo_sinus_driver.cli.trouble import UsageError
+from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.errors import UsageError
 
 
 def require_yes(options: argparse.Namespace, question: str) -> None:
     """
     See to it that a person wants it.
 
-    :raises Trouble: the answer is no.
+    :raises CliError: the answer is no.
     :raises UsageError: there is nobody to ask, and no ``--yes``.
     """
     if options.yes:
@@ -39,4 +39,4 @@ def require_yes(options: argparse.Namespace, question: str) -> None:
     if not answer.endswith('\n'):
         print(file=sys.stderr)
     if answer.strip().lower() not in ('y', 'yes'):
-        raise Trouble('nothing was done')
+        raise CliError('nothing was done')

@@ -22,19 +22,19 @@ import math
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: What comes and goes is told again only when it was away for so long, s.
 _AGAIN_AFTER = 10.0
 
-class Notices:
+class Conditions:
     """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
 
-    def __init__(self, inverter: Inverter) -> None:
+    def __init__(self, inverter: DriveState) -> None:
         self._inverter = inverter
         #: When each was last there.
         self._seen_at: dict[tuple[Cause, int], float] = {}

@@ -19,10 +19,10 @@ from __future__ import annotations
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import LinkError
@@ -56,12 +56,12 @@ def report_of(error: Exception) -> Report:
     return Report(Cause.DRIVER_ERROR, error=repr(error))
 
 
-def explain_fault(inverter: Inverter, seen: InverterStatus) -> Report:
+def explain_fault(inverter: DriveState, seen: InverterStatus) -> Report:
     """Return which fault is active, what it means and what to do about its cause."""
     return inverter.report(Cause.FAULT, fault=seen.listed)
 
 
-def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
+def require_no_fault(inverter: DriveState, seen: InverterStatus) -> None:
     """
     See to it that no fault is active before the motor is energised.
 
@@ -72,7 +72,7 @@ def require_no_fault(inverter: Inverter, seen: InverterStatus) -> None:
 
 
 def explain_stop(
-    inverter: Inverter, seen: InverterStatus, control_mode: str
+    inverter: DriveState, seen: InverterStatus, control_mode: str
 ) -> Report | None:
     """
     Return why the motor no longer follows us, before it is enabled again.
@@ -97,7 +97,7 @@ def explain_stop(
     return cause and inverter.report(cause)
 
 
-def _why_control_is_lost(inverter: Inverter, seen: InverterStatus) -> Cause:
+def _why_control_is_lost(inverter: DriveState, seen: InverterStatus) -> Cause:
     if seen.means(Meaning.TERMINALS):
         return Cause.TERMINALS_IN_CONTROL
     if seen.means(Meaning.KEYPAD):

@@ -47,7 +47,7 @@ _SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
 _RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
 
 
-class Registers:
+class ParameterAccess:
     """
     The parameters of one drive, for coroutines on the bus.
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
-class Trouble(Exception):
+class CliError(Exception):
     """It was not done; the message says why and what to do."""
 
 

@@ -19,24 +19,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
 
 
-class OwnTimeout:
+class CommunicationWatchdog:
     """
     SioTot with AutoStop of one drive [C91]; used on the bus alone.
 
     :param commanded: this driver may command the drive, and not only watch it.
     """
 
-    def __init__(self, inverter: Inverter, parameters: Parameters, *, commanded: bool) -> None:
+    def __init__(self, inverter: DriveState, parameters: Parameters, *, commanded: bool) -> None:
         self._inverter = inverter
         self._parameters = parameters
         self._commanded = commanded

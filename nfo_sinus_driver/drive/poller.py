@@ -29,17 +29,17 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.advice import explain
-from nfo_sinus_driver.drive.advice import explain_fault
+from nfo_sinus_driver.drive.conditions import Conditions
 from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import explain_fault
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
-from nfo_sinus_driver.drive.notices import Notices
-from nfo_sinus_driver.drive.picture import take_picture
-from nfo_sinus_driver.drive.registers import Registers
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.drive.picture import take_snapshot
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -90,7 +90,7 @@ _STEADY = 0.02
 _MODE_TURNS = 60
 
 
-class Watch:
+class Poller:
     """
     Watches one drive, for ever once it was begun; used on the bus alone.
 
@@ -101,8 +101,8 @@ class Watch:
     def __init__(
         self,
         bus: Bus,
-        inverter: Inverter,
-        registers: Registers,
+        inverter: DriveState,
+        registers: ParameterAccess,
         setpoint: Setpoint,
         controller: Controller | None,
         listener: Listener,
@@ -119,7 +119,7 @@ class Watch:
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
-        self.snapshot = take_picture(inverter, setpoint, None)
+        self.snapshot = take_snapshot(inverter, setpoint, None)
         #: Since when every poll failed, although the drive may have answered.
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
@@ -134,7 +134,7 @@ class Watch:
         self._told_fault = 0
         #: How many requests nobody had answered when it was last looked at.
         self._unanswered = 0
-        self._notices = Notices(inverter)
+        self._conditions = Conditions(inverter)
         inverter.on_missed = self._look_soon
 
     @property
@@ -143,7 +143,7 @@ class Watch:
         return self._task is not None
 
     def begin(self) -> None:
-        """Watch from now on."""
+        """Poller from now on."""
         self._task = self._bus.spawn(self._poll_for_ever())
 
     def end(self) -> None:
@@ -322,7 +322,7 @@ class Watch:
         self._unanswered = self._registers.unanswered
         told = self._controller is not None and self._controller.judge(seen)
         self._tell_fault(seen, told)
-        self._notices.take(seen)
+        self._conditions.take(seen)
         return seen
 
     async def _poll(self) -> None:
@@ -443,7 +443,7 @@ class Watch:
         inverter = self._inverter
         frequency, speed = (inverter.last_polled(role) for role in _BASIC)
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
-        self.snapshot = take_picture(inverter, self._setpoint, seen, frequency, speed, actual)
+        self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
         self._listener.on_snapshot(self.snapshot)
 
     def _explain(self, error: LinkError | DriveError) -> Report:

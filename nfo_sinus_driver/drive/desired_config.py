@@ -20,10 +20,10 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.inverter import Inverter
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import show
@@ -52,10 +52,10 @@ class Settings(Protocol):
         """Write what differs, and read it back."""
 
 
-class WantedState:
+class DesiredConfig:
     """What the settings of one drive shall be; used on the bus, readable from anywhere."""
 
-    def __init__(self, parameters: Settings, inverter: Inverter) -> None:
+    def __init__(self, parameters: Settings, inverter: DriveState) -> None:
         self._parameters = parameters
         self._inverter = inverter
         self._values: dict[str, Value] = {}

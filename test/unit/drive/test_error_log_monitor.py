@@ -31,7 +31,7 @@ from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import log_watch
+from nfo_sinus_driver.drive import error_log_monitor
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
@@ -46,7 +46,7 @@ HOURS = 1234.5
 def connect(rig: Rig) -> None:
     """Connect, and wait until the log was looked at."""
     rig.connect()
-    wait_until(lambda: rig.drive._log_watch._known is not None)
+    wait_until(lambda: rig.drive._error_log_monitor._known is not None)
 
 
 def trip(rig: Rig, code: int = 5, *, acknowledge: bool = False) -> None:
@@ -85,7 +85,7 @@ def test_the_entry_of_a_fault_is_told(make_rig: MakeRig, method: str) -> None:
 
 def test_the_motor_is_stopped_first(rig: Rig) -> None:
     rig.turn()
-    wait_until(lambda: rig.drive._log_watch._known is not None)
+    wait_until(lambda: rig.drive._error_log_monitor._known is not None)
     trip(rig)
     told(rig)
     reads = [
@@ -123,7 +123,7 @@ def test_a_fault_that_stands_already_is_told_but_nobody_knows_since_when(rig: Ri
 
 
 def test_a_fault_that_no_poll_saw(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_watch, '_PERIOD', 0.1)
+    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.1)
     connect(rig)
     began = time.monotonic()
     with rig.simulator.lock:
@@ -140,7 +140,7 @@ def test_a_fault_that_no_poll_saw(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> 
 def test_the_same_fault_twice_within_a_tick_is_told_twice(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_watch, '_SOON', 0.0)
+    monkeypatch.setattr(error_log_monitor, '_SOON', 0.0)
     connect(rig)
     trip(rig)
     told(rig)
@@ -163,7 +163,7 @@ def test_a_drive_that_writes_its_log_late(rig: Rig) -> None:
         rig.far.trip(5)
         late = list(rig.far.faults.log)
         rig.far.faults.log.clear()
-    wait_until(lambda: rig.drive._log_watch._tries < log_watch._TRIES)
+    wait_until(lambda: rig.drive._error_log_monitor._tries < error_log_monitor._TRIES)
     assert rig.notes.entries == []
     with rig.simulator.lock:
         rig.far.faults.log[:] = late
@@ -174,8 +174,8 @@ def test_a_drive_that_writes_its_log_late(rig: Rig) -> None:
 def test_what_came_while_the_drive_was_not_reached(
     rig: Rig, hasty: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_watch, '_PERIOD', 0.1)
-    monkeypatch.setattr(log_watch, '_WAIT', 0.05)
+    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.1)
+    monkeypatch.setattr(error_log_monitor, '_WAIT', 0.05)
     connect(rig)
     with rig.simulator.lock:
         rig.far.power_cycle(3600.0)
@@ -185,7 +185,7 @@ def test_what_came_while_the_drive_was_not_reached(
     rig.set_response_timeout(0.05)
     wait_until(lambda: not rig.drive.snapshot.connected)
     rig.set_response_timeout(2.0)
-    rig.drive._log_watch._looked_at = -math.inf
+    rig.drive._error_log_monitor._looked_at = -math.inf
     rig.boot()
     (entry,) = told(rig)
     assert entry.code == 7
@@ -195,7 +195,7 @@ def test_what_came_while_the_drive_was_not_reached(
 def test_a_drive_that_has_no_log_is_asked_once(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_watch, '_PERIOD', 0.0)
+    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.0)
     asked = []
 
     def refuse(register: int, words) -> None:
@@ -212,7 +212,7 @@ def test_a_drive_that_has_no_log_is_asked_once(
 
 
 def test_the_optimal_is_not_asked(make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_watch, '_PERIOD', 0.0)
+    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.0)
     rig = make_rig(model='sinus_optimal')
     asked = []
     rig.tap.before = lambda register, words: asked.append(register)
@@ -292,7 +292,7 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
 
     monkeypatch.setattr(rig.link, 'read', absurd)
     # nobody looked for long, so that only the hours tell when the entry came
-    rig.drive._log_watch._looked_at = -math.inf
+    rig.drive._error_log_monitor._looked_at = -math.inf
     for code, name in ((5, 'Overload'), (1, 'Par Fail')):
         rig.far.trip(code)
         rig.far.end_fault_causes()

@@ -78,7 +78,7 @@ class Ended(Exception):
         self.signal = signal
 
 
-class Ear:
+class EventLog:
     """
     Hears what a drive has to tell, on the worker of the bus.
 
@@ -114,7 +114,7 @@ class Ear:
         """Nothing: what matters of it is told as an event."""
 
 
-class Helm:
+class ControlSession:
     """
     The means to command one drive.
 
@@ -127,7 +127,7 @@ class Helm:
         self._session = session
         self._signals = signals
         self.screen = screen
-        self.ear = Ear(screen.say, mute)
+        self.ear = EventLog(screen.say, mute)
         self.remote: Remote = session.drive()
 
     def drive(self, **settings: Any) -> Drive:
@@ -185,9 +185,9 @@ class Helm:
 
 
 @contextlib.contextmanager
-def at_the_helm(
+def control_session(
     options: argparse.Namespace, *, mute: Collection[Cause] = (), live: bool = False
-) -> Iterator[Helm]:
+) -> Iterator[ControlSession]:
     """
     Open the line to command a drive; signals are held while the ``with`` block lasts.
 
@@ -200,4 +200,4 @@ def at_the_helm(
         Screen(live=live) as screen,
         Session(options, writes=True) as session,
     ):
-        yield Helm(session, screen, signals, mute)
+        yield ControlSession(session, screen, signals, mute)
