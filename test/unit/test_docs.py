@@ -301,6 +301,19 @@ def test_what_a_page_names_exists(page: Path) -> None:
         assert any((folder / name).exists() for folder in (ROOT, PACKAGE)), name
 
 
+def test_every_reading_that_is_cited_is_listed() -> None:
+    listed = set(re.findall(r'^(\d+)\. ', (ROOT / 'docs' / 'readings.md').read_text('utf-8'), re.M))
+    found = {
+        number: path.name
+        for folder, kinds in ((PACKAGE, ('*.py', '*.csv')), (ROOT / 'docs', ('*.md',)))
+        for kind in kinds
+        for path in folder.rglob(kind)
+        for number in re.findall(r'\bC(\d+)\b(?=[\],;])', path.read_text('utf-8'))
+    }
+    assert found.keys() > {'12', '98'}
+    assert {number: name for number, name in found.items() if number not in listed} == {}
+
+
 def test_every_page_is_in_the_index() -> None:
     index = {file for file, _ in links(read(ROOT / 'docs' / 'README.md'))}
     assert {page.name for page in (ROOT / 'docs').glob('*.md')} - index == {'README.md'}
