@@ -20,14 +20,14 @@ from concurrent.futures import Future
 import dataclasses
 import itertools
 
+from any_order_machine import AnyOrder
+from any_order_machine import G2DriveControl
+from any_order_machine import G2ModeScmd
 from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
 import pytest
 from support.addresses import Words
-from test_any_order import AnyOrder
-from test_any_order import G2DriveControl
-from test_any_order import G2ModeScmd
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 

@@ -20,9 +20,9 @@ from collections.abc import Iterator
 from collections.abc import Mapping
 import contextlib
 
+from any_order_machine import AnyOrder
+from any_order_machine import G2ModeScmd
 import pytest
-from test_any_order import AnyOrder
-from test_any_order import G2ModeScmd
 from test_older_settings import Rig as OlderRig
 
 from nfo_sinus_driver.drive import Procedure

@@ -1,0 +1,605 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rules by which Hypothesis makes up histories of a drive; see ``any_order_laws.py``."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+from typing import ClassVar
+
+from any_order_history import POLL_RATE
+from any_order_history import SETPOINT_TIMEOUT
+from any_order_history import SHUTDOWN_TIMEOUT
+from any_order_laws import MODE_BUS
+from any_order_laws import RUN_FIELDBUS
+from any_order_laws import Laws
+from any_order_rig import Rig
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine
+from hypothesis.stateful import initialize
+from hypothesis.stateful import precondition
+from hypothesis.stateful import rule
+import pytest
+
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.refusal import Refused as Refusal
+from nfo_sinus_driver.simulator.sinus.variant import ALL
+from nfo_sinus_driver.simulator.sinus.variant import DROPS
+from nfo_sinus_driver.simulator.sinus.variant import KEEPS
+from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.variant import REFUSED
+from nfo_sinus_driver.simulator.sinus.variant import SCMD
+from nfo_sinus_driver.simulator.sinus.variant import TAKEN
+from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
+
+#: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
+WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
+SETPOINTS = st.sampled_from((20.0, -20.0, 0.0, 5.0, 50.0, 400.0, -1e5, 0.004))
+#: Faults of the motor, the mains, the serial line and the fieldbus; 15 wants no acknowledgement.
+FAULTS = st.sampled_from((5, 7, 12, 14, 15))
+
+_CONTROL = 'fieldbus.drive_control'
+_whole = precondition(lambda self: self.rig.link.whole)
+_driven = precondition(lambda self: self.laws.watched)
+
+
+class AnyOrder(RuleBasedStateMachine):
+    """The rules; each ends with some time that passes."""
+
+    model: ClassVar[str] = 'sinus_g2'
+    method: ClassVar[str] = 'mode_scmd'
+    reference: ClassVar[str] = 'fieldbus'
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rig: Rig
+        self.laws: Laws
+
+    @initialize(
+        control_mode=st.sampled_from(('Freque', 'Freque', 'Speed', 'Torque', 'PI-Reg')),
+        brake=st.booleans(),
+        slow=st.booleans(),
+        delay=st.sampled_from((0, 0, 1)),
+        drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
+        restart_after=st.sampled_from((None, None, 0, 1, 2)),
+        keeps=st.booleans(),
+        refuses=st.sampled_from((ALL, ALL, SCMD, NOTHING)),
+        tunes_on=st.booleans(),
+    )
+    def begin(
+        self,
+        control_mode: str = 'Freque',
+        brake: bool = True,
+        slow: bool = False,
+        delay: int = 0,
+        drive_timeout: float = 0.0,
+        restart_after: int | None = None,
+        keeps: bool = True,
+        refuses: str = ALL,
+        tunes_on: bool = True,
+    ) -> None:
+        """
+        Begin; a G2 ends its faults by itself after some seconds, if there are any.
+
+        :param keeps: the drive keeps its run command through a fault.
+        :param refuses: what it refuses while one is active.
+        :param tunes_on: it refuses to stop while it tunes.
+        """
+        optimal = self.model == 'sinus_optimal'
+        if optimal and control_mode not in ('Freque', 'Speed'):
+            control_mode = 'Freque'
+        parameters: dict[str, Any] = {
+            'control.mode': control_mode,
+            'control.st_mode': 'Brake' if brake else 'Release',
+            'control.accel': 0.3,
+            'control.retard': 3.0 if slow else 0.3,
+            'control.run_dly': delay,
+        }
+        if restart_after is not None and not optimal:
+            parameters.update(dict.fromkeys(TRIES.values(), 3))
+            parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
+        variant = {
+            'run_command_in_fault': KEEPS if keeps else DROPS,
+            'refuses_in_fault': refuses,
+            'stop_in_tuning': REFUSED if tunes_on else TAKEN,
+        }
+        far = simulated_drive(self.model, settings=parameters, **variant)
+        self.rig = Rig(
+            far,
+            DriveSettings(
+                model=self.model,
+                control_method=self.method,
+                reference=self.reference,
+                expected_control_mode=control_mode if optimal else '',
+                poll_rate=POLL_RATE,
+                telemetry_rate=1.0,
+                setpoint_timeout=SETPOINT_TIMEOUT,
+                shutdown_timeout=SHUTDOWN_TIMEOUT,
+                drive_timeout=0.0 if optimal or self.method == 'monitor' else drive_timeout,
+            ),
+        )
+        self.laws = Laws(self.rig)
+        self.connect()
+        self.activate()
+
+    def teardown(self) -> None:
+        if hasattr(self, 'rig'):
+            try:
+                self.laws.end()
+            finally:
+                self.rig.close()
+
+    def let(self, wait: float) -> None:
+        """Let time pass, and judge."""
+        self.rig.judge(self.rig.looked)
+        self.rig.pass_time(wait)
+
+    def until_noticed(self) -> None:
+        """Let what has happened last be noticed, if it can be."""
+        # a drive without power answers nobody, and is not seen before it has started
+        while not self.rig.far.listening and self.rig.link.whole:
+            self.rig.pass_time(0.1)
+        self.rig.pass_time(self.laws.noticed)
+
+    # --- commands ---------------------------------------------------------------------------------
+
+    @precondition(lambda self: not self.laws.watched)
+    @rule(wait=WAITS)
+    def connect(self, wait: float = 0.1) -> None:
+        future = self.rig.drive.connect(patient=False)
+        self.rig.answer(future)
+        if future.exception() is None:
+            self.laws.connected()
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def activate(self, wait: float = 0.1) -> None:
+        self.rig.drive.activate()
+        self.laws.activated()
+        self.let(wait)
+
+    def _give(self, name: str, wait: float) -> None:
+        # dozens of calls at one moment delay the polls, and show nothing
+        if not self.laws.pending(name):
+            self.laws.command(name, getattr(self.rig.drive, name)())
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def enable(self, wait: float = 1.0) -> None:
+        self._give('enable', wait)
+
+    @_driven
+    @rule(value=SETPOINTS, wait=WAITS)
+    def run(self, value: float = 20.0, wait: float = 1.0) -> None:
+        """Enable it and send set-points, as a program does."""
+        self._give('enable', 0.4)
+        self.send(value, wait)
+
+    @rule(value=SETPOINTS, wait=WAITS)
+    def ride(self, value: float = 20.0, wait: float = 1.0) -> None:
+        """Put right what is in the way, enable it and send set-points."""
+        rig, far = self.rig, self.rig.far
+        rig.send(None)
+        rig.link.mend()
+        far.silence(0.0)
+        far.motor.load = 0.3
+        far.end_fault_causes()
+        if self.laws.watched:
+            # what happened last may not have been noticed, nor the line be trusted again
+            self.let(2.5)
+        else:
+            self.connect()
+        self.activate()
+        if far.faults:
+            self._answered('acknowledge')
+        if not far.control_unit.run_input:
+            self.run_input_on()
+        self._answered('enable')
+        self.send(value, wait)
+
+    @rule(value=SETPOINTS, wait=WAITS)
+    def another_ride(self, value: float, wait: float) -> None:
+        self.ride(value, wait)
+
+    @rule(value=st.sampled_from((20.0, -50.0)), wait=st.sampled_from((0.4, 1.0)))
+    def good_ride(self, value: float, wait: float) -> None:
+        self.ride(value, wait)
+
+    def _answered(self, name: str) -> None:
+        if self.method != 'monitor':
+            future = getattr(self.rig.drive, name)()
+            self.laws.command(name, future)
+            self.rig.answer(future)
+
+    @_driven
+    @rule(wait=WAITS)
+    def enable_without_run_input(self, wait: float = 0.4) -> None:
+        self.run_input_off()
+        self._answered('enable')
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def stop(self, wait: float = 0.4) -> None:
+        self._give('stop', wait)
+
+    @rule(wait=WAITS)
+    def stop_while_reading(self, wait: float = 0.4) -> None:
+        """Stop a ride while all the parameters are read, which keeps the line busy."""
+        self.ride()
+        reading = self.rig.drive.parameters.read()
+        self.let(0.05)
+        self._give('stop', wait)
+        self.rig.answer(reading)
+
+    @_driven
+    @rule(
+        names=st.sampled_from(
+            (
+                ('enable', 'stop'),
+                ('stop', 'enable'),
+                ('stop', 'stop'),
+                ('enable', 'enable', 'stop'),
+                ('enable', 'quick_stop', 'enable'),
+                ('quick_stop', 'acknowledge'),
+                ('acknowledge', 'acknowledge'),
+                ('stop', 'deactivate'),
+            )
+        ),
+        begun=st.sampled_from(('', '', 'enable', 'acknowledge')),
+        after=st.sampled_from((0.0, 0.004, 0.02)),
+        wait=WAITS,
+    )
+    def at_once(
+        self, names: tuple[str, ...], begun: str = '', after: float = 0.0, wait: float = 0.4
+    ) -> None:
+        """Let two clients call at the same moment, perhaps while a third one is being served."""
+        if begun:
+            self._give(begun, after)
+        for name in names:
+            self.laws.command(name, getattr(self.rig.drive, name)())
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def quick_stop(self, wait: float = 0.4) -> None:
+        self._give('quick_stop', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def acknowledge(self, wait: float = 0.4) -> None:
+        self._give('acknowledge', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def deactivate(self, wait: float = 0.4) -> None:
+        self._give('deactivate', wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def clean_up(self, wait: float = 0.4) -> None:
+        future = self.rig.drive.disconnect(SHUTDOWN_TIMEOUT)
+        self.laws.command('disconnect', future)
+        self.rig.answer(future)
+        self.let(wait)
+
+    @_driven
+    @rule(wait=WAITS)
+    def shut_down(self, wait: float = 0.4) -> None:
+        """End the driver as a signal does, and start another."""
+        for name, give in (
+            ('stop_for_good', self.rig.drive.stop_for_good),
+            ('disconnect', self.rig.drive.disconnect),
+        ):
+            future = give(SHUTDOWN_TIMEOUT)
+            self.laws.command(name, future)
+            self.rig.answer(future)
+        self.kill(wait)
+
+    @rule(wait=WAITS)
+    def kill(self, wait: float = 0.4) -> None:
+        """End the driver as a power cut of its computer does, and start another."""
+        self.rig.send(None)
+        self.rig.kill()
+        self.laws.killed()
+        self.rig.begin()
+        self.let(wait)
+        self.connect()
+        if self.laws.watched:
+            self.activate()
+
+    @_driven
+    @precondition(lambda self: self.model == 'sinus_g2' and self.method == 'mode_scmd')
+    @rule(
+        procedure=st.sampled_from(Procedure),
+        after=st.sampled_from((0.02, 0.4, 1.0)),
+        give=st.sampled_from(('', 'stop', 'stop', 'quick_stop', 'deactivate', 'enable')),
+        wait=WAITS,
+    )
+    def tune(
+        self, procedure: Procedure, after: float = 0.4, give: str = 'stop', wait: float = 1.0
+    ) -> None:
+        """Tune a motor that stands; do something else meanwhile."""
+        if not self.laws.pending('tune'):
+            self.laws.command('tune', self.rig.drive.tune(procedure))
+        self.let(after)
+        if give:
+            self._give(give, wait)
+
+    @_driven
+    @rule(code=FAULTS, between=st.sampled_from((0.0, 0.1, 0.4)), wait=WAITS)
+    def fault_in_a_ride_acknowledged(
+        self, code: int, between: float = 0.4, wait: float = 1.0
+    ) -> None:
+        """Acknowledge a fault that has ended a ride, with the run command standing perhaps."""
+        self.ride()
+        self.fault(code, wait=between)
+        if self.laws.watched:
+            self._give('acknowledge', wait)
+
+    @precondition(lambda self: self.reference == 'fieldbus')
+    @rule(value=SETPOINTS, wait=WAITS)
+    def set_once(self, value: float = 20.0, wait: float = 0.1) -> None:
+        for number in (math.nan, math.inf):
+            with pytest.raises(ValueError, match='no number'):
+                self.rig.drive.set_setpoint(number)
+        self.rig.drive.set_setpoint(value)
+        self.laws.gave(value)
+        self.let(wait)
+
+    @precondition(lambda self: self.reference == 'fieldbus')
+    @rule(value=st.none() | SETPOINTS, wait=WAITS)
+    def send(self, value: float | None = 20.0, wait: float = 1.0) -> None:
+        """Let a program send set-points from now on, or no more."""
+        if self.reference == 'fieldbus':
+            self.rig.send(value)
+        self.let(wait)
+
+    @_driven
+    @precondition(lambda self: self.model == 'sinus_g2')
+    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
+    def set_control_mode(self, mode: str, wait: float = 0.4) -> None:
+        if self.method != 'monitor':
+            self.until_noticed()
+            change = self.rig.drive.parameters.change({'control.mode': mode})
+            self.rig.answer(change)
+            self.let(wait)
+
+    # --- what the drive does ----------------------------------------------------------------------
+
+    @rule(code=FAULTS, standing=st.booleans(), wait=WAITS)
+    def fault(self, code: int, standing: bool = False, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        self.rig.far.trip(code, cause_present=standing)
+        self.let(wait)
+
+    @precondition(lambda self: self.rig.far.faults)
+    @rule(wait=WAITS)
+    def end_cause(self, wait: float = 0.4) -> None:
+        self.rig.far.end_fault_causes()
+        self.let(wait)
+
+    @precondition(lambda self: self.rig.far.faults and self.rig.link.whole)
+    @rule(wait=WAITS)
+    def end_fault(self, wait: float = 1.0) -> None:
+        """Let the drive forget its fault, by its keypad or as RstDly says."""
+        self.until_noticed()
+        self.laws.disturbed()
+        self.rig.far.end_fault_causes()
+        self.rig.far.faults.acknowledge()
+        self.rig.far.faults.acknowledge_serial()
+        self.rig.far.set_run_input(self.rig.far.control_unit.run_input)
+        self.let(wait)
+
+    @rule(key=st.sampled_from(('stop', 'start', 'ext')), wait=WAITS)
+    def press(self, key: str, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        self.rig.far.control_unit.press(key)
+        self.let(wait)
+
+    @rule(mode=st.sampled_from((1, 2, 3)), wait=WAITS)
+    def write_mode(self, mode: int, wait: float = 0.4) -> None:
+        """Let somebody else write MODE."""
+        self._by_another(('fieldbus.mode', mode))
+        if mode == MODE_BUS:
+            self.laws.forgotten()
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: self.reference == 'fieldbus' and not self.laws.enabling)
+    @rule(wait=WAITS)
+    def run_by_another(self, wait: float = 1.0) -> None:
+        """Let another master run the motor, the way this driver would."""
+        self.until_noticed()
+        setpoint = self.rig.far.control_unit.setpoint_key
+        if self.method == 'drive_control':
+            words = (0xC076, 0xC077, 0xC07F)
+            self._by_another(*((_CONTROL, word) for word in words), (setpoint, 100))
+        else:
+            command = 'fieldbus.smode' if self.model == 'sinus_optimal' else 'fieldbus.scmd'
+            mode = ('fieldbus.mode', MODE_BUS)
+            self._by_another(mode, (setpoint, 100), (command, RUN_FIELDBUS))
+        self.laws.started_by_another()
+        self.let(wait)
+
+    def _by_another(self, *writes: tuple[str, int]) -> None:
+        self.laws.disturbed()
+        for key, raw in writes:
+            try:
+                self.rig.far.write_raw(key, raw)
+            except Refusal:
+                return
+
+    @rule(wait=WAITS)
+    def run_input_off(self, wait: float = 0.4) -> None:
+        self.laws.disturbed()
+        self.rig.far.set_run_input(False)
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: not self.rig.far.control_unit.run_input)
+    @rule(wait=WAITS)
+    def run_input_on(self, wait: float = 1.0) -> None:
+        self.until_noticed()
+        self.laws.disturbed()
+        self.rig.far.set_run_input(True)
+        self.let(wait)
+
+    @rule(share=st.sampled_from((0.3, 3.0)), wait=WAITS)
+    def load(self, share: float, wait: float = 1.0) -> None:
+        """Load the motor; 3.0 is more than the current limit lets it turn."""
+        self.rig.far.motor.load = share
+        self.let(wait)
+
+    @rule(boot=st.sampled_from((0.05, 0.5, 2.0)), wait=WAITS)
+    def power_cycle(self, boot: float, wait: float = 1.0) -> None:
+        self.laws.disturbed()
+        self.rig.far.power_cycle(boot)
+        self.let(wait)
+
+    @_whole
+    @precondition(lambda self: self.model == 'sinus_g2')
+    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
+    def set_control_mode_at_keypad(self, mode: str, wait: float = 1.0) -> None:
+        self.until_noticed()
+        if self.rig.far.peek('control.mode') != mode:
+            self.rig.far.set_from_keypad('control.mode', mode)
+            self.laws.control_mode_changed()
+        # it is not read with every poll
+        self.let(max(wait, 2.5))
+
+    @rule(
+        event=st.sampled_from(('fault', 'fault', 'stop', 'ext', 'mode', 'run_input', 'unheard')),
+        after=st.sampled_from((0.2, 0.2, 1.0)),
+        wait=st.sampled_from((1.0, 2.5)),
+    )
+    def end_ride(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
+        """Let something that ends a ride happen in one."""
+        self.ride(wait=after)
+        if event == 'fault':
+            self.fault(5, wait=wait)
+        elif event == 'mode':
+            self.write_mode(1, wait)
+        elif event == 'run_input':
+            self.run_input_off(wait)
+        elif event == 'unheard':
+            self.rig.link.unheard = 1
+            self.stop(wait)
+        else:
+            self.press(event, wait)
+
+    # --- what the line does -----------------------------------------------------------------------
+
+    @_whole
+    @rule(state=st.sampled_from(('silent', 'deaf', 'noise', 'late', 'gone')), wait=WAITS)
+    def break_line(self, state: str, wait: float = 1.0) -> None:
+        self.rig.link.state = state
+        self.let(wait)
+
+    @rule(
+        state=st.sampled_from(('silent', 'noise', 'gone')),
+        give=st.sampled_from(('', '', 'stop', 'quick_stop', 'deactivate')),
+        seconds=st.sampled_from((4.5, 9.0, 9.0)),
+        wait=WAITS,
+    )
+    def lose_line(self, state: str, give: str, seconds: float, wait: float = 2.5) -> None:
+        """Lose the line in a ride for so long that the drive is lost; stop it meanwhile."""
+        self.ride()
+        self.break_line(state, wait=0.02)
+        if give and self.laws.watched:
+            self._give(give, 0.0)
+        self.let(seconds)
+        self.mend_line(wait)
+
+    @rule(state=st.sampled_from(('silent', 'gone')), wait=WAITS)
+    def lose_line_for_long(self, state: str, wait: float) -> None:
+        self.lose_line(state, '', 9.0, wait)
+
+    @precondition(lambda self: not self.rig.link.whole)
+    @rule(wait=WAITS)
+    def mend_line(self, wait: float = 1.0) -> None:
+        self.rig.link.mend()
+        self.let(wait)
+
+    @_whole
+    @rule(losses=st.integers(1, 3), wait=WAITS)
+    def lose_answers(self, losses: int, wait: float = 0.4) -> None:
+        self.rig.link.losses = losses
+        self.let(wait)
+
+    @_whole
+    @rule(share=st.sampled_from((0.01, 0.03, 0.1)), seed=st.integers(0, 999), wait=WAITS)
+    def noise(self, share: float = 0.1, seed: int = 0, wait: float = 1.0) -> None:
+        """Damage or lose answers by chance, until the line is mended."""
+        self.rig.link.make_noise(share, seed)
+        self.let(wait)
+
+    @rule(
+        share=st.sampled_from((0.03, 0.1)),
+        seed=st.integers(0, 999),
+        give=st.sampled_from(('stop', 'quick_stop', 'deactivate', 'enable')),
+    )
+    def ride_in_noise(self, share: float, seed: int, give: str) -> None:
+        self.ride()
+        self.noise(share, seed, 2.5)
+        if self.laws.watched:
+            self._give(give, 1.0)
+
+    @rule(seconds=st.sampled_from((0.05, 0.3, 2.0)), wait=WAITS)
+    def hold_silent(self, seconds: float, wait: float = 1.0) -> None:
+        self.rig.far.silence(seconds)
+        self.let(wait)
+
+
+class G2ModeScmd(AnyOrder):
+    pass
+
+
+class G2DriveControl(AnyOrder):
+    method = 'drive_control'
+
+
+class OptimalModeScmd(AnyOrder):
+    model = 'sinus_optimal'
+
+
+class OptimalDriveControl(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'drive_control'
+    reference = 'terminal'
+
+
+class G2Monitor(AnyOrder):
+    method = 'monitor'
+
+
+class OptimalMonitor(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'monitor'
+
+
+MACHINES = (
+    G2ModeScmd,
+    G2DriveControl,
+    OptimalModeScmd,
+    OptimalDriveControl,
+    G2Monitor,
+    OptimalMonitor,
+)
