@@ -53,6 +53,8 @@ from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 #: No honest wait takes this long, on any machine, s.
@@ -204,8 +206,7 @@ class Rig:
 
     def writes(self, register: int) -> list[int]:
         """What was written to a register of one word, in order."""
-        requests = [frame for frame in self.trace() if frame['direction'] == 'request']
-        data = [bytes.fromhex(frame['hex']) for frame in requests]
+        data = self.requests
         return [
             int.from_bytes(frame[4:6], 'big')
             for frame in data
@@ -302,6 +303,28 @@ class Rig:
         self.enable()
         self.publish(frequency)
         self.wait_for_frequency(frequency)
+
+    @property
+    def requests(self) -> list[bytes]:
+        """All requests so far."""
+        sent = (frame for frame in self.trace() if frame['direction'] == 'request')
+        return [bytes.fromhex(frame['hex']) for frame in sent]
+
+    @property
+    def functions(self) -> set[int]:
+        """Their functions."""
+        return {request[1] for request in self.requests}
+
+    def refuse(self, monkeypatch: pytest.MonkeyPatch, key: str, only: int | None = None) -> None:
+        """Let the simulated drive refuse to have a parameter written."""
+        write = self.far.write_raw
+
+        def write_raw(written: str, raw: int) -> None:
+            if written == key and only in (None, raw):
+                raise Refused(Reason.STATE, 'as the test wants it')
+            write(written, raw)
+
+        monkeypatch.setattr(self.far, 'write_raw', write_raw)
 
     def wait_for_frequency(self, frequency: float) -> None:
         wait_until(lambda: abs(self.far.motor.frequency - frequency) < 0.2)
