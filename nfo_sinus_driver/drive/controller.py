@@ -119,6 +119,11 @@ class Controller:
         return self._state
 
     @property
+    def enabled(self) -> bool:
+        """The motor follows set-points, or the reference of the drive."""
+        return self._state is ControlState.ENABLED
+
+    @property
     def stopping(self) -> bool:
         """A stop is not confirmed yet."""
         return self._sequence.active
@@ -146,7 +151,7 @@ class Controller:
     @property
     def changing(self) -> bool:
         """The driver is waiting for the drive to say something else than before."""
-        return self.stopping or (self.commanded and self._state is not ControlState.ENABLED)
+        return self.stopping or (self.commanded and not self.enabled)
 
     @property
     def may_run(self) -> bool:
@@ -271,7 +276,7 @@ class Controller:
         :returns: what was done.
         :raises DriveError: it was not done, and why; the run command is removed then.
         """
-        if self._state is ControlState.ENABLED:
+        if self.enabled:
             return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()
         self._enabling = self._bus.current
@@ -281,6 +286,8 @@ class Controller:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
             control_mode = await self._starting.start(prepare)
             self._happened(ControlEvent.RUNNING)
+            if not self.enabled:
+                raise Cancelled
             self._setpoint.arm(control_mode)
         except Cancelled:
             raise DriveError(Report(Cause.STOPPED_WHILE_ENABLING)) from None
@@ -361,7 +368,8 @@ class Controller:
                         Priority.STOP,
                         confirmation.TIMEOUT,
                     )
-            except (DriveError, LinkError) as error:
+            except Exception as error:
+                # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()
                 with contextlib.suppress(LinkError):
                     await self._inverter.look(Priority.STOP)
@@ -439,6 +447,11 @@ class Controller:
         # it, one may stand that an acknowledgement has not come to remove yet
         seen = self._inverter.seen
         may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
+        # nobody enables it while it is waited for that the motor stands
+        with self._stopped_by_itself():
+            return await self._release(timeout, may_run=may_run)
+
+    async def _release(self, timeout: float, *, may_run: bool) -> Report:
         stopped = await self.stop() if may_run else None
         if not await self._method.in_control(Priority.SERVICE):
             return stopped or Report(Cause.NOT_IN_CONTROL)
@@ -481,8 +494,11 @@ class Controller:
         self._happened(ControlEvent.CONNECTED)
 
     def disconnected(self) -> None:
-        """Take note that the drive is left alone."""
+        """Take note that the drive is left alone; what still drives the motor is stopped."""
+        commanded = self.commanded
         self._happened(ControlEvent.LOST)
+        if commanded:
+            self._stop()
 
     def lost(self) -> bool:
         """Take note that the drive does not answer any more; true if it may have followed us."""
@@ -493,12 +509,12 @@ class Controller:
             self._inverter.tell(Severity.WARNING, Report(Cause.STOPPING_BECAUSE, why=reason))
         self._happened(ControlEvent.LOST)
         if self._lost_in_use:
-            self._sequence.request()
+            self._stop()
         return self._lost_in_use
 
     def alarmed_by(self, seen: InverterStatus) -> bool:
         """Tell whether a status is a reason to stop."""
-        follows = self._state is ControlState.ENABLED and seen.at >= self._since
+        follows = self.enabled and seen.at >= self._since
         return follows and self._why_stopped(seen) is not None
 
     def judge(self, seen: InverterStatus) -> bool:
@@ -511,7 +527,7 @@ class Controller:
         if seen.at < self._since:
             return False
         reason = None
-        if self._state is ControlState.ENABLED:
+        if self.enabled:
             reason = self._why_stopped(seen)
         elif not (self.commanded or self.stopping) and seen.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)

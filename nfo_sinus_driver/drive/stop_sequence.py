@@ -122,7 +122,7 @@ class StopSequence:
             yield
         finally:
             self._held -= 1
-            self._report_outcome()
+            self._report_end()
 
     def request(self) -> None:
         """
@@ -137,7 +137,8 @@ class StopSequence:
             self._outcome = None
             self._unconfirmed = _NO_ANSWER_YET
             self._due = time.monotonic() + confirmation.TIMEOUT
-            self._task = self._bus.spawn(self._keep_trying())
+            task = self._bus.spawn(self._keep_trying())
+            self._task = None if task.future.done() else task
 
     def request_anew(self) -> None:
         """Request it, or try again at once: what attempts show that have begun counts no more."""
@@ -146,7 +147,7 @@ class StopSequence:
         else:
             self._outcome = None
             self._reasons += 1
-            self._report_outcome()
+            self._report_fault()
             self._bus.wake(self._task)
 
     async def wait_confirmed(self, patience: float | None = None) -> None:
@@ -184,7 +185,7 @@ class StopSequence:
                 )
             await self._rest()
         self._task = None
-        self._report_outcome()
+        self._report_end()
         if pause:
             self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
 
@@ -233,16 +234,16 @@ class StopSequence:
         if self._reasons > reasons:
             self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
         self._tried_at = time.monotonic()
-        self._report_outcome()
+        self._report_fault()
         return self._outcome
 
-    def _report_outcome(self) -> None:
+    def _report_fault(self) -> None:
+        blocked = self._outcome is _Outcome.BLOCKED_BY_FAULT
+        self._report(ControlEvent.FAULT_BLOCKS if blocked else ControlEvent.FAULT_OVER)
+
+    def _report_end(self) -> None:
         if not self.active:
             self._report(ControlEvent.STOPPED)
-        elif self.blocked_by_fault:
-            self._report(ControlEvent.FAULT_BLOCKS)
-        else:
-            self._report(ControlEvent.FAULT_OVER)
 
     async def _try_once(self) -> _Outcome:
         """

@@ -51,6 +51,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
@@ -356,10 +357,23 @@ class Rig:
             until = min(self.bus.step(), end, self.clock.now + _SLICE)
             if self._shown != before or self.changed():
                 self.judge(self.looked)
+            self._require_consistent()
             if self._broken is not None:
                 raise self._broken
             if until > self.clock.now:
                 self.elapse(until - self.clock.now)
+
+    def _require_consistent(self) -> None:
+        """See to it that the state of control says what there is of a stop, and who is followed."""
+        controller = self.drive._controller
+        if controller is None:
+            return
+        state, stopping = controller.state, controller.stopping
+        if state in (ControlState.STOPPING, ControlState.BLOCKED):
+            assert stopping, f'{state.name}, and nothing stops it'
+        elif state not in (ControlState.PROCEDURE, ControlState.ABORTING, ControlState.CLOSED):
+            assert not stopping, f'{state.name}, and a stop is on its way'
+        assert self.drive.armed == (state is ControlState.ENABLED)
 
     @property
     def _shown(self) -> tuple[object, ...]:
