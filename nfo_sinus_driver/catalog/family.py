@@ -176,6 +176,8 @@ def load_family(name: str) -> Family:
         addresses[key][found.protocol] = found
     parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
     roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
+    if Role.STATUS_CODE.value not in {role.value for role, _ in roles}:
+        raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the status_code')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
     log = folder / 'error_log.csv'
     logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []

@@ -103,8 +103,10 @@ def _stop(helm: ControlSession, options: argparse.Namespace) -> tuple[bool, str]
 def _in_charge(helm: ControlSession) -> Drive:
     """Return the drive, to be commanded by whichever method has control of it already."""
     method = helm.remote.method_in_charge()
-    # the reference does not matter to who starts nothing; this one goes with the control word
-    reference = 'terminal' if method == 'drive_control' else 'fieldbus'
+    methods = helm.remote.model.profile.methods
+    references = methods[method].references
+    # it does not matter to who starts nothing, and what is not usual leaves it to the drive
+    reference = references[0] if method == next(iter(methods)) else references[-1]
     return helm.drive(control_method=method, reference=reference)
 
 

@@ -239,11 +239,15 @@ class DriveState:
 
     async def measure(self, role: Role, priority: Priority) -> float:
         """
-        Read a measured value once; NaN if the drive says what cannot be, and that again.
+        Read a measured value once; NaN if its family has none such.
+
+        NaN, too, if the drive says what cannot be, and that again.
 
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
+        if not key:
+            return math.nan
         data = await self._registers.read_data(key, priority, once=True)
         value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
@@ -393,11 +397,13 @@ class DriveState:
         return mode
 
     async def coasts_to_stop(self) -> bool:
-        """Tell whether an ordinary stop releases the motor [C97]."""
+        """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
         key = self.model.key(Role.STOP_MODE)
         if self._registers.reaches(key):
             return await self.read_label(key, Priority.STOP) == self.model.profile.releases
-        return self.seen is not None and Fact.STOP_MODE_BRAKE not in self.seen.facts
+        seen = self.seen
+        told = seen is not None and Fact.STOP_MODE_BRAKE in seen.valid
+        return told and seen is not None and Fact.STOP_MODE_BRAKE not in seen.facts
 
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""

@@ -25,7 +25,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from collections.abc import Sequence
 import dataclasses
+import math
 from pathlib import Path
+import shutil
 import struct
 import threading
 import time
@@ -41,6 +43,7 @@ from support.said import said
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import CatalogError
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
@@ -271,3 +274,36 @@ def test_it_follows_no_set_point_for_all(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, Notes())
     refused = said(drive.setpoint.why_not_shared('acme'))
     assert refused == 'acme takes a set-point in several writes'
+
+
+@pytest.fixture
+def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The same drive as a family that has no roles but those of its status."""
+    folder = tmp_path / f'bare_{tmp_path.name}'
+    shutil.copytree(Path(__file__).parent / 'made_up' / 'acme', folder)
+    (folder / 'roles.csv').write_text(
+        'role,parameter\nstatus_word,bus.told\nstatus_code,bus.code\n', encoding='utf-8'
+    )
+    monkeypatch.setattr(families, '__path__', [*families.__path__, str(tmp_path)])
+    return folder.name
+
+
+def test_a_role_that_is_missing_is_a_feature_that_it_lacks(
+    acme: Acme, bus: Bus, bare: str
+) -> None:
+    notes = Notes()
+    drive = turning(acme, bus, notes, model=bare)
+    polls = len(notes.snapshots)
+    wait_until(lambda: len(notes.snapshots) > polls + 20)
+    assert drive.snapshot.connected and drive.armed
+    assert math.isnan(drive.snapshot.speed) and math.isnan(drive.snapshot.frequency)
+    # nothing says that it coasts
+    assert drive.stop().result(PATIENCE).cause is not Cause.COASTING
+    assert acme.hertz == 0
+
+
+def test_a_family_without_a_status_code_is_none(bare: str, tmp_path: Path) -> None:
+    roles = tmp_path / bare / 'roles.csv'
+    roles.write_text('role,parameter\nstatus_word,bus.told\n', encoding='utf-8')
+    with pytest.raises(CatalogError, match='status_code'):
+        load_family(bare)
