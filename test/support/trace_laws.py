@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
 import functools
+import itertools
 from typing import Any
 
 from nfo_sinus_driver.catalog import Access
@@ -38,6 +39,11 @@ _SETPOINTS = {
     'modbus': frozenset((0x03FC, 0x025C, 0x0408, 0x0410)),
     'classic': frozenset((0x001E,)),
 }
+
+#: A master waits at least so long for an answer, s; a later one may meet the next request, and
+#: so many frames behind it are looked at.
+_GIVEN_UP = 0.19
+_NEAR = 8
 
 Frame = dict[str, Any]
 
@@ -78,15 +84,26 @@ def violations(
         for number, frame in enumerate(frames)
         if frame['direction'] == 'request'
         for complaint in (
-            *(_wrong_gap(frame, number, frame_gap) if protocol in WITH_GAP else ()),
+            *(_wrong_gap(frames, number, frame_gap) if protocol in WITH_GAP else ()),
             *judge.complaints(bytes.fromhex(frame['hex'])),
         )
     ]
 
 
-def _wrong_gap(frame: Frame, number: int, frame_gap: float) -> Iterator[str]:
-    if number and frame['gap'] < frame_gap:
-        yield f'came {1000 * frame["gap"]:.3f} ms after the frame before, t3.5 is not kept'
+def _wrong_gap(frames: list[Frame], number: int, frame_gap: float) -> Iterator[str]:
+    gap = frames[number]['gap']
+    if number and gap < frame_gap and not _behind_a_late_answer(frames, number):
+        yield f'came {1000 * gap:.3f} ms after the frame before, t3.5 is not kept'
+
+
+def _behind_a_late_answer(frames: list[Frame], number: int) -> bool:
+    """Tell whether a request was given up just before: who comes late keeps no gap to the next."""
+    near = frames[max(0, number - _NEAR) : number]
+    return any(
+        one['direction'] == 'request' and other['first'] - one['last'] >= _GIVEN_UP
+        for one, other in itertools.pairwise(near)
+        if 'first' in other and 'last' in one
+    )
 
 
 class _Judge:

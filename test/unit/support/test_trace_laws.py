@@ -184,3 +184,17 @@ def test_a_bad_ride_over_classic_is_found_out(bad: list[dict], complaint: str) -
 def test_a_frame_that_is_none_is_found_out(protocol: str, data: bytes, complaint: str) -> None:
     (found,) = violations([_raw(data)], _GAP, protocol=protocol)
     assert complaint in found
+
+
+def test_a_late_answer_keeps_no_gap_to_the_next_request() -> None:
+    times = [(0.0, 0.001), (0.202, 0.203), (0.2025, 0.2035)]
+    kinds = ['request', 'request', 'answer']
+    frames = [
+        {**_request(_POLL, gap=0.01), 'direction': kind, 'first': first, 'last': last}
+        for kind, (first, last) in zip(kinds, times, strict=True)
+    ]
+    frames.append({**_request(_POLL, gap=-0.0001), 'first': 0.2034, 'last': 0.2044})
+    assert violations(frames, _GAP) == []
+    # an answer in time does not excuse it
+    frames[1]['first'] = 0.1
+    assert len(violations(frames, _GAP)) == 1
