@@ -39,7 +39,7 @@ BACKGROUND_SHARE = 1 / 6
 #: The same for all polls of units that do not answer: each of them may cost a whole time-out.
 RETRY_SHARE = 1 / 2
 #: How much of its share each may be owed while it waits for it, s: what it earns by two requests
-#: that nobody answers, when the time-out is that of the factory.
+#: without a response, when the time-out is that of the factory.
 _MOST_OWED = 0.07
 #: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005

@@ -77,7 +77,7 @@ class Read:
     """
     Read a parameter; brings its value.
 
-    :ivar once: do not repeat the request when nobody answers.
+    :ivar once: do not repeat the request when there is no response.
     """
 
     key: str
@@ -92,7 +92,7 @@ class Write:
     :ivar value: a float is rounded to the drive's step; anything else is written as it is or not.
     :ivar at: the parameter in whose place it is written where the line reaches that one; ``key``
         still says how.
-    :ivar once: do not repeat the request when nobody answers.
+    :ivar once: do not repeat the request when there is no response.
     :ivar head: at the head of the bus, as the very next frame.
     """
 
@@ -177,7 +177,7 @@ class SetpointTarget:
         return float(values[0])
 
     def zero(self, *, once: bool) -> Steps[None]:
-        """Write set-point 0; ``once``: do not repeat a request that nobody answers."""
+        """Write set-point 0; ``once``: do not repeat a request without a response."""
         for write in self.writes(0.0):
             yield Write(write.key, write.value, at=write.at, once=once)
 

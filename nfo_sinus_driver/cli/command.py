@@ -46,9 +46,9 @@ _STATUS_PERIOD = 0.2
 
 def stop(options: argparse.Namespace) -> int:
     """Stop a motor that the bus runs."""
-    with control_session(options, mute=_MUTE, live=not options.json) as helm:
+    with control_session(options, mute=_MUTE, live=not options.json) as control:
         try:
-            done, answer = _stop(helm, options)
+            done, answer = _stop(control, options)
         except DriveError as error:
             done, answer = False, (
                 f'the stop is NOT confirmed: {say(error)}. '
@@ -56,17 +56,17 @@ def stop(options: argparse.Namespace) -> int:
             )
         if options.json:
             facts = {'confirmed': done, 'message': answer}
-            helm.screen.put(json.dumps(facts, ensure_ascii=False))
+            control.screen.put(json.dumps(facts, ensure_ascii=False))
         elif done:
-            helm.screen.put(answer)
+            control.screen.put(answer)
     if not done:
         raise CliError(answer)
     return 0
 
 
-def _stop(helm: ControlSession, options: argparse.Namespace) -> tuple[bool, str]:
+def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, str]:
     """Return whether it is stopped, and what to say of it."""
-    remote = helm.remote
+    remote = control.remote
     remote.identify(thoroughly=False)
     seen = remote.look()
     told = remote.inverter.describe()
@@ -77,43 +77,43 @@ def _stop(helm: ControlSession, options: argparse.Namespace) -> tuple[bool, str]
                 'press STOP at the keypad, or open its RUN input'
             )
         return True, f'the motor does not run ({told})'
-    drive = _in_charge(helm)
+    drive = _in_charge(control)
     shown_at = -math.inf
 
     def show() -> None:
         nonlocal shown_at
-        if helm.screen.live and time.monotonic() > shown_at + _STATUS_PERIOD:
+        if control.screen.live and time.monotonic() > shown_at + _STATUS_PERIOD:
             shown_at = time.monotonic()
-            helm.screen.status(as_line(drive.snapshot, helm.ear.values))
+            control.screen.status(as_line(drive.snapshot, control.events.values))
 
-    stopping = Stopping(helm, drive, show)
-    helm.finish(drive.connect(), _LONGEST)
+    stopping = Stopping(control, drive, show)
+    control.finish(drive.connect(), _LONGEST)
     drive.activate()
     stopped = stopping.stop(quick=options.quick)
     how = say(stopping.answer)
     if not stopped:
         return False, how
     if not options.json:
-        helm.screen.say(how)
+        control.screen.say(how)
     if not stopping.give_back():
         return False, f'{how}, but control was not released'
     return True, say(stopping.answer)
 
 
-def _in_charge(helm: ControlSession) -> Drive:
+def _in_charge(control: ControlSession) -> Drive:
     """Return the drive, to be commanded by whichever method has control of it already."""
-    method = helm.remote.method_in_charge()
-    methods = helm.remote.model.profile.methods
+    method = control.remote.method_in_charge()
+    methods = control.remote.model.profile.methods
     references = methods[method].references
     # it does not matter to who starts nothing, and what is not usual leaves it to the drive
     reference = references[0] if method == next(iter(methods)) else references[-1]
-    return helm.drive(control_method=method, reference=reference)
+    return control.drive(control_method=method, reference=reference)
 
 
 def ack(options: argparse.Namespace) -> int:
     """Acknowledge a fault or an alarm."""
-    with control_session(options, mute=_MUTE) as helm:
-        remote = helm.remote
+    with control_session(options, mute=_MUTE) as control:
+        remote = control.remote
         remote.identify(thoroughly=False)
         seen = remote.look()
         told = remote.inverter.describe()
@@ -123,7 +123,7 @@ def ack(options: argparse.Namespace) -> int:
             answer = say(Report(Cause.NOTHING_TO_ACKNOWLEDGE, status=told))
         else:
             try:
-                answer = say(_acknowledge(helm, seen))
+                answer = say(_acknowledge(control, seen))
                 acknowledged = True
             except (DriveError, CliError) as failure:
                 error, answer = failure, say(failure)
@@ -137,30 +137,30 @@ def ack(options: argparse.Namespace) -> int:
                 'text_now': remote.inverter.text,
                 'message': answer,
             }
-            helm.screen.put(json.dumps(facts, ensure_ascii=False))
+            control.screen.put(json.dumps(facts, ensure_ascii=False))
         elif not error:
-            helm.screen.put(answer)
+            control.screen.put(answer)
     if error is not None:
         raise CliError(answer)
     return 0
 
 
-def _acknowledge(helm: ControlSession, seen: InverterStatus) -> Report:
+def _acknowledge(control: ControlSession, seen: InverterStatus) -> Report:
     """
     Acknowledge, and leave nothing behind that could start the motor.
 
     :raises DriveError: the fault is still active.
     :raises CliError: the motor runs.
     """
-    remote = helm.remote
+    remote = control.remote
     if seen.driven:
         raise CliError(
             f'the motor runs ({remote.inverter.describe()}), and to acknowledge would stop it: '
             'type nfo-sinus stop first'
         )
-    drive = _in_charge(helm)
-    helm.finish(drive.connect(), _LONGEST)
-    answer = helm.finish(drive.acknowledge(), _LONGEST)
+    drive = _in_charge(control)
+    control.finish(drive.connect(), _LONGEST)
+    answer = control.finish(drive.acknowledge(), _LONGEST)
     # nobody is here afterwards to keep the drive from timing out
-    released = helm.finish(drive.disconnect(1.0), _LONGEST)
+    released = control.finish(drive.disconnect(1.0), _LONGEST)
     return Report(Cause.CONTROL_RELEASED, stop=answer) if released.cause in RELEASED else answer

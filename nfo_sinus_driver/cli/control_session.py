@@ -127,7 +127,7 @@ class ControlSession:
         self._session = session
         self._signals = signals
         self.screen = screen
-        self.ear = EventLog(screen.say, mute)
+        self.events = EventLog(screen.say, mute)
         self.remote: Remote = session.drive()
 
     def drive(self, **settings: Any) -> Drive:
@@ -137,7 +137,7 @@ class ControlSession:
         :param settings: fields of ``DriveSettings`` that are not as usual.
         :raises UsageError: they make no sense.
         """
-        return self._session.command(self.ear, poll_rate=_POLL_RATE, **settings)
+        return self._session.command(self.events, poll_rate=_POLL_RATE, **settings)
 
     def signal(self, timeout: float) -> str:
         """Return the name of a signal that shall end it; ``''`` when none came in time, s."""

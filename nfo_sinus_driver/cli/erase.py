@@ -41,10 +41,10 @@ def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object
     count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
     if entries:
         require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
-        with control_session(options, mute=_MUTE) as helm:
-            drive = helm.drive()
-            helm.finish(drive.connect(), _LONGEST)
-            helm.finish(drive.erase_error_log(), _LONGEST)
+        with control_session(options, mute=_MUTE) as control:
+            drive = control.drive()
+            control.finish(drive.connect(), _LONGEST)
+            control.finish(drive.erase_error_log(), _LONGEST)
     if options.json:
         put(json.dumps({'erased': rows}, ensure_ascii=False, indent=2))
     else:

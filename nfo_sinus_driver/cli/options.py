@@ -133,7 +133,7 @@ def _common() -> argparse.ArgumentParser:
         type=int,
         choices=range(11),
         metavar='TIMES',
-        help='how often a request that nobody answers is repeated (default: 2)',
+        help='how often a request without a response is repeated (default: 2)',
     )
     return parser
 

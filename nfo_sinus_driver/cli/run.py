@@ -61,24 +61,24 @@ def run(options: argparse.Namespace) -> int:
             f'with --reference {options.reference} the drive follows its own reference: '
             'leave the set-point out'
         )
-    with control_session(options, live=not options.json) as helm:
-        return _Ride(helm, options).go()
+    with control_session(options, live=not options.json) as control:
+        return _Ride(control, options).go()
 
 
 class _Ride:
     """One motor that runs, from enable to stop."""
 
-    def __init__(self, helm: ControlSession, options: argparse.Namespace) -> None:
-        self._session = helm
+    def __init__(self, control: ControlSession, options: argparse.Namespace) -> None:
+        self._session = control
         self._options = options
-        self._screen = helm.screen
-        self._drive = helm.drive(
+        self._screen = control.screen
+        self._drive = control.drive(
             control_method=options.method,
             reference=options.reference,
             expected_control_mode=options.control_mode,
             drive_timeout=options.drive_timeout,
         )
-        self._stopping = Stopping(helm, self._drive, self._show)
+        self._stopping = Stopping(control, self._drive, self._show)
         self._shown_at = -math.inf
         self._ends_at = math.inf
 
@@ -141,10 +141,10 @@ class _Ride:
             )
 
     def _start(self) -> None:
-        helm, drive = self._session, self._drive
-        helm.wait(drive.connect())
+        control, drive = self._session, self._drive
+        control.wait(drive.connect())
         drive.activate()
-        helm.wait(drive.enable(), self._show)
+        control.wait(drive.enable(), self._show)
         if self._options.seconds is not None:
             self._ends_at = time.monotonic() + self._options.seconds
 
@@ -179,7 +179,7 @@ class _Ride:
         """Return why the motor follows set-points no more; a person has been told."""
         deadline = time.monotonic() + _LONGEST_WORD
         while time.monotonic() < deadline:
-            for report in reversed(self._session.ear.told):
+            for report in reversed(self._session.events.told):
                 if report.cause in _ENDS:
                     return say(report)
             self._session.signal(0.01)
@@ -211,7 +211,7 @@ class _Ride:
 
     def _show(self) -> None:
         now = time.monotonic()
-        seen, values = self._drive.snapshot, self._session.ear.values
+        seen, values = self._drive.snapshot, self._session.events.values
         nothing_yet = seen.status is None and self._shown_at < 0
         if nothing_yet or now < self._shown_at + self._options.period:
             return

@@ -58,7 +58,7 @@ _COLUMNS = (
     ('serial number', 0),
 )
 _ADVICE = (
-    'nobody answers: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
+    'no response: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
     'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
     'A and B of the wires'
 )

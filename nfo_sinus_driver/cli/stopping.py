@@ -51,8 +51,8 @@ class Stopping:
     :param show: called again and again meanwhile.
     """
 
-    def __init__(self, helm: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
-        self._session = helm
+    def __init__(self, control: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
+        self._session = control
         self._drive = drive
         self._show = show
         #: What the drive answered, or what became of its stop.

@@ -69,8 +69,8 @@ def tune(options: argparse.Namespace) -> int:
             raise CliError(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
     require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
     mute = {*NO_TIMEOUT, Cause.FAULT_APPEARED, *_OUTCOMES}
-    with control_session(options, mute=mute, live=not options.json) as helm:
-        return _Tuning(helm, options, procedure).go()
+    with control_session(options, mute=mute, live=not options.json) as control:
+        return _Tuning(control, options, procedure).go()
 
 
 def _warning(procedure: Procedure) -> str:
@@ -83,12 +83,12 @@ class _Tuning:
     """One procedure, from beginning to end."""
 
     def __init__(
-        self, helm: ControlSession, options: argparse.Namespace, procedure: Procedure
+        self, control: ControlSession, options: argparse.Namespace, procedure: Procedure
     ) -> None:
-        self._session = helm
+        self._session = control
         self._options = options
         self._procedure = procedure
-        self._drive = helm.drive()
+        self._drive = control.drive()
         self._begun = time.monotonic()
         self._shown = ''
         self._shown_at = 0.0
@@ -130,17 +130,17 @@ class _Tuning:
 
     def _tuned(self) -> tuple[Tuned, int]:
         """Return how it ended, and the exit status."""
-        helm, drive = self._session, self._drive
-        helm.wait(drive.connect())
+        control, drive = self._session, self._drive
+        control.wait(drive.connect())
         drive.activate()
         future = drive.tune(self._procedure)
         self._begun = time.monotonic()
         try:
-            tuned = helm.wait(future, self._show)
+            tuned = control.wait(future, self._show)
         except Ended as end:
-            helm.screen.say(f'{spoken(str(end))}: stopping it')
-            helm.finish(drive.cancel_tuning(), _LONGEST)
-            return helm.finish(future, _LONGEST, self._show), _INTERRUPTED
+            control.screen.say(f'{spoken(str(end))}: stopping it')
+            control.finish(drive.cancel_tuning(), _LONGEST)
+            return control.finish(future, _LONGEST, self._show), _INTERRUPTED
         return tuned, int(not tuned.success)
 
     def _show(self) -> None:

@@ -222,8 +222,8 @@ class Drive:
         Identify the drive, make sure that nothing runs unasked, and watch it from then on.
 
         :param parameters: read all its parameters before, and watch them too.
-        :param patient: repeat the first request when nobody answers; who tries again anyway saves
-            the other drives on the line that time.
+        :param patient: repeat the first request when there is no response; who tries again anyway
+            saves the other drives on the line that time.
         """
         return self.run(lambda: self._connect_first(patient, parameters))
 

@@ -141,7 +141,7 @@ class DriveState:
         """
         Read the status, without acknowledging anything.
 
-        :param once: do not repeat a request when nobody answers.
+        :param once: do not repeat a request when there is no response.
         :param told: the status word, where the drive has just told it with something else.
         :param code_for: how long an inverter status counts, s, that was read with the very status
             word that stands, if nothing was on its way then (:attr:`InverterStatus.plain`).

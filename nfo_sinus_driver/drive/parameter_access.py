@@ -145,7 +145,7 @@ class ParameterAccess:
         """
         Read a parameter.
 
-        :param once: do not repeat the request when nobody answers.
+        :param once: do not repeat the request when there is no response.
         :raises LinkError: as the link does.
         """
         return (await self.read_at(key, priority, once=once))[0]

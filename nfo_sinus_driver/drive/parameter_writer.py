@@ -180,7 +180,7 @@ class ParameterWriter:
         """
         Refuse what only a standing motor allows; a drive that is lax about it is not trusted.
 
-        :raises ParameterError: the motor runs, or nobody answers.
+        :raises ParameterError: the motor runs, or there is no response.
         """
         stopped = ', '.join(key for key in keys if self._registers.model[key].stopped)
         if not stopped:
@@ -255,7 +255,7 @@ class ParameterWriter:
 
         Tried again when the drive refuses, for it had the value once.
 
-        :raises LinkError: nobody answers.
+        :raises LinkError: there is no response.
         """
         trouble: Report | None = None
         for _ in range(_TRIES):

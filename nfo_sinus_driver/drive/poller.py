@@ -352,7 +352,7 @@ class Poller:
         self._publish(seen)
 
     def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
-        """Say on change that a fault stands, unless who ended a ride because of it has told."""
+        """Say on change that a fault is active, unless who ended a ride because of it has told."""
         code = seen.code if seen.faulted else 0
         if code and code != self._told_fault and not told:
             fault = explain_fault(self._inverter, seen)

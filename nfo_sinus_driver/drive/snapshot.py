@@ -122,7 +122,7 @@ class InverterStatus:
 
     @property
     def faulted(self) -> bool:
-        """A fault stands, or waits for being acknowledged [M0 table 15]."""
+        """A fault is active, or waits for being acknowledged [M0 table 15]."""
         return Fact.FAULT in self.facts
 
     @property

@@ -15,7 +15,7 @@
 """
 Why a drive answered a SELECT by NAK [M0 §6.1.5], [M2 §7].
 
-The NAK says nothing. The inverter status says whether a fault stands, for then nothing can be
+The NAK says nothing. The inverter status says whether a fault is active, for then nothing can be
 written; and when it is the serial fault, its flags say more, but reading them clears them.
 """
 
@@ -63,10 +63,10 @@ def flag_names(word: int) -> list[str]:
 def by_status(inv_st: int) -> Refused:
     """Return what the inverter status says of a NAK, where the flags are not read."""
     if inv_st == SIO_FAIL:
-        text = 'a serial fault (Sio Fail) stands, and until it is acknowledged nothing can be done'
+        text = 'a serial fault (Sio Fail) is active: until it is acknowledged nothing can be done'
         return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
     if inv_st in _FAULTS:
-        text = f'a fault stands (InvSt {inv_st}), and until it is acknowledged nothing can be done'
+        text = f'a fault is active (InvSt {inv_st}): until it is acknowledged nothing can be done'
         return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
     text = 'the drive does not accept this value, or not in its present state'
     return Refused(Refused.ILLEGAL_VALUE, f'{text} (NAK, InvSt {inv_st})')

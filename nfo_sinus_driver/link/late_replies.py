@@ -33,7 +33,7 @@ from nfo_sinus_driver.link.errors import NotReady
 #: How late a reply may come, in time-outs, before it counts as lost for good.
 LATEST_REPLY = 4
 #: How long a line is not trusted that has told something nobody asked for, s.
-DISTRUST = 60.0
+SUSPECT_FOR = 60.0
 #: How much later than its slowest reply of late a unit may reply.
 _LATER = 1.25
 #: What is left of the memory of a slow reply with each of the next.
@@ -100,7 +100,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self._last: _Request | None = None
         self.repeated: _Request | None = None
         #: Until when a reply may well come twice.
-        self._distrust_until = 0.0
+        self._suspect_until = 0.0
         #: How long a unit has taken at most to reply, s.
         self._slowest: dict[int, float] = {}
 
@@ -164,7 +164,7 @@ class LateReplies(Generic[_Request, _Kind]):
 
     def heard_unasked(self, now: float) -> None:
         """Take note of bytes that nobody asked for: the last request may be answered once more."""
-        self._distrust_until = now + DISTRUST
+        self._suspect_until = now + SUSPECT_FOR
         if self._last is not None:
             self.expect(self._last, now)
 
@@ -190,7 +190,7 @@ class LateReplies(Generic[_Request, _Kind]):
         if self.repeated is None:
             return Doubt.NONE
         right = names_it or self.repeated == request
-        if now > self._distrust_until:
+        if now > self._suspect_until:
             return Doubt.NONE if right else Doubt.LISTEN
         return Doubt.ONCE_MORE if right else Doubt.RESYNC
 

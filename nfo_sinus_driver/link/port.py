@@ -30,13 +30,29 @@ _HOST_AND_PORT = re.compile(r'[^/]+:\d+')
 class Port(Protocol):
     """What carries the bytes."""
 
-    def open(self) -> None: ...  # noqa: D102
+    def open(self) -> None:
+        """
+        Open it.
 
-    def close(self) -> None: ...  # noqa: D102
+        :raises PortError: it is absent, not permitted, in use, or unable to do the settings.
+        """
 
-    def write(self, data: bytes) -> None: ...  # noqa: D102
+    def close(self) -> None:
+        """Close it; harmless when it is closed already."""
 
-    def read(self, until: float) -> bytes: ...  # noqa: D102
+    def write(self, data: bytes) -> None:
+        """
+        Hand all bytes over.
+
+        :raises PortError: it is gone.
+        """
+
+    def read(self, until: float) -> bytes:
+        """
+        Return what has come; wait for the first byte until a moment of ``time.monotonic``, s.
+
+        :raises PortError: it is gone.
+        """
 
 
 def port_of(name: str, settings: LineSettings) -> Port:

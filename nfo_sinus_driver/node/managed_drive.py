@@ -115,7 +115,7 @@ class ManagedDrive:
         """
         Find the drive that the settings ask for, and watch it from then on.
 
-        :param patient: repeat the first request when nobody answers.
+        :param patient: repeat the first request when there is no response.
         :returns: false if the settings ask for another one meanwhile.
         :raises DriveError: it does not respond, or may not be taken over.
         :raises NodeError: the one before has not stopped yet.

@@ -148,7 +148,7 @@ BUS_SETTINGS = (
     Setting(
         'retries',
         2,
-        'How often a request is repeated when nobody answers and repeating is safe',
+        'How often a request is repeated when there is no response and repeating is safe',
         0,
         10,
         fixed=True,

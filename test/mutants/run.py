@@ -28,8 +28,8 @@ import subprocess
 import sys
 import tempfile
 
+from mutant import Mutant
 from mutants import MUTANTS
-from mutants import Mutant
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PYTEST = (sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', '-p', 'timeout')

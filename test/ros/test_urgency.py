@@ -73,7 +73,7 @@ def test_a_stop_overtakes_a_hanging_configure_and_a_slow_parameter(bench: Bench)
     good = bench.client('/good').connected()
     silent = bench.client('/silent')
     assert silent.state() == 'unconfigured'
-    # the longest transaction there is: a request that nobody answers, and that has to leave first
+    # the longest transaction there is: a request without a response, and that has to leave first
     transaction = _RESPONSE_TIMEOUT + 30 * 10 / bench.way.baud_rate
     timeouts = iter(range(2, 2 + 2 * _TRIES))
     delays = []

@@ -210,7 +210,7 @@ def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
 def test_scan_finds_nobody(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '3-4', '--all-settings', '--response-timeout', 0.02)
     assert done.status == 1 and done.out == ''
-    assert 'nobody answers' in done.err
+    assert 'no response' in done.err
 
 
 def test_scan_writes_a_parameter_file_for_the_driver(

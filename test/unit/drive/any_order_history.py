@@ -43,7 +43,7 @@ NOTICED_IDLE = 1.2
 CONTROL_MODE_PERIOD = 1.0
 #: A command is carried out within this, s.
 CARRIED_OUT = 0.06
-#: Three polls that nobody answers and the drive is lost: while active, and while not, s.
+#: Three polls without a response and the drive is lost: while active, and while not, s.
 LOST = 3.0
 LOST_IDLE = 4.0
 #: A run command that could not be taken back is, so long after the line came back, s.

@@ -387,7 +387,7 @@ class Laws(History):
     def _judge_connected(self, snapshot: Snapshot) -> None:
         if self._broken_since is not None and snapshot.connected:
             lost = LOST if self.active and self._active_at < self._broken_since else LOST_IDLE
-            # commands that nobody answers go before the polls
+            # commands without a response go before the polls
             since = max(self._broken_since, self._commanded_at)
             if self.now - since > lost and not self._rig.link.losses:
                 raise Broken('it is told as connected, and it is not')

@@ -23,11 +23,11 @@ from __future__ import annotations
 
 import os
 
-from any_order_machine import MACHINES
 from any_order_machine import AnyOrder
-from any_order_machine import G2DriveControl
-from any_order_machine import G2ModeScmd
-from any_order_machine import OptimalModeScmd
+from any_order_machines import MACHINES
+from any_order_machines import G2DriveControl
+from any_order_machines import G2ModeScmd
+from any_order_machines import OptimalModeScmd
 from hypothesis import HealthCheck
 from hypothesis import Phase
 from hypothesis import seed
@@ -116,7 +116,7 @@ def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> N
                 state.let(0.02)
                 driven.append(state.rig.far.motor.driven)
             assert not state.rig.far.faults and not state.laws.standing
-            # who refuses every command while a fault stands cannot be stopped before it ends
+            # who refuses every command while a fault is active cannot be stopped before it ends
             assert any(driven) == (state.method == 'mode_scmd')
             assert not driven[-1]
     finally:

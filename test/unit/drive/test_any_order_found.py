@@ -21,8 +21,8 @@ import dataclasses
 import itertools
 
 from any_order_machine import AnyOrder
-from any_order_machine import G2DriveControl
-from any_order_machine import G2ModeScmd
+from any_order_machines import G2DriveControl
+from any_order_machines import G2ModeScmd
 from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 import contextlib
 
 from any_order_machine import AnyOrder
-from any_order_machine import G2ModeScmd
+from any_order_machines import G2ModeScmd
 import pytest
 from test_older_settings import Rig as OlderRig
 

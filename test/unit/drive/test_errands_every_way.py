@@ -112,12 +112,12 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 
 @pytest.fixture
 def strict_faults(monkeypatch: pytest.MonkeyPatch) -> None:
-    """While a fault stands, no control word is taken either: [M0 §6.1.5] makes no exception."""
+    """While a fault is active, no control word is taken either: [M0 §6.1.5] makes no exception."""
     write = G2ControlUnit._write_control
 
     def refuse(unit: G2ControlUnit, raw: int) -> None:
         if unit.faults:
-            raise Refused(Reason.STATE, 'a fault stands')
+            raise Refused(Reason.STATE, 'a fault is active')
         write(unit, raw)
 
     monkeypatch.setattr(G2ControlUnit, '_write_control', refuse)
@@ -324,7 +324,7 @@ def test_a_tuning_that_fails(rig: Rig) -> None:
     rig.simulator.inject('tuning-fails', 17)
     result = rig.drive.tune(Procedure.STATOR_RESISTANCE).result(PATIENCE)
     assert not result.success and '17 TunFailM' in said(result.how)
-    # nothing begins while a fault stands
+    # nothing begins while a fault is active
     assert '17 TunFailM is active' in rig.refused(rig.drive.tune(Procedure.FULL))
     assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 17 TunFailM'
 

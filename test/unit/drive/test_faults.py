@@ -230,7 +230,7 @@ def test_run_command_is_taken_back_before_the_drive_restarts(make_rig: MakeRig) 
 def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     make_rig: MakeRig,
 ) -> None:
-    # by SCMD, which a G2 refuses while a fault stands: nobody can take it back before
+    # by SCMD, which a G2 refuses while a fault is active: nobody can take it back before
     rig = make_rig(parameters=RESTARTS)
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)

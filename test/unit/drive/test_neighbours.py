@@ -103,7 +103,7 @@ def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once(make_line: MakeLine) ->
     stop = rig.drives[8].stop()
     rig.pass_time(0.5)
     stops = [at for at, frame in rig.line.frames[sent:] if frame[0] == 8 and frame[1] == 6]
-    # behind the transaction on the line, which may be one that nobody answers
+    # behind the transaction on the line, which may be one without a response
     assert stops and stops[0] - asked_at < 0.3
     assert 'NOT confirmed' in rig.answer(stop)
 
@@ -115,5 +115,5 @@ def test_a_drive_alone_on_its_line_is_asked_as_often_as_before(make_line: MakeLi
     rig.pass_time(8.0)
     sent = len(rig.line.frames)
     rig.pass_time(20.0)
-    # every four seconds, and the time that nobody answers
+    # every four seconds, and the time without a response
     assert len(rig.line.frames) - sent >= 4

@@ -55,7 +55,7 @@ def test_refused_without_a_fault() -> None:
 @pytest.mark.parametrize('code', [1, 12, 15, 23])
 def test_refused_because_a_fault_stands(code: int) -> None:
     bench = refusal_bench(code, 1 << 10)
-    bench.refused(Refused.DEVICE_FAILURE, 'a fault stands', f'InvSt {code}')
+    bench.refused(Refused.DEVICE_FAILURE, 'a fault is active', f'InvSt {code}')
     assert bench.asked == [0x1E, INV_ST]
 
 

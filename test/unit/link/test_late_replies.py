@@ -26,8 +26,8 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import classic_link
-from nfo_sinus_driver.link.late_replies import DISTRUST
 from nfo_sinus_driver.link.late_replies import LATEST_REPLY
+from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
 from nfo_sinus_driver.link.late_replies import Doubt
 from nfo_sinus_driver.link.late_replies import LateReplies
 
@@ -154,7 +154,8 @@ def test_doubt_about_the_same_bytes(
 def test_a_line_is_trusted_again_after_a_while() -> None:
     late = make()
     late.heard_unasked(NOW)
-    for now, doubt in ((NOW + DISTRUST - 1, Doubt.RESYNC), (NOW + DISTRUST + 1, Doubt.LISTEN)):
+    over = NOW + SUSPECT_FOR
+    for now, doubt in ((over - 1, Doubt.RESYNC), (over + 1, Doubt.LISTEN)):
         told(late, Ask('a'), b'1', now)
         told(late, Ask('b'), b'1', now + 0.1)
         assert late.doubt_about(Ask('b'), now + 0.1) is doubt

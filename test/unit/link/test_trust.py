@@ -26,7 +26,7 @@ from test_echo import SameWords
 from virtual_wire import Fate
 
 from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link.late_replies import DISTRUST
+from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
 
 
 def trusting(fates: list[Fate] | None = None) -> Bench:
@@ -68,7 +68,7 @@ def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
     bench.read(A)
     bench.read(B)
     assert bench.asked[-1] not in (A.index, B.index), 'nothing confirmed it'
-    bench.wire.now += DISTRUST + 1.0
+    bench.wire.now += SUSPECT_FOR + 1.0
     bench.read(A)
     bench.read(B)
     assert bench.asked[-2:] == [A.index, B.index]

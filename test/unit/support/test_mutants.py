@@ -22,8 +22,8 @@ import sys
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / 'test' / 'mutants'))
 
+from mutant import Mutant  # noqa: E402
 from mutants import MUTANTS  # noqa: E402
-from mutants import Mutant  # noqa: E402
 import pytest  # noqa: E402
 
 

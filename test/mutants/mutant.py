@@ -1,0 +1,74 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a broken copy is, and the files that are broken and tested."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+WAYS_OUT = 'test/ros/test_ways_out.py'
+NO_RESTART = 'test/ros/test_no_restart.py'
+INTERFACE = 'test/ros/test_interface.py'
+TRACE = 'test/ros/test_trace.py'
+RTU_LINK = 'test/unit/link/test_rtu_link.py'
+ECHO = 'test/unit/link/test_echo.py'
+
+CONTROLLER = 'nfo_sinus_driver/drive/controller.py'
+STARTING = 'nfo_sinus_driver/drive/start_sequence.py'
+TABLE = 'nfo_sinus_driver/drive/control_state.py'
+SETPOINT = 'nfo_sinus_driver/drive/setpoint.py'
+ADVICE = 'nfo_sinus_driver/drive/diagnosis.py'
+DRIVE = 'nfo_sinus_driver/drive/drive.py'
+WATCH = 'nfo_sinus_driver/drive/poller.py'
+WRITER = 'nfo_sinus_driver/drive/parameter_writer.py'
+TUNING = 'test/unit/drive/test_tuning.py'
+COMMANDS = 'nfo_sinus_driver/drive/commands.py'
+G2 = 'nfo_sinus_driver/families/sinus_g2/profile.py'
+NODE = 'nfo_sinus_driver/node/drive_node.py'
+MAIN = 'nfo_sinus_driver/node/main.py'
+SIGNALS = 'nfo_sinus_driver/signals.py'
+SEQUENCE = 'nfo_sinus_driver/drive/stop_sequence.py'
+PROFILE = 'nfo_sinus_driver/catalog/profile.py'
+ANY_ORDER = 'test/unit/drive/test_any_order.py'
+STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
+CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
+TUNING_BEGINS = ('test/unit/drive/test_tuning_begins.py', '-k', 'any_moment')
+EVERY_WAY = ('test/unit/drive/test_errands_every_way.py', '-k', 'terminals_keep')
+NO_STOP_FORGOTTEN = ('test/unit/drive/test_no_stop_is_forgotten.py',)
+NO_TURN = ('test/unit/drive/test_no_turn_at_acknowledge.py',)
+G2_SCMD = (ANY_ORDER, '-k', 'G2ModeScmd')
+G2_CONTROL = (ANY_ORDER, '-k', 'G2DriveControl')
+OPTIMAL_SCMD = (ANY_ORDER, '-k', 'OptimalModeScmd')
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """
+    One broken copy.
+
+    :ivar law: the number of the law in docs/architecture.md that it breaks.
+    :ivar old: what stands in the file, once.
+    :ivar tests: what has to fail, as arguments of pytest.
+    """
+
+    law: int
+    what: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f'law {self.law}: {self.what}'

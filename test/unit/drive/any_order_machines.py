@@ -1,0 +1,56 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rules for each model and each way to command it."""
+
+from __future__ import annotations
+
+from any_order_machine import AnyOrder
+
+
+class G2ModeScmd(AnyOrder):
+    pass
+
+
+class G2DriveControl(AnyOrder):
+    method = 'drive_control'
+
+
+class OptimalModeScmd(AnyOrder):
+    model = 'sinus_optimal'
+
+
+class OptimalDriveControl(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'drive_control'
+    reference = 'terminal'
+
+
+class G2Monitor(AnyOrder):
+    method = 'monitor'
+
+
+class OptimalMonitor(AnyOrder):
+    model = 'sinus_optimal'
+    method = 'monitor'
+
+
+MACHINES = (
+    G2ModeScmd,
+    G2DriveControl,
+    OptimalModeScmd,
+    OptimalDriveControl,
+    G2Monitor,
+    OptimalMonitor,
+)
