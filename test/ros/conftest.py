@@ -118,12 +118,6 @@ def way(request: pytest.FixtureRequest) -> Way:
 
 
 @pytest.fixture
-def whole(request: pytest.FixtureRequest) -> bool:
-    """Tell whether nothing is shared out."""
-    return request.config.getoption('--way', DEFAULT) == _ALL
-
-
-@pytest.fixture
 def domain() -> Iterator[int]:
     """Return a ROS domain that no other test and no demo on this machine uses at the time."""
     with own_domain() as number:

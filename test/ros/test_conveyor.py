@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Many drives on one line: they do what one does, and cost no more than the line."""
+"""Thirty-two drives on one line: they do what one does, and cost no more than the line."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ import pytest
 from std_msgs.msg import Float32
 from ways import needs
 
-#: As many as one line may have, and a share of them in a normal run.
-_MANY, _SOME = 32, 12
+#: By address.
+NAMES = {address: f'conveyor_{address:02}' for address in range(1, 33)}
 _COUNTING = str(Path(__file__).with_name('counting_driver.py'))
 #: So few that neither the line nor the processors are what is tested.
 _RARE = (
@@ -53,18 +53,16 @@ _STOP = '0602980000'
 class Conveyor:
     """A driver with all these drives, and somebody who sees and commands them."""
 
-    def __init__(self, bench: Bench, count: int) -> None:
-        #: By address.
-        self.names = {address: f'conveyor_{address:02}' for address in range(1, count + 1)}
+    def __init__(self, bench: Bench) -> None:
         self.simulator = bench.simulator(
             '--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0',
-            *(f'--address={address}' for address in self.names),
+            *(f'--address={address}' for address in NAMES),
             paced=False,
         )
         parameters = bench.folder / 'conveyor.yaml'
         parameters.write_text('\n'.join((
-            f'nfo_sinus_bus: {{ros__parameters: {{drives: [{", ".join(self.names.values())}]}}}}',
-            *(f'{name}: {{ros__parameters: {{address: {at}}}}}' for at, name in self.names.items()),
+            f'nfo_sinus_bus: {{ros__parameters: {{drives: [{", ".join(NAMES.values())}]}}}}',
+            *(f'{name}: {{ros__parameters: {{address: {at}}}}}' for at, name in NAMES.items()),
         )))
         self._wakes = bench.folder / 'wakes'
         counting = (sys.executable, _COUNTING, str(self._wakes))
@@ -74,7 +72,7 @@ class Conveyor:
         self.status: dict[int, DriveStatus] = {}
         node = self.client.node
         node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
-        for address, name in self.names.items():
+        for address, name in NAMES.items():
             node.create_subscription(
                 DriveStatus,
                 f'/{name}/status',
@@ -82,9 +80,9 @@ class Conveyor:
                 10,
             )
         self._setpoints = [node.create_publisher(Float32, f'/{name}/setpoint', 1)
-                           for name in self.names.values()]
+                           for name in NAMES.values()]
         wait_until(
-            lambda: list(self.states.values()).count('active') == len(self.names),
+            lambda: list(self.states.values()).count('active') == len(NAMES),
             'all are active', timeout=_START,
         )
 
@@ -106,7 +104,7 @@ class Conveyor:
         """Enable all, and have them turn."""
         answer = self.client.call('enable_all')
         assert answer.success, answer.message
-        assert answer.message.count(': enabled') == len(self.names)
+        assert answer.message.count(': enabled') == len(NAMES)
         wait_until(
             lambda: all(one.get_subscription_count() for one in self._setpoints),
             'somebody listens to each', period=0.1,
@@ -128,7 +126,7 @@ class Conveyor:
         time.sleep(_WATCHED)
         woken = self._wakes.stat().st_size - counts[-1]
         assert woken < _WAKE_UPS
-        assert self.client.call(f'/{self.names[1]}/stop').success
+        assert self.client.call(f'/{NAMES[1]}/stop').success
         assert self._wakes.stat().st_size > counts[-1] + woken
 
     def takes_setpoints_in_its_sleep(self) -> None:
@@ -145,19 +143,18 @@ class Conveyor:
 
     def turning(self) -> set[int]:
         """Return whose motors turn."""
-        return {at for at in self.names if self.simulator.state(at)['turning']}
+        return {at for at in NAMES if self.simulator.state(at)['turning']}
 
 
 @needs('rtu')
 @pytest.mark.timeout(2 * _START)
-def test_a_conveyor_from_its_start_to_its_end(bench: Bench, whole: bool) -> None:
+def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:
     # one start for all of it, for that is what takes long
-    conveyor = Conveyor(bench, _MANY if whole else _SOME)
-    names = conveyor.names
+    conveyor = Conveyor(bench)
     conveyor.sleeps()
     conveyor.run()
     conveyor.takes_setpoints_in_its_sleep()
-    faulty, unplugged = 7, 11
+    faulty, unplugged = 7, 23
     conveyor.simulator.inject('fault', 5, address=faulty)
     wait_until(lambda: not conveyor.status[faulty].enabled, 'its fault has stopped it')
     holds_for(A_WHILE, conveyor.all_but(faulty), 'the others follow')
@@ -166,20 +163,20 @@ def test_a_conveyor_from_its_start_to_its_end(bench: Bench, whole: bool) -> None
     holds_for(A_WHILE, conveyor.all_but(faulty, unplugged), 'the others follow')
     answer = conveyor.client.call('stop_all')
     assert not answer.success
-    assert answer.message.startswith(f'{names[unplugged]}: the stop is NOT confirmed')
-    assert answer.message.count(': stopp') == len(names) - 1
+    assert answer.message.startswith(f'{NAMES[unplugged]}: the stop is NOT confirmed')
+    assert answer.message.count(': stopp') == len(NAMES) - 1
     wait_until(lambda: conveyor.turning() <= {unplugged}, 'all that hear it stand', period=0.5)
 
     conveyor.simulator.inject('silence', 0.0, address=unplugged)
     wait_until(lambda: not conveyor.turning(), 'it is stopped as soon as it answers', period=0.5)
     wait_until(lambda: conveyor.status[unplugged].connected, 'it is back')
-    assert conveyor.client.call(f'/{names[faulty]}/fault_ack').success
+    assert conveyor.client.call(f'/{NAMES[faulty]}/fault_ack').success
     conveyor.run()
     before = len(bench.requests())
     conveyor.driver.signal(signal.SIGTERM)
     assert conveyor.driver.wait() == 0, conveyor.driver.text
     assert not conveyor.turning()
     requests = bench.requests()[before:]
-    stops = {address: requests.index(f'{address:02x}{_STOP}') for address in names}
+    stops = {address: requests.index(f'{address:02x}{_STOP}') for address in NAMES}
     told = requests[min(stops.values()) : max(stops.values())]
     assert not [request for request in told if request[2:4] == _READ], 'one was asked before all'
