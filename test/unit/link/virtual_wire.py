@@ -29,6 +29,7 @@ from unittest import mock
 import pymodbus_opinion as opinion
 
 from nfo_sinus_driver.link import classic_link
+from nfo_sinus_driver.link import movitrac_link
 from nfo_sinus_driver.link import serial_link
 from nfo_sinus_driver.link.settings import LineSettings
 
@@ -77,7 +78,7 @@ class Wire:
         """Let the link see this clock."""
         clock = SimpleNamespace(monotonic=self.monotonic)
         with contextlib.ExitStack() as stack:
-            for module in (serial_link, classic_link):
+            for module in (serial_link, classic_link, movitrac_link):
                 stack.enter_context(mock.patch.object(module, 'time', clock))
             yield
 
