@@ -45,6 +45,8 @@ from nfo_sinus_driver.link.movitrac import Select
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.silence import NEVER_SILENT
+from nfo_sinus_driver.link.silence import await_silence
 
 #: How much later than at once a drive may be told to answer (P843), s.
 LONGEST_RESPONSE_TIME = 0.2
@@ -286,25 +288,15 @@ class MovitracLink:
         gap = _GAP * self._settings.char_time
         longest = movitrac.LONGEST_ANSWER * self._settings.char_time
         wait = max(_WRITE_WAIT, longest) if is_write else self._settings.response_timeout
-        give_up = max(self._line_end + gap, time.monotonic()) + wait
-        while True:
-            data = self._port.read(self._line_end + gap)
-            now = time.monotonic()
-            if not data:
-                if now >= self._line_end + gap:
-                    return
-                continue
-            self._heard_unasked(data, now)
-            self._line_end = max(self._line_end, now)
-            if now > give_up:
-                if is_write:
-                    return
-                raise NeverSilent('the line is never silent: noise, or another master on it')
+        data, self._line_end, silent = await_silence(self._port, self._line_end, gap, wait)
+        self._heard_unasked(data)
+        if not silent and not is_write:
+            raise NeverSilent(NEVER_SILENT)
 
-    def _heard_unasked(self, data: bytes, now: float) -> None:
+    def _heard_unasked(self, data: bytes) -> None:
         """Take note of bytes that nobody asked for, unless switching a transmitter makes them."""
         if not movitrac.is_glitch(data):
-            self._late.heard_unasked(now)
+            self._late.heard_unasked(time.monotonic())
 
     # --- one transaction --------------------------------------------------------------------------
 
@@ -337,7 +329,7 @@ class MovitracLink:
         self._last = reader.frame
         # and the request has left, even where the port is faster than its settings say
         self._line_end = arrived
-        self._heard_unasked(reader.rest, time.monotonic())
+        self._heard_unasked(reader.rest)
         return answer, arrived
 
     def _receive(

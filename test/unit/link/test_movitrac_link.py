@@ -208,7 +208,7 @@ def test_silence() -> None:
 @pytest.mark.parametrize('act', [lambda bench: bench.read(A), lambda bench: bench.write(A)])
 def test_damaged_answer(act: Callable[[Bench], object]) -> None:
     bench = Bench(Fate(what='damage'))
-    with pytest.raises(DamagedAnswer, match='[28] bytes came that are no answer') as raised:
+    with pytest.raises(DamagedAnswer, match=r'[28] bytes came that are no answer') as raised:
         act(bench)
     assert raised.value.maybe_done
 
