@@ -108,6 +108,20 @@ def test_a_quarantine_lasts_until_the_latest_reply_or_any_certain_one() -> None:
     assert late.quarantined(UNIT, nearly + 0.002) == set()
 
 
+def test_a_reply_that_names_no_unit_may_be_of_another() -> None:
+    late = make()
+    late.expect(Ask('A', 2), NOW)
+    assert late.may_be_of_another(1, 'A', NOW) and late.may_be_of_another(1, 'no A', NOW)
+    assert not late.may_be_of_another(1, 'B', NOW)
+    assert not late.may_be_of_another(2, 'A', NOW), 'that is what it was asked itself'
+    # what the one asked replies says nothing of the other
+    late.release(1)
+    assert late.may_be_of_another(1, 'A', NOW)
+    assert not late.may_be_of_another(1, 'A', NOW + LATEST_REPLY * TIMEOUT)
+    late.release(2)
+    assert not late.may_be_of_another(1, 'A', NOW)
+
+
 def test_a_question_is_certain_when_each_of_its_replies_is() -> None:
     late = make()
     late.quarantine(UNIT, ('a',), NOW)
