@@ -144,9 +144,13 @@ def load_profile(name: str) -> Profile:
     Load the profile of one drive family, without its tables.
 
     :raises ValueError: there is no such family; the message lists those there are.
+    :raises CatalogError: its folder is no package.
     """
-    if name not in families():
+    folders = _folders()
+    if name not in folders:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
+    if not (folders[name] / '__init__.py').exists():
+        raise table.CatalogError(f'{name}: no __init__.py, without which it would not be installed')
     profile = importlib.import_module(f'{_FAMILIES}.{name}.profile').PROFILE
     assert isinstance(profile, Profile)
     return profile

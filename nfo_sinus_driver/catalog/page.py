@@ -25,6 +25,8 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from fractions import Fraction
+import functools
+import re
 
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
@@ -70,6 +72,7 @@ How to read the tables:
 - **Stopped**: it can only be written while the motor stands.
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
   low word first), **PROFIBUS** its parameter number, **CANopen** its index.
+- A **type** with bits behind it, such as `[0:23]`: only these bits count, on one of the buses.
 - **From** is the first firmware that has it; empty: all have it.
 
 Numbers like 0220h are hexadecimal. A column that would be empty is left out.
@@ -89,14 +92,19 @@ inverter status above it. Code 0 ends the log.
 | bus | first entry | next entry | entries |
 |---|---|---|---|
 """
-#: How each numbering is printed: the title of its column, and a number in it.
+#: How each numbering is printed: the title of its column, a number in it, and how far it is to the
+#: next entry of an error log. Any other is printed by its name and in decimal numbers.
 _SPACES = {
     'register': ('Modbus', '{:04X}h', '{} registers on'),
     'id': ('Classic', 'E{:04X}', '{} ids on'),
     'pnu': ('PROFIBUS', 'P{}', 'the next number'),
     'object': ('CANopen', '{:04X}h', 'the next index'),
-    'index': ('Index', '{}', 'the next index'),
 }
+
+
+def _printed(space: str) -> tuple[str, str, str]:
+    return _SPACES.get(space, (space.capitalize(), '{}', '{} numbers on'))
+
 
 _Column = tuple[str, Callable[[Parameter], str]]
 
@@ -137,21 +145,23 @@ def _family(family: Family, taken: list[str]) -> Iterator[str]:
         yield _table(_OTHER_COLUMNS, only_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
-        yield f'### {title}\n'
-        yield _table(_OTHER_COLUMNS, rows)
+        if rows:
+            yield f'### {title}\n'
+            yield _table(_OTHER_COLUMNS, rows)
     if family.error_logs:
         yield '### Error log\n'
         yield _ERROR_LOG + ''.join(map(_log_row, family.error_logs.values()))
 
 
 def _log_row(area: ErrorLogArea) -> str:
-    bus, first, following = _SPACES[area.space]
+    bus, first, following = _printed(area.space)
     entries = f'{area.entries}' + (f' to {area.limit}' if area.limit > area.entries else '')
     return f'| {bus} | {first.format(area.first)} | {following.format(area.stride)} | {entries} |\n'
 
 
 def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
     """Return a table without the columns that would be empty."""
+    columns = (*columns, *_addresses())
     cells = {title: [show(row) for row in rows] for title, show in columns}
     full = {title: column for title, column in cells.items() if any(column)}
     lines = [list(full), ['---'] * len(full), *zip(*full.values(), strict=True)]
@@ -197,7 +207,7 @@ def _step(parameter: Parameter) -> str:
 
 def _column(space: str) -> _Column:
     """Return the column of a numbering."""
-    title, shown, _ = _SPACES[space]
+    title, shown, _ = _printed(space)
 
     def cell(parameter: Parameter) -> str:
         found = [a for a in parameter.addresses.values() if a.space == space]
@@ -210,7 +220,8 @@ def _column(space: str) -> _Column:
 
 def _types(parameter: Parameter) -> str:
     names = [address.codec.name for address in parameter.addresses.values()]
-    return ', '.join(dict.fromkeys(name.partition('_')[0].upper() for name in names))
+    # the order of bytes is left out, the bits that count are not
+    return ', '.join(dict.fromkeys(re.sub(r'_[a-z]+', '', name).upper() for name in names))
 
 
 def _number(number: Fraction) -> str:
@@ -222,10 +233,17 @@ def _anchor(title: str, taken: Sequence[str]) -> str:
     return title.lower().replace(' ', '-') + (f'-{before}' if before else '')
 
 
-_ADDRESSES: tuple[_Column, ...] = (
-    *map(_column, _SPACES),
-    ('From', lambda row: '' if row.since is None else _number(row.since)),
-)
+@functools.cache
+def _addresses() -> tuple[_Column, ...]:
+    """Return the columns of all numberings that any family has."""
+    parameters = [parameter for name in families() for parameter in load_family(name).values()]
+    spaces = [address.space for one in parameters for address in one.addresses.values()]
+    return (
+        *map(_column, dict.fromkeys((*_SPACES, *spaces))),
+        ('From', lambda row: '' if row.since is None else _number(row.since)),
+    )
+
+
 _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('ROS parameter', lambda row: f'`{row.key}`'),
     ('Display', lambda row: row.name),
@@ -236,7 +254,6 @@ _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('Step', _step),
     ('Stopped', lambda row: 'yes' if row.stopped else ''),
     ('Option', lambda row: row.option),
-    *_ADDRESSES,
 )
 _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Name', lambda row: row.name),
@@ -247,7 +264,6 @@ _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Step', lambda row: _step(row) if row.unit or row.kind is float else ''),
     ('Option', lambda row: row.option),
     ('Type', _types),
-    *_ADDRESSES,
 )
 
 

@@ -113,8 +113,15 @@ def test_every_control_method_has_a_constant_in_the_message(name: str) -> None:
 
 
 def test_unknown_family() -> None:
-    with pytest.raises(ValueError, match=r"unknown model 'sinus_h': choose one of .*sinus_g2"):
-        load_family('sinus_h')
+    with pytest.raises(ValueError, match=r"unknown model 'sinus_x': choose one of .*sinus_g2"):
+        load_family('sinus_x')
+
+
+def test_folder_that_would_not_be_installed(folder: Path) -> None:
+    again = folder.rename(folder.with_name('sinus_bare'))
+    (again / '__init__.py').unlink()
+    with pytest.raises(CatalogError, match=r'sinus_bare: no __init__\.py, without which'):
+        load_afresh('sinus_bare')
 
 
 def test_copied_tables_are_as_good(folder: Path) -> None:
