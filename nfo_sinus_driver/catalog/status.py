@@ -149,6 +149,7 @@ class StatusWord:
     :ivar shown: which bits of it are published.
     :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
         the frequency has to tell; it is read with every status.
+    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE tells it.
     """
 
     state: Callable[[int], State]
@@ -159,6 +160,7 @@ class StatusWord:
     code: Callable[[int], int] | None = None
     shown: int = 0xFFFFFFFF
     by_frequency: bool = False
+    tells_sign: bool = False
 
     def may_say(self, word: int) -> bool:
         """Tell whether a status word is one of those that the manual knows."""

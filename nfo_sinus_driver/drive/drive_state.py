@@ -197,7 +197,7 @@ class DriveState:
         if not seen.by_frequency:
             return self._saw(seen)
         try:
-            frequency = await self.measure(Role.ACTUAL_FREQUENCY, priority, once=once)
+            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
         except Refused:
             frequency = math.nan
         self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
@@ -262,22 +262,28 @@ class DriveState:
         self.answering = False
         self.on_missed()
 
-    async def measure(self, role: Role, priority: Priority, *, once: bool = True) -> float:
+    async def measure(self, role: Role, priority: Priority) -> float:
         """
-        Read a measured value; NaN if its family has none such.
+        Read a measured value once; NaN if its family has none such.
 
         NaN, too, if the drive says what cannot be, and that again.
 
-        :param once: do not repeat a request when there is no response.
         :raises LinkError: it does not answer, or refuses.
         """
+        return await self._measure(role, priority, True, self.seen)
+
+    async def _measure(
+        self, role: Role, priority: Priority, once: bool, seen: InverterStatus | None
+    ) -> float:
+        """Measure; a status tells the direction of what turns, where the value does not."""
         key = self.model.key(role)
         if not key:
             return math.nan
         data = await self._registers.read_data(key, priority, once=once)
         value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
-            return value
+            turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+            return seen.signed(value) if turns and seen is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit

@@ -188,6 +188,11 @@ class InverterStatus:
         """Its word goes on saying that the motor runs while that ramps to a stop."""
         return self.model.profile.status_word.by_frequency
 
+    def signed(self, size: float) -> float:
+        """Return a measured frequency or speed with its sign, where the word has to tell that."""
+        tells_sign = self.model.profile.status_word.tells_sign
+        return -size if tells_sign and Fact.REVERSE in self.facts else size
+
     @property
     def tuning(self) -> bool:
         """It measures the motor, which is energised then, whatever else the status says."""

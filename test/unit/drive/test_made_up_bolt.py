@@ -46,9 +46,9 @@ from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
-PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ = 11, 12, 100, 102, 400, 402, 403
+PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
 RUN, RESET = 1 << 0, 1 << 3
-RUNNING, TRIPPED, LINE = 1 << 0, 1 << 1, 1 << 2
+RUNNING, TRIPPED, LINE, BACKWARDS = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 
 
 class Bolt(FarEnd):
@@ -62,6 +62,8 @@ class Bolt(FarEnd):
         self.fault = 0
         #: It goes on as it was told before, whatever is written.
         self.deaf = False
+        #: Its motor is turned the other way.
+        self.backwards = False
         self._demand = 0
 
     @property
@@ -77,7 +79,7 @@ class Bolt(FarEnd):
         runs = (registers[BITS] & RUN or registers[HERTZ]) and not self.fault
         registers[TOLD] = self.fault or (2 if runs else 1)
         facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault) | LINE * registers[SOURCE]
-        registers[TOLD + 1] = facts
+        registers[TOLD + 1] = facts | BACKWARDS * self.backwards
 
     def was_written(self, before: dict[int, int]) -> None:
         if self.registers[BITS] & RESET and not before[BITS] & RESET:
@@ -150,17 +152,28 @@ def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: B
     assert (drive.snapshot.frequency, drive.snapshot.actual) == (40.0, 40.0)
 
 
+def test_the_word_tells_the_sign_of_what_is_measured(bolt: Bolt, bus: Bus) -> None:
+    drive = turning(bolt, bus, Notes())
+    bolt.registers[TURNS] = 1200
+    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (40.0, 1200.0))
+    bolt.backwards = True
+    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (-40.0, -1200.0))
+    # in size it has not changed
+    assert drive.snapshot.status is not None and drive.snapshot.status.keeps_running
+
+
 def test_a_stop_is_confirmed_by_a_frequency_that_falls(bolt: Bolt, bus: Bus) -> None:
     notes = Notes()
     drive = turning(bolt, bus, notes)
-    bolt.step = 5
-    answer = drive.stop().result(PATIENCE)
-    assert (answer.cause, bolt.hertz > 30) == (Cause.RAMPING, True)
+    bolt.step = 1
+    assert drive.stop().result(PATIENCE).cause is Cause.RAMPING
     seen = drive.inverter.seen
-    assert seen is not None and seen.runs and seen.driven
+    assert seen is not None and seen.runs and seen.driven and seen.frequency > 0
     # all the way down nobody takes it for a motor that runs unasked
+    looks = len(notes.snapshots)
+    wait_until(lambda: len(notes.snapshots) > looks + 50)
+    bolt.step = 100
     wait_until(lambda: drive.snapshot.frequency == 0)
-    bolt.was_read(TOLD)
     assert not notes.told(Cause.RUNS_UNASKED)
     assert drive.snapshot.status is not None and not drive.snapshot.status.driven
     assert drive.stop().result(PATIENCE).cause is Cause.STOPPED

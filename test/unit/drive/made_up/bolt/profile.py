@@ -60,6 +60,7 @@ class Told(enum.IntFlag):
     RUNNING = 1 << 0
     TRIPPED = 1 << 1
     LINE = 1 << 2
+    BACKWARDS = 1 << 3
 
 
 class Frequency(SetpointTarget):
@@ -154,11 +155,13 @@ PROFILE = Profile(
             Told.RUNNING: Fact.OPERATION_ENABLED,
             Told.TRIPPED: Fact.FAULT,
             Told.LINE: Fact.NETWORK_CONTROL,
+            Told.BACKWARDS: Fact.REVERSE,
         },
         by_state={},
         code=lambda word: word >> 16,
         shown=0xFFFF,
         by_frequency=True,
+        tells_sign=True,
     ),
     holders={},
     methods={'function_bits': FunctionBits},
