@@ -395,7 +395,6 @@ class Profile:
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
-    :ivar unsigned: what it measures without a sign, which the fact REVERSE of its status tells.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     """
 
@@ -412,7 +411,6 @@ class Profile:
     releases: Value = ''
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
-    unsigned: frozenset[Role] = frozenset()
     uncertain: Mapping[str, float] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:

@@ -318,5 +318,4 @@ PROFILE = Profile(
     in_charge=_in_charge,
     # a tenth above what the display values have [M4 §4]: the motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 440.0, Role.ACTUAL_SPEED: 9999.0},
-    unsigned=frozenset((Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)),
 )

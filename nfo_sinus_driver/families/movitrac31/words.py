@@ -186,4 +186,5 @@ STATUS_WORD = StatusWord(
     shown=0xFFFF,
     # it goes on saying Enable, or Normal stop, whatever the motor does
     by_frequency=True,
+    tells_sign=True,
 )

@@ -28,7 +28,6 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 
 MOVITRAC = load_family('movitrac31')
@@ -236,4 +235,3 @@ def test_roles() -> None:
         'communication_timeout': 285,
         'bus_address': 206,
     }
-    assert MOVITRAC.profile.unsigned == {Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED}

@@ -161,6 +161,7 @@ def test_facts(number: int, facts: Fact) -> None:
 def test_what_is_published_of_it() -> None:
     assert WORD.shown == 0xFFFF
     assert WORD.by_frequency
+    assert WORD.tells_sign
 
 
 @given(st.integers(0, 0xFFFFFFFF))
