@@ -44,6 +44,8 @@ from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
+#: The message InvSt has one byte for a status code.
+_HIGHEST_CODE = 0xFF
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,11 @@ class Family(Mapping[str, Parameter]):
     def key(self, role: Role) -> str:
         """Return the key of the parameter that has a role; ``''`` if this family has none."""
         return self.roles.get(role, '')
+
+    @property
+    def key_of_status(self) -> str:
+        """The parameter that every drive of it has: the status code, or the word that tells it."""
+        return self.key(Role.STATUS_CODE) or self.key(Role.STATUS_WORD)
 
     @functools.cached_property
     def role_of(self) -> Mapping[str, Role]:
@@ -137,9 +144,13 @@ def load_profile(name: str) -> Profile:
     Load the profile of one drive family, without its tables.
 
     :raises ValueError: there is no such family; the message lists those there are.
+    :raises CatalogError: its folder is no package.
     """
-    if name not in families():
+    folders = _folders()
+    if name not in folders:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
+    if not (folders[name] / '__init__.py').exists():
+        raise table.CatalogError(f'{name}: no __init__.py, without which it would not be installed')
     profile = importlib.import_module(f'{_FAMILIES}.{name}.profile').PROFILE
     assert isinstance(profile, Profile)
     return profile
@@ -176,8 +187,9 @@ def load_family(name: str) -> Family:
         addresses[key][found.protocol] = found
     parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
     roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
-    if Role.STATUS_CODE.value not in {role.value for role, _ in roles}:
-        raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the status_code')
+    for needed in _needed_roles(profile):
+        if needed not in dict(roles):
+            raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
     log = folder / 'error_log.csv'
     logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
@@ -189,6 +201,12 @@ def load_family(name: str) -> Family:
         error_logs={row.protocol: row for row in logs},
         profile=profile,
     )
+
+
+def _needed_roles(profile: Profile) -> Iterator[Role]:
+    yield Role.STATUS_CODE if profile.status_word.code is None else Role.STATUS_WORD
+    if profile.status_word.by_frequency:
+        yield Role.ACTUAL_FREQUENCY
 
 
 def _address(row: table.Row) -> Address:
@@ -222,6 +240,11 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
     labels = {int(code, 0): label for code, label in pairs}
     if len(labels) != len(pairs) or len(set(labels.values())) != len(pairs):
         raise ValueError('a code or a label stands twice')
+    steps = tuple(_steps(row.get('steps', ''), minimum))
+    counts = [number for pair in steps for number in pair] + [Fraction(code) for code in labels]
+    for address in addresses.values():
+        if any((number / address.factor).denominator != 1 for number in counts):
+            raise ValueError(f'not all steps are counts on {address.protocol}')
     return Parameter(
         key=row['parameter'],
         name=row['name'],
@@ -231,20 +254,37 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
         unit=row['unit'],
         minimum=minimum,
         maximum=maximum,
+        steps=steps,
         decimals=int(row['decimals']),
         labels=labels,
         access=Access(row['access']),
         stopped={'init': True, 'run': False, '': False}[row['when']],
         since=table.fraction(row['since']),
         older={'yes': True, '': False}[row['older']],
+        option=row.get('option', ''),
         description=row['description'],
         source=row['source'],
     )
 
 
+def _steps(text: str, minimum: Fraction | None) -> Iterator[tuple[Fraction, Fraction]]:
+    """Return what ``0.05|10:0.5`` says: by 0.05 from the minimum, by 0.5 from 10 on."""
+    start = minimum
+    for part in text.split('|') if text else ():
+        *begins, step = part.split(':')
+        if begins:
+            start = Fraction(begins[0])
+        if start is None:
+            raise ValueError('steps begin at the minimum, and there is none')
+        yield start, Fraction(step)
+
+
 def _status_code(row: table.Row) -> StatusCode:
+    code = int(row['code'])
+    if not 0 <= code <= _HIGHEST_CODE:
+        raise ValueError(f'code {code} is out of range, 0 to {_HIGHEST_CODE}')
     return StatusCode(
-        code=int(row['code']),
+        code=code,
         text=row['text'],
         old_text=row['old_text'] or row['text'],
         renamed=table.fraction(row['renamed']),

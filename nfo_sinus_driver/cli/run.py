@@ -119,25 +119,25 @@ class _Ride:
                 'then type nfo-sinus ack'
             )
         mode = remote.do(remote.inverter.read_control_mode)
-        if not remote.registers.reaches(remote.model.key(Role.CONTROL_MODE)):
+        key = remote.model.key(Role.CONTROL_MODE)
+        if not remote.registers.reaches(key):
             # nothing tells it, so it is what was typed
             mode = options.control_mode or mode
         if options.control_mode not in ('', mode):
             raise CliError(
                 f'the drive is in control mode {mode}, not {options.control_mode}: set '
-                'control.mode, or give another --control-mode'
+                f'{key}, or give another --control-mode'
             )
         if options.setpoint is None:
             return
         target = remote.model.profile.setpoints.get(mode)
         if target is None:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
-        most = target.most
-        if abs(options.setpoint) > most:
+        if not target.least <= options.setpoint <= target.most:
             unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
             raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
-                f'in control mode {mode} {-most:g} to {most:g} {unit}'
+                f'in control mode {mode} {target.least:g} to {target.most:g} {unit}'
             )
 
     def _start(self) -> None:

@@ -23,6 +23,7 @@ from fractions import Fraction
 import functools
 import logging
 import math
+import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
@@ -38,6 +39,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import NEVER
 from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -52,6 +54,8 @@ _log = logging.getLogger(__name__)
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
 _SOON = 2.0
+#: How long it counts that the bus had control, s, where that has to be asked for by itself.
+_BY_MODE_FOR = 1.0
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -156,6 +160,14 @@ class DriveState:
             word, at = await self._read_word(priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
+        code_of = self.model.profile.status_word.code
+        if code_of is not None:
+            seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+            seen = self._with_control_as_before(seen)
+            alarmed = before is not None and word != before.word and alarming(seen)
+            priority = Priority.STOP if alarmed else priority
+            seen = await self._with_control(seen, priority, once)
+            return await self._with_frequency(seen, priority, once)
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -181,7 +193,25 @@ class DriveState:
         if differs:
             word, at = await self._read_word(priority, once)
             seen = replace(seen, word=word, at=at)
-        return self._saw(seen)
+        return await self._with_frequency(seen, priority, once)
+
+    async def _with_frequency(
+        self, seen: InverterStatus, priority: Priority, once: bool
+    ) -> InverterStatus:
+        """Complete a status by the frequency, where its word alone does not tell a stop."""
+        if not seen.by_frequency:
+            return self._saw(seen)
+        try:
+            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
+        except Refused:
+            frequency = math.nan
+        self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
+        before, fell = self.seen, NEVER
+        if before is not None and abs(frequency) < abs(before.frequency):
+            fell = before.at, seen.at
+        elif before is not None and abs(frequency) == abs(before.frequency):
+            fell = before.fell
+        return self._saw(replace(seen, frequency=frequency, fell=fell))
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
         reply = await self._registers.read_reply(self.word_key, priority, once=once)
@@ -193,8 +223,8 @@ class DriveState:
         return self.model.key(Role.STATUS_WORD)
 
     def status_word(self, data: bytes) -> int:
-        """Return what counts of a status word: the upper half is described nowhere [C24]."""
-        return int(self._registers.number(self.word_key, data)) & 0xFFFF
+        """Return the status word that bytes mean."""
+        return int(self._registers.number(self.word_key, data))
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
@@ -206,12 +236,33 @@ class DriveState:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._read_code(priority, once)
         seen = InverterStatus(at, None, code, self.model, code_at=at)
-        if seen.means(Meaning.ANONYMOUS):
-            key = self.model.key(Role.CONTROL_SOURCE)
-            source = await self._registers.read(key, priority, once=once)
-            holder = self.model.profile.holders.get(int(source), Holder.UNKNOWN)
-            seen = replace(seen, by_mode=holder is Holder.BUS)
-        return self._saw(seen)
+        return self._saw(await self._with_control(seen, priority, once))
+
+    def _with_control_as_before(self, seen: InverterStatus) -> InverterStatus:
+        before = self.seen
+        if before is None:
+            return seen
+        return replace(seen, by_mode=before.by_mode, by_mode_at=before.by_mode_at)
+
+    async def _with_control(
+        self, seen: InverterStatus, priority: Priority, once: bool
+    ) -> InverterStatus:
+        """
+        Complete a status by who has control, where neither its word nor its code tells it.
+
+        That the bus has it counts for a while, as long as the code stays what it was.
+        """
+        word_tells = seen.word is not None and Fact.NETWORK_CONTROL in seen.valid
+        if word_tells or not seen.means(Meaning.ANONYMOUS):
+            return seen
+        before = self.seen
+        same = before is not None and before.code == seen.code
+        if same and seen.by_mode and seen.at - seen.by_mode_at < _BY_MODE_FOR:
+            return seen
+        key = self.model.key(Role.CONTROL_SOURCE)
+        source, at = await self._registers.read_at(key, priority, once=once)
+        holder = self.model.profile.holders.get(source, Holder.UNKNOWN)
+        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=at)
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -245,13 +296,20 @@ class DriveState:
 
         :raises LinkError: it does not answer, or refuses.
         """
+        return await self._measure(role, priority, True, self.seen)
+
+    async def _measure(
+        self, role: Role, priority: Priority, once: bool, seen: InverterStatus | None
+    ) -> float:
+        """Measure; a status tells the direction of what turns, where the value does not."""
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self._registers.read_data(key, priority, once=True)
+        data = await self._registers.read_data(key, priority, once=once)
         value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
-            return value
+            turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+            return seen.signed(value) if turns and seen is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit
@@ -277,16 +335,21 @@ class DriveState:
     @property
     def can_time_out(self) -> bool:
         """It has a time-out of its own that can be read and set over this line."""
-        needed = (Role.COMMUNICATION_TIMEOUT, Role.STOP_AT_TIMEOUT)
-        return all(self.has(self.model.key(role)) for role in needed)
+        stop = self.model.key(Role.STOP_AT_TIMEOUT)
+        needed = (self.model.key(Role.COMMUNICATION_TIMEOUT), *([stop] if stop else []))
+        return all(self.has(key) for key in needed)
 
     async def read_timeout(self) -> None:
         """Read whether the drive has a time-out of its own."""
         if not self.can_time_out:
             return
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
-        stop = self.model.key(Role.STOP_AT_TIMEOUT)
         self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
+        stop = self.model.key(Role.STOP_AT_TIMEOUT)
+        if not stop:
+            # where nothing can keep it from that, it stops the motor
+            self.auto_stop = True
+            return
         data = await self._registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
         self.auto_stop = data == self._registers.encode(stop, True)
@@ -300,7 +363,7 @@ class DriveState:
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self._registers.read(self.model.key(Role.STATUS_CODE), priority, once=not patient)
+        await self._registers.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
         self._older = dialect is not None and self.settings.classic_dialect == dialect.name
@@ -351,7 +414,7 @@ class DriveState:
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
         source = await self._registers.read(key, Priority.SERVICE)
-        return self.model.profile.holders.get(int(source)) in dialect.harmless
+        return self.model.profile.holders.get(source) in dialect.harmless
 
     @property
     def settings_need_control(self) -> bool:

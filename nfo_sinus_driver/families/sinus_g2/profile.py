@@ -26,6 +26,7 @@ from collections.abc import Sequence
 import contextlib
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import Acknowledge
 from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
 from nfo_sinus_driver.catalog.profile import ControlMethod
@@ -45,6 +46,7 @@ from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.profile import one
 from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -61,7 +63,7 @@ INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
 _MASK = 'fieldbus.drv_ctrl_write_mask'
 _SIO_ERR = 'fieldbus.sio_err'
 
-_HOLDERS: Mapping[int, Holder] = {
+_HOLDERS: Mapping[Value, Holder] = {
     Mode.INHIBIT: Holder.INHIBITED,
     Mode.STOP: Holder.NOBODY,
     Mode.EXT: Holder.LOCAL,
@@ -75,6 +77,13 @@ _SETPOINTS = {
     'PI-Reg': SetpointTarget('status.reg_set', 150.0, at=_COMMON),
     'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON),
     'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON),
+}
+#: Beyond what any reference asks for in either direction, 150 Hz, 9000 rpm and 200 % ([M0 table 4],
+#: [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
+MOST = {
+    Role.ACTUAL_FREQUENCY: 180.0,
+    Role.ACTUAL_SPEED: 10800.0,
+    Role.ACTUAL_TORQUE: 400.0,
 }
 #: The run command that each reference has; the fixed ones are made of their number.
 _COMMANDS = {
@@ -463,6 +472,7 @@ PROFILE = Profile(
     older=OlderDialect(
         'classic', 'v5.0', before=4.28, harmless=frozenset((Holder.NOBODY, Holder.LOCAL))
     ),
+    most=MOST,
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
 )

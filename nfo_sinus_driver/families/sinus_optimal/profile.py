@@ -26,6 +26,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
 from nfo_sinus_driver.catalog.profile import Procedure
@@ -42,6 +43,7 @@ from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2.profile import CONTROL_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import MODE
+from nfo_sinus_driver.families.sinus_g2.profile import MOST
 from nfo_sinus_driver.families.sinus_g2.profile import STATUS_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import ModeScmd
 from nfo_sinus_driver.families.sinus_optimal import words
@@ -49,7 +51,7 @@ from nfo_sinus_driver.families.sinus_optimal.words import Control
 from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 
-_HOLDERS: Mapping[int, Holder] = {
+_HOLDERS: Mapping[Value, Holder] = {
     Mode.MANUAL: Holder.LOCAL,
     Mode.AUTO: Holder.LOCAL,
     Mode.BUS: Holder.BUS,
@@ -206,4 +208,5 @@ PROFILE = Profile(
     methods={'mode_scmd': ModeSmode, 'drive_control': DriveControl},
     setpoints=_SETPOINTS,
     in_charge=_in_charge,
+    most=MOST,
 )

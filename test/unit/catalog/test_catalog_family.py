@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import csv
 from pathlib import Path
+import re
 import shutil
 import time
 
@@ -55,8 +56,8 @@ def rewrite(path: Path, change: Callable[[list[Row]], object]) -> None:
     """Let a function change the rows of a table."""
     with path.open(encoding='utf-8', newline='') as stream:
         rows = list(csv.DictReader(stream))
-    names = list(rows[0])
     change(rows)
+    names = list(rows[0])
     with path.open('w', encoding='utf-8', newline='') as stream:
         writer = csv.DictWriter(stream, names)
         writer.writeheader()
@@ -104,9 +105,23 @@ def test_every_folder_is_a_family() -> None:
     assert [load_family(name).name for name in families()] == list(families())
 
 
+@pytest.mark.parametrize('name', families())
+def test_every_control_method_has_a_constant_in_the_message(name: str) -> None:
+    message = Path(__file__).parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
+    constants = re.findall(r'uint8 (\w+)=', message.read_text(encoding='utf-8'))
+    assert {method.upper() for method in load_family(name).profile.methods} <= set(constants)
+
+
 def test_unknown_family() -> None:
-    with pytest.raises(ValueError, match="unknown model 'sinus_h': choose one of sinus_g2"):
-        load_family('sinus_h')
+    with pytest.raises(ValueError, match=r"unknown model 'sinus_x': choose one of .*sinus_g2"):
+        load_family('sinus_x')
+
+
+def test_folder_that_would_not_be_installed(folder: Path) -> None:
+    again = folder.rename(folder.with_name('sinus_bare'))
+    (again / '__init__.py').unlink()
+    with pytest.raises(CatalogError, match=r'sinus_bare: no __init__\.py, without which'):
+        load_afresh('sinus_bare')
 
 
 def test_copied_tables_are_as_good(folder: Path) -> None:
@@ -164,6 +179,8 @@ def test_copied_tables_are_as_good(folder: Path) -> None:
             'motor.u_nom on modbus stands in line 6 already',
         ),
         (CODES, ['5'], {'code': 'five'}, 'invalid literal'),
+        (CODES, ['5'], {'code': '256'}, 'code 256 is out of range, 0 to 255'),
+        (CODES, ['5'], {'code': '-1'}, 'code -1 is out of range, 0 to 255'),
         (CODES, ['5'], {'code': '4'}, 'code 4 stands in line 6 already'),
         (CODES, ['5'], {'kind': 'disaster'}, "'disaster' is not a valid Kind"),
         (CODES, ['5'], {'requires_ack': 'maybe'}, "no 'maybe'"),
@@ -264,3 +281,23 @@ def test_the_catalog_knows_no_family() -> None:
     for path in Path(family.__file__).parent.glob('*.py'):
         text = path.read_text(encoding='utf-8')
         assert {name for name in names | keys if name in text} == set(), path.name
+
+
+@pytest.mark.parametrize(
+    ('steps', 'reason'),
+    [
+        ('0.05', 'not all steps are counts on classic'),
+        ('0.1|20.05:0.5', 'not all steps are counts on classic'),
+        ('0.1:', 'Invalid literal for Fraction'),
+    ],
+)
+def test_steps_that_the_drive_cannot_take(folder: Path, steps: str, reason: str) -> None:
+    def change(rows: list[Row]) -> None:
+        for row in rows:
+            row['steps'] = steps if row['parameter'] == 'control.accel' else ''
+
+    rewrite(folder / PARAMETERS, change)
+    line = line_of(folder / PARAMETERS, 'control.accel')
+    said = refusal()
+    assert said.startswith(f'{NAME}/{PARAMETERS}, line {line}: ')
+    assert reason in said
