@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import classic_link
+from nfo_sinus_driver.link import movitrac_link
 from nfo_sinus_driver.link.late_replies import LATEST_REPLY
 from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
 from nfo_sinus_driver.link.late_replies import Doubt
@@ -215,4 +216,12 @@ def test_what_is_asked_over_classic_is_in_the_table_of_every_firmware_and_does_n
             and parameter.at('classic').numbers == (number,)
         )
         assert parameter.since is None
+        assert parameter.access in (Access.READ, Access.READ_WRITE)
+
+
+def test_what_is_asked_of_a_movitrac_is_in_its_table_and_does_nothing() -> None:
+    rows = load_family('movitrac31').values()
+    for index in movitrac_link._EVERYWHERE:
+        (parameter,) = (row for row in rows if row.at('movitrac').index == index)
+        assert parameter.option == '', 'every drive has it'
         assert parameter.access in (Access.READ, Access.READ_WRITE)
