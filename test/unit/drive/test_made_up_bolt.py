@@ -179,6 +179,14 @@ def test_a_stop_is_confirmed_by_a_frequency_that_falls(bolt: Bolt, bus: Bus) -> 
     assert drive.stop().result(PATIENCE).cause is Cause.STOPPED
 
 
+def test_a_motor_that_stands_is_not_driven_whatever_the_word_says(bus: Bus) -> None:
+    drive = connected(bus, Notes())
+    drive.enable().result(PATIENCE)
+    seen = drive.read_status().result(PATIENCE)
+    assert seen.runs and seen.frequency == 0
+    assert not seen.driven and not seen.keeps_running
+
+
 def test_a_fall_from_before_the_stop_confirms_nothing(bolt: Bolt, bus: Bus) -> None:
     notes = Notes()
     drive = turning(bolt, bus, notes)
@@ -240,6 +248,7 @@ def test_control_that_is_kept_is_said(bolt: Bolt, bus: Bus) -> None:
 
 
 def test_an_enable_that_is_not_possible_leaves_the_drive_as_it_was(bolt: Bolt, bus: Bus) -> None:
+    bolt.registers[SOURCE] = 1
     drive = connected(bus, Notes())
     bolt.registers[INPUTS] = 1
     begun = len(bolt.writes)
