@@ -157,6 +157,11 @@ class ControlUnit(abc.ABC):
         """Whether it is set to this protocol, speed and format."""
         return True
 
+    @property
+    def response_time(self) -> float:
+        """How long it is set to wait before it answers (s)."""
+        return 0.0
+
     def heard(self) -> None:
         """Take note that a valid frame for this drive arrived."""
 

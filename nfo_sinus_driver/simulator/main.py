@@ -155,13 +155,6 @@ def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     return settings
 
 
-def _address(text: str) -> int:
-    address = int(text, 10)
-    if not 1 <= address <= 247:
-        raise argparse.ArgumentTypeError(f'{text} is not possible: 1 to 247')
-    return address
-
-
 def _tcp(text: str) -> int:
     port = int(text, 10)
     if not 0 <= port <= 65535:
@@ -187,10 +180,10 @@ def _parser() -> argparse.ArgumentParser:
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
         '--address',
-        type=_address,
+        type=int,
         action='append',
         metavar='N',
-        help='address of a drive, 1 to 247; once for each drive (default: 1)',
+        help='address of a drive, as its protocol has them; once for each drive (default: 1)',
     )
     add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')

@@ -1,0 +1,83 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the manual leaves open of a MOVITRAC 31.., so that a simulated one does it this or that way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import fields
+
+from nfo_sinus_driver.simulator.family import Option
+
+
+def _open(usual: str, *others: str, text: str) -> str:
+    """Return a field for what can be read in several ways, and the usual one."""
+    choices = (usual, *others)
+    found: str = field(default=usual, metadata={'choices': choices, 'text': text})
+    return found
+
+
+@dataclass(frozen=True)
+class Variant:
+    """
+    One way to read the manual; by default the one that its words are nearest to.
+
+    :ivar negative_nibble: the first half-byte of a negative number [C70]: the figure is missing.
+    :ivar status_numbers: how status and fault stand in index 284 [C105].
+    :ivar enable_bit: ``ored``: with an enable at the terminals the bit for it changes nothing, for
+        "all subsequent bits are ORed with the terminal signals"; ``anded``: both are needed;
+        ``either``: the bit alone will do.
+    :ivar timeout_stop: what fault 45 does to the motor: it ``coasts``, or the drive ``ramps`` it
+        down as if the enable were gone.
+    :ivar outside_remote_control: what becomes of bits and set-point that the control mode has no use for
+        [C110]: ``refused``, ``ignored``, or ``taken`` and followed as soon as the mode allows.
+    :ivar stop_status: what a drive with an enable and no direction shows: ``normal_stop`` on the
+        way down and No enable at standstill, or ``enable`` all the time.
+    :ivar bits_after_power_on: what becomes of bits and set-point by power-off: ``cleared`` or ``kept``.
+    :ivar bits_in_fault: what a fault does to the bits: they are ``kept``, or ``cleared``.
+    :raises ValueError: one of them cannot be that.
+    """
+
+    negative_nibble: str = _open('F', '8', '1', text='first half-byte of a negative number')
+    status_numbers: str = _open('binary', 'bcd', text='how status and fault number stand in index 284')
+    enable_bit: str = _open(
+        'ored', 'anded', 'either',
+        text='whether the enable at the terminals will do, the bit is needed, too, or either will',
+    )
+    timeout_stop: str = _open('coasts', 'ramps', text='what fault 45, PC time-out, does to the motor')
+    outside_remote_control: str = _open(
+        'ignored', 'refused', 'taken',
+        text='what becomes of function bits and set-point that the control mode has no use for',
+    )
+    stop_status: str = _open(
+        'normal_stop', 'enable', text='what is shown with an enable but no direction'
+    )
+    bits_after_power_on: str = _open(
+        'cleared', 'kept', text='what becomes of function bits and set-point by power-off'
+    )
+    bits_in_fault: str = _open('kept', 'cleared', text='what a fault does to the function bits')
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            if getattr(self, one.name) not in one.metadata['choices']:
+                raise ValueError(f'{one.name}: choose one of {", ".join(one.metadata["choices"])}')
+
+
+#: The same as options of a drive.
+OPTIONS = tuple(
+    Option(one.name, f'{one.metadata["text"]} (default: {one.default})', one.metadata['choices'])
+    for one in fields(Variant)
+)
