@@ -30,6 +30,7 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.parameter import NO_SETTINGS
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
 
@@ -64,6 +65,7 @@ How to read the tables:
 - **Step** is the difference between two values that the drive can hold. Two steps: the one over
   Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of
   the process regulator are the factory's; the drive's scale factors change them.
+- **Option**: the option cards of which the drive needs one for it.
 - **Stopped**: it can only be written while the motor stands.
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
   low word first), **PROFIBUS** its parameter number, **CANopen** its index.
@@ -92,6 +94,7 @@ _SPACES = {
     'id': ('Classic', 'E{:04X}', '{} ids on'),
     'pnu': ('PROFIBUS', 'P{}', 'the next number'),
     'object': ('CANopen', '{:04X}h', 'the next index'),
+    'index': ('Index', '{}', 'the next index'),
 }
 
 _Column = tuple[str, Callable[[Parameter], str]]
@@ -117,6 +120,11 @@ def _family(family: Family) -> Iterator[str]:
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
+    only_read = [row for row in family.values() if row.access is Access.READ]
+    only_read = [row for row in only_read if row.group not in NO_SETTINGS]
+    if only_read:
+        yield '### Only read\n'
+        yield _table(_OTHER_COLUMNS, only_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
         yield f'### {title}\n'
@@ -167,6 +175,8 @@ def _values(parameter: Parameter) -> str:
 def _step(parameter: Parameter) -> str:
     if parameter.labels:
         return ''
+    if parameter.steps:
+        return parameter.shown_steps
     steps = [_number(address.factor) for address in parameter.addresses.values()]
     return ', '.join(dict.fromkeys(steps))
 
@@ -210,6 +220,7 @@ _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('Unit', lambda row: row.unit),
     ('Step', _step),
     ('Stopped', lambda row: 'yes' if row.stopped else ''),
+    ('Option', lambda row: row.option),
     *_ADDRESSES,
 )
 _OTHER_COLUMNS: tuple[_Column, ...] = (
@@ -219,6 +230,7 @@ _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Values', _values),
     ('Unit', lambda row: row.unit),
     ('Step', lambda row: _step(row) if row.unit or row.kind is float else ''),
+    ('Option', lambda row: row.option),
     ('Type', _types),
     *_ADDRESSES,
 )
