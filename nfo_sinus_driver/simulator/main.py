@@ -195,8 +195,12 @@ def _parser() -> argparse.ArgumentParser:
         help='serve the same drives by another protocol as well, at a link or TCP port; may be '
         'repeated',
     )
-    add('--baud', type=int, help='default: 19200, of classic 9600')
-    add('--char-format', metavar='FORMAT', help='default: 8E1, of classic and modbus_ascii 7E1')
+    add('--baud', type=int, help='default: 19200, of classic and movitrac 9600')
+    add(
+        '--char-format',
+        metavar='FORMAT',
+        help='default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1',
+    )
     add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
     add(
         '--gateway-timeout',

@@ -50,6 +50,7 @@ from nfo_sinus_driver.simulator.movitrac31.displays import readings
 from nfo_sinus_driver.simulator.movitrac31.eeprom import Eeprom
 from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory
 from nfo_sinus_driver.simulator.movitrac31.fault_memory import MovitracFaults
+from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 from nfo_sinus_driver.simulator.movitrac31.option_cards import places
 from nfo_sinus_driver.simulator.movitrac31.parameter_set import ParameterSet
 from nfo_sinus_driver.simulator.movitrac31.sequence import Sequence
@@ -100,6 +101,8 @@ class MovitracControlUnit(ControlUnit):
     def __init__(
         self, memory: Memory, address: int, *, option_card: str = 'none', **left_open: str
     ) -> None:
+        if option_card not in CARDS:
+            raise ValueError(f'option_card: choose one of {", ".join(CARDS)}')
         if _ADDRESS in memory.given:
             raise ValueError(f'{_ADDRESS} is given with --address')
         memory.set(_ADDRESS, address)
@@ -307,8 +310,9 @@ class MovitracControlUnit(ControlUnit):
         else:
             enable = command.enable and not self.faults
             self._sequence.follow(replace(command, enable=enable), self._parameters)
-        if self.motor.ramp:
-            self._clockwise = self.motor.ramp > 0
+        turns = self.motor.ramp or self.motor.demand
+        if self.motor.driven and turns:
+            self._clockwise = turns > 0
 
     def restart(self) -> None:
         """Begin as after power-on: from the EEPROM, with bits and set-point as the variant says."""
@@ -380,7 +384,7 @@ class MovitracControlUnit(ControlUnit):
     @property
     def status_code(self) -> int:
         """The fault if one is active, else the inverter status."""
-        return self.faults.shown or self.number
+        return int(self.faults.shown or self.number)
 
     @property
     def status_word(self) -> int:
@@ -388,12 +392,10 @@ class MovitracControlUnit(ControlUnit):
         fault = self.faults.shown - FAULTS if self.faults else 0
         x20, x21 = places(self.option_card)
         flags = Flag.VOLTAGE_SIGNAL
-        if self._commands.second_set:
-            flags |= Flag.SECOND_SET
-        if self._clockwise:
-            flags |= Flag.CW
-        options = x21 << 4 | x20
-        return self._coded(fault) << 24 | self._coded(self.number) << 16 | options << 8 | flags
+        flags |= Flag.SECOND_SET if self._commands.second_set else Flag(0)
+        flags |= Flag.CW if self._clockwise else Flag(0)
+        shown = (self._coded(fault), self._coded(self.number), x21 << 4 | x20, flags)
+        return int.from_bytes(bytes(shown), 'big')
 
     def _coded(self, number: int) -> int:
         """Return a number as a byte shows it: binary, or as two decimal digits [C105]."""

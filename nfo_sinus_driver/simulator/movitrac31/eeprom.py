@@ -28,19 +28,18 @@ class Eeprom:
         self._memory = memory
         self._saved: dict[str, int] = {}
 
-    @property
-    def saves(self) -> bool:
-        """Whether what is written is saved: P801 is On, which is code 0."""
-        return not self._memory.raw(_SAVE)
+    def lacks(self, key: str) -> bool:
+        """Tell whether a parameter has a value that is lost when power is off."""
+        return key in self._saved
 
     def before(self, key: str) -> None:
         """Take note that a parameter will be written."""
-        if not self.saves:
+        if not self._saves:
             self._saved.setdefault(key, self._memory.raw(key))
 
     def after(self, key: str) -> None:
         """Take note that it has been."""
-        if self.saves:
+        if self._saves:
             self._saved.pop(key, None)
 
     def restore(self) -> None:
@@ -48,3 +47,8 @@ class Eeprom:
         for key, raw in self._saved.items():
             self._memory.put(key, raw)
         self._saved.clear()
+
+    @property
+    def _saves(self) -> bool:
+        """Whether what is written is saved: P801 is On, which is code 0."""
+        return not self._memory.raw(_SAVE)

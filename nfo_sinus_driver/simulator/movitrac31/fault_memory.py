@@ -57,5 +57,5 @@ class FaultMemory:
         head, fault, rest = key.partition('.fault_t')
         if head != 'status' or not fault:
             return None
-        number, name = int(rest[0]), rest[1:]
+        number, name = int(rest[0]), rest[1:].removeprefix('_')
         return self._entries[number][name] if number < len(self._entries) else 0

@@ -77,7 +77,7 @@ class Server(movitrac.Server):
         self._drive.write_raw(key, raw)
         if self._unit.factory_left:
             raise Nack(ReturnCode.FACTORY_SETTING_STARTED, 'the factory setting begins')
-        if key in self._drive.settings and not self._unit.eeprom.saves:
+        if self._unit.eeprom.lacks(key):
             raise Nack(ReturnCode.VOLATILE, f'{key} is lost when power is off')
 
     def _find(self, index: int) -> Parameter:
