@@ -25,7 +25,6 @@ import copy
 import json
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.driver_params import driver_params
 from nfo_sinus_driver.cli.driver_params import require_new
 from nfo_sinus_driver.cli.errors import CliError
@@ -159,7 +158,7 @@ def _ask(drive: Remote) -> dict[str, str] | None:
     :raises DriveError: the port cannot be used.
     """
     try:
-        status = drive.model.key(Role.STATUS_CODE)
+        status = drive.model.key_of_status
         drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))
         identity = drive.identify()
     except DriveError as error:

@@ -103,7 +103,7 @@ class Drive:
         )
         self._controller: Controller | None = None
         if settings.control_method != 'monitor':
-            commands = Commands(settings, self._registers)
+            commands = Commands(settings, self._registers, self._inverter.tell)
             self._controller = Controller(bus, self._inverter, commands, self._setpoint)
         self._watch = Poller(
             bus,

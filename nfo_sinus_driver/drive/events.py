@@ -103,7 +103,10 @@ class Cause(enum.Enum):
     NEXT_FAULT = enum.auto()
     NOT_IN_CONTROL = enum.auto()
     CONTROL_RELEASED = enum.auto()
-    COASTED_AND_RELEASED = enum.auto()
+    #: Instead of another stop, when control is released.
+    COASTED_FOR_TIMEOUT = enum.auto()
+    #: The motor stands, and the bus keeps control for a reason of the family's.
+    CONTROL_KEPT = enum.auto()
     LEFT_TO_RAMP = enum.auto()
     RELEASE_BLOCKED = enum.auto()
     ONLY_WATCHED = enum.auto()
@@ -148,6 +151,7 @@ class Cause(enum.Enum):
     MEMBER_NOT_ENABLED = enum.auto()
     MEMBER_TAKES_SEVERAL_WRITES = enum.auto()
     MEMBERS_DIFFER = enum.auto()
+    MEMBERS_WRITTEN_DIFFERENTLY = enum.auto()
     SHARED_SETPOINT_LIMITED = enum.auto()
 
     # --- what the drive says of itself
@@ -210,6 +214,8 @@ class Cause(enum.Enum):
     BAD_VALUE = enum.auto()
     CHANGED = enum.auto()
     CHANGED_FOR_TIMEOUT = enum.auto()
+    #: By taking control, to a memory that wears out.
+    STORED = enum.auto()
     CHANGED_AS_WANTED = enum.auto()
     CHANGED_AT_DRIVE = enum.auto()
     NOT_AS_WANTED = enum.auto()

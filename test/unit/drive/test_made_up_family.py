@@ -216,13 +216,15 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
     begun = len(acme.writes)
     drive.set_setpoint(-12.34)
     wait_until(lambda: acme.hertz == -12.34)
-    assert acme.writes[begun:] == [(TURN, 1), (SIZE, 0), (SIZE + 1, 0x1234)]
+    # the size is none before the direction changes
+    none, size = [(SIZE, 0), (SIZE + 1, 0)], [(SIZE, 0), (SIZE + 1, 0x1234)]
+    assert acme.writes[begun:] == [*none, (TURN, 1), *size]
     wait_until(lambda: drive.snapshot.actual == -12.34)
     assert (drive.snapshot.setpoint, drive.snapshot.text) == (-12.34, 'Run')
     # what stands there already is not written again
     drive.set_setpoint(-50.0)
     wait_until(lambda: acme.hertz == -50.0)
-    assert acme.writes[begun + 3 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
+    assert acme.writes[begun + 5 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
 
     with acme.lock:
         acme.trip(70)
@@ -252,11 +254,12 @@ def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bu
 
 def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, Notes())
-    acme.fates[SIZE] = NoAnswer('silence')
+    acme.fates[TURN] = NoAnswer('silence')
     begun = len(acme.writes)
     drive.set_setpoint(30.0)
     wait_until(lambda: acme.hertz == 30.0)
-    assert acme.writes[begun:] == [(TURN, 0), (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
+    none = [(SIZE, 0), (SIZE + 1, 0)]
+    assert acme.writes[begun:] == [*none, *none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
     wait_until(lambda: drive.snapshot.setpoint == 30.0)
 
 
