@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is wanted of a MOVITRAC 31..: the terminals, the line or the keypad, as P841 and P870 say."""
+"""What terminals, line and keypad want of a MOVITRAC 31.., and which counts (P841, P870)."""
 
 from __future__ import annotations
 

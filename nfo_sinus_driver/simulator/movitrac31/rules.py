@@ -72,7 +72,7 @@ _RULES = (
 def broken(memory: Memory, key: str, raw: int) -> ReturnCode | None:
     """Return why a setting cannot have a raw number as the others stand, ``None`` if it can."""
     for rule in _RULES:
-        if rule.key == key and rule.on == bool(raw):
-            if rule.other_on == bool(memory.raw(rule.other)):
-                return rule.code
+        stands = bool(memory.raw(rule.other)) == rule.other_on
+        if rule.key == key and rule.on == bool(raw) and stands:
+            return rule.code
     return None

@@ -28,7 +28,6 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.movitrac import Nack
 from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
 from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
-from nfo_sinus_driver.simulator.movitrac31.control_unit import FACTORY_SETTING
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
 from nfo_sinus_driver.simulator.movitrac31.option_cards import suffices
 from nfo_sinus_driver.simulator.movitrac31.rules import broken

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the manual leaves open of a MOVITRAC 31.., so that a simulated one does it this or that way."""
+"""What the manual leaves open of a MOVITRAC 31..: a simulated one does it this way or that."""
 
 from __future__ import annotations
 
@@ -52,15 +52,23 @@ class Variant:
     """
 
     negative_nibble: str = _open('F', '8', '1', text='first half-byte of a negative number')
-    status_numbers: str = _open('binary', 'bcd', text='how status and fault number stand in index 284')
-    enable_bit: str = _open(
-        'ored', 'anded', 'either',
-        text='whether the enable at the terminals will do, the bit is needed, too, or either will',
+    status_numbers: str = _open(
+        'binary', 'bcd', text='how status and fault number stand in index 284'
     )
-    timeout_stop: str = _open('coasts', 'ramps', text='what fault 45, PC time-out, does to the motor')
+    enable_bit: str = _open(
+        'ored',
+        'anded',
+        'either',
+        text='whether the enable of the terminals will do, the bit is needed as well, or either does',
+    )
+    timeout_stop: str = _open(
+        'coasts', 'ramps', text='what fault 45, PC time-out, does to the motor'
+    )
     outside_remote_control: str = _open(
-        'ignored', 'refused', 'taken',
-        text='what becomes of function bits and set-point that the control mode has no use for',
+        'ignored',
+        'refused',
+        'taken',
+        text='what becomes of function bits and set-point where the control mode has no use for them',
     )
     stop_status: str = _open(
         'normal_stop', 'enable', text='what is shown with an enable but no direction'
@@ -68,7 +76,9 @@ class Variant:
     bits_after_power_on: str = _open(
         'cleared', 'kept', text='what becomes of function bits and set-point by power-off'
     )
-    bits_in_fault: str = _open('kept', 'cleared', text='what a fault does to the function bits')
+    bits_in_fault: str = _open(
+        'kept', 'cleared', text='what a fault does to the function bits'
+    )
 
     def __post_init__(self) -> None:
         for one in fields(self):

@@ -25,7 +25,6 @@ from movitrac_bench import HEAT_SINK
 from movitrac_bench import INPUT_42
 from movitrac_bench import INPUT_47
 from movitrac_bench import NO_ENABLE
-from movitrac_bench import PC_TIMEOUT
 from movitrac_bench import RAPID_STOP
 from movitrac_bench import RESET
 from movitrac_bench import STANDARD
