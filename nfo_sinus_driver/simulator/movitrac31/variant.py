@@ -42,11 +42,12 @@ class Variant:
         ``either``: the bit alone will do.
     :ivar timeout_stop: what fault 45 does to the motor: it ``coasts``, or the drive ``ramps`` it
         down as if the enable were gone.
-    :ivar outside_remote_control: what becomes of bits and set-point that the control mode has no use for
-        [C110]: ``refused``, ``ignored``, or ``taken`` and followed as soon as the mode allows.
+    :ivar outside_remote_control: what becomes of bits and set-point that the control mode has no
+        use for [C110]: ``refused``, ``ignored``, or ``taken`` and followed once the mode allows.
     :ivar stop_status: what a drive with an enable and no direction shows: ``normal_stop`` on the
         way down and No enable at standstill, or ``enable`` all the time.
-    :ivar bits_after_power_on: what becomes of bits and set-point by power-off: ``cleared`` or ``kept``.
+    :ivar bits_after_power_on: what becomes of bits and set-point by power-off: they are ``cleared``
+        or ``kept``.
     :ivar bits_in_fault: what a fault does to the bits: they are ``kept``, or ``cleared``.
     :raises ValueError: one of them cannot be that.
     """
@@ -59,7 +60,7 @@ class Variant:
         'ored',
         'anded',
         'either',
-        text='whether the enable of the terminals will do, the bit is needed as well, or either does',
+        text='whether the enable of the terminals will do, the bit is needed too, or either does',
     )
     timeout_stop: str = _open(
         'coasts', 'ramps', text='what fault 45, PC time-out, does to the motor'
@@ -68,7 +69,7 @@ class Variant:
         'ignored',
         'refused',
         'taken',
-        text='what becomes of function bits and set-point where the control mode has no use for them',
+        text='what becomes of function bits and set-point without use in the control mode',
     )
     stop_status: str = _open(
         'normal_stop', 'enable', text='what is shown with an enable but no direction'
