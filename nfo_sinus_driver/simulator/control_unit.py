@@ -74,7 +74,7 @@ class ControlUnit(abc.ABC):
 
     @abc.abstractmethod
     def show(self, key: str) -> int | None:
-        """Return the raw number of what is neither stored nor measured; else ``None``."""
+        """Return the raw number of what is not stored, or measured its own way; else ``None``."""
 
     @property
     @abc.abstractmethod

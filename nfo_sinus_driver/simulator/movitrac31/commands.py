@@ -49,12 +49,14 @@ class Command:
     :ivar inhibited: the controller inhibit is.
     :ivar direction: 1 is clockwise, -1 counter-clockwise; 0 where none or both are wanted.
     :ivar setpoint: the frequency to run at (Hz), within the limits of the parameter set.
+    :ivar parameters: the parameter set that is chosen, with its ramps.
     """
 
     enable: bool
     inhibited: bool
     direction: int
     setpoint: float
+    parameters: ParameterSet
 
 
 class Commands:
@@ -71,18 +73,20 @@ class Commands:
         self._terminals = terminals
         self._enable_bit = enable_bit
         self.key = 0
-        self._sets: dict[tuple[int, bool], ParameterSet] = {}
+        #: What the last command was made of, but for the settings.
+        self._made_of: tuple[object, ...] = ()
+        self._command: Command | None = None
 
     def changed(self, key: str) -> None:
         """Take note that a setting has a new value; the keypad begins with no direction."""
-        self._sets.clear()
+        self._command = None
         if key == MANUAL:
             self.key = 0
 
     @property
-    def mode(self) -> Mode:
+    def mode(self) -> int:
         """The control mode, P841."""
-        return Mode(round(self._memory.number(CONTROL_MODE)))
+        return round(self._memory.number(CONTROL_MODE))
 
     @property
     def manual(self) -> bool:
@@ -90,10 +94,9 @@ class Commands:
         return bool(self._memory.raw(MANUAL))
 
     @property
-    def bits(self) -> Bit:
+    def bits(self) -> int:
         """The function bits, as far as they count: in the mode Remote control alone."""
-        remote = self.mode is Mode.REMOTE_CONTROL
-        return Bit(self._memory.raw(FUNCTION_BITS)) if remote else Bit(0)
+        return self._memory.raw(FUNCTION_BITS) if self.mode == Mode.REMOTE_CONTROL else 0
 
     @property
     def follows_line(self) -> bool:
@@ -101,34 +104,38 @@ class Commands:
         return self.mode in (Mode.REMOTE_SETPOINT, Mode.REMOTE_CONTROL)
 
     @property
-    def second_set(self) -> bool:
-        """Whether parameter set 2 is chosen."""
-        return bool(self._memory.raw(_SETS)) and self._wanted(Bit.SECOND_SET, Input.SECOND_SET)
+    def now(self) -> Command:
+        """What is wanted now."""
+        raw = self._memory.raw
+        made_of = (raw(FUNCTION_BITS), raw(SETPOINT), self._terminals.closed, self.key)
+        if self._command is None or made_of != self._made_of:
+            self._made_of = made_of
+            self._command = self._made()
+        return self._command
 
-    @property
-    def parameters(self) -> ParameterSet:
-        """The parameter set that is chosen, with its ramps."""
-        chosen = 1 + self.second_set, self._wanted(Bit.SECOND_RAMP, Input.SECOND_RAMP)
-        if chosen not in self._sets:
-            self._sets[chosen] = parameter_set(self._memory, *chosen)
-        return self._sets[chosen]
-
-    def now(self, parameters: ParameterSet) -> Command:
-        """Return what is wanted now, with a parameter set."""
+    def _made(self) -> Command:
+        parameters = self._parameters()
         inhibited = self._terminals.opened(Input.NOT_INHIBIT) or bool(self.bits & Bit.INHIBIT)
         if self.manual:
             keypad = parameters.limited(_KEYPAD_SHARE * parameters.f_max)
-            return Command(True, inhibited, self.key, keypad)
-        if self.mode is Mode.FIELDBUS:
+            return Command(True, inhibited, self.key, keypad, parameters)
+        if self.mode == Mode.FIELDBUS:
             # the simulated drive has none
-            return Command(False, inhibited, 0, 0.0)
+            return Command(False, inhibited, 0, 0.0, parameters)
         turns = self._wanted(Bit.CW, Input.CW) - self._wanted(Bit.CCW, Input.CCW)
         setpoint = self._memory.number(SETPOINT) if self.follows_line else self._local(parameters)
-        return Command(self._enabled(), inhibited, turns, parameters.limited(setpoint))
+        limited = parameters.limited(setpoint)
+        return Command(self._enabled(), inhibited, turns, limited, parameters)
+
+    def _parameters(self) -> ParameterSet:
+        selects = bool(self._memory.raw(_SETS))
+        second = selects and self._wanted(Bit.SECOND_SET, Input.SECOND_SET)
+        second_ramp = self._wanted(Bit.SECOND_RAMP, Input.SECOND_RAMP)
+        return parameter_set(self._memory, 2 if second else 1, second_ramp)
 
     def _enabled(self) -> bool:
         terminal = self._terminals.on(Input.ENABLE)
-        if self.mode is not Mode.REMOTE_CONTROL:
+        if self.mode != Mode.REMOTE_CONTROL:
             return terminal
         bit = bool(self.bits & Bit.ENABLE)
         if self._enable_bit == 'either':

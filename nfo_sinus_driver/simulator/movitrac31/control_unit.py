@@ -52,7 +52,6 @@ from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory
 from nfo_sinus_driver.simulator.movitrac31.fault_memory import MovitracFaults
 from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 from nfo_sinus_driver.simulator.movitrac31.option_cards import places
-from nfo_sinus_driver.simulator.movitrac31.parameter_set import ParameterSet
 from nfo_sinus_driver.simulator.movitrac31.sequence import Sequence
 from nfo_sinus_driver.simulator.movitrac31.terminals import ENABLE
 from nfo_sinus_driver.simulator.movitrac31.terminals import Terminals
@@ -113,7 +112,7 @@ class MovitracControlUnit(ControlUnit):
         self.ambient = AMBIENT
         self.factory_left = 0.0
         self._commands = Commands(memory, self.terminals, self.variant.enable_bit)
-        self._parameters = self._commands.parameters
+        self._parameters = self._commands.now.parameters
         super().__init__(memory, address, MovitracFaults(memory.model))
         self._fault_memory = FaultMemory()
         self._sequence = Sequence(self.motor)
@@ -161,7 +160,7 @@ class MovitracControlUnit(ControlUnit):
         if key == FACTORY_SETTING:
             self._start_factory_setting(raw)
         elif key == FUNCTION_BITS:
-            self._take(key, raw, self._commands.mode is Mode.REMOTE_CONTROL)
+            self._take(key, raw, self._commands.mode == Mode.REMOTE_CONTROL)
         elif key == SETPOINT:
             self._take(key, raw, self._commands.follows_line)
         else:
@@ -176,6 +175,8 @@ class MovitracControlUnit(ControlUnit):
         """Take note of a setting that has a new value."""
         self.eeprom.after(key)
         self._commands.changed(key)
+        if key.startswith('terminal.'):
+            self._external_fault_ends()
 
     def _take(self, key: str, raw: int, of_use: bool) -> None:
         if not of_use and self.variant.outside_remote_control == 'ignored':
@@ -204,11 +205,11 @@ class MovitracControlUnit(ControlUnit):
     @property
     def run_input(self) -> bool:
         """The terminal that is the enable from the factory."""
-        return self.terminals.closed(ENABLE)
+        return ENABLE in self.terminals.closed
 
     @run_input.setter
     def run_input(self, active: bool) -> None:
-        self.terminals.switch(ENABLE, active)
+        self._switch(ENABLE, active)
 
     def switch(self, number: int, closed: bool) -> None:
         """
@@ -216,11 +217,15 @@ class MovitracControlUnit(ControlUnit):
 
         :raises ValueError: there is no such input.
         """
+        self._switch(number, closed)
+        self.settle()
+
+    def _switch(self, number: int, closed: bool) -> None:
         before = self.terminals.on(Input.RESET)
         self.terminals.switch(number, closed)
+        self._external_fault_ends()
         if self.terminals.on(Input.RESET) and not before:
             self.reset()
-        self.settle()
 
     def press(self, key: str) -> None:
         """
@@ -260,12 +265,9 @@ class MovitracControlUnit(ControlUnit):
         if self.variant.bits_in_fault == 'cleared':
             self.memory.put(FUNCTION_BITS, 0)
 
-    def _watch_external_fault(self) -> None:
-        opened = self.terminals.opened(Input.NOT_EXTERNAL_FAULT)
-        if not opened:
+    def _external_fault_ends(self) -> None:
+        if not self.terminals.opened(Input.NOT_EXTERNAL_FAULT):
             self.faults.end_cause(EXTERNAL_FAULT)
-        elif EXTERNAL_FAULT not in self.faults.codes:
-            self.trip(EXTERNAL_FAULT, cause_present=True)
 
     @property
     def _resets_itself(self) -> bool:
@@ -302,14 +304,17 @@ class MovitracControlUnit(ControlUnit):
 
     def settle(self) -> None:
         """Let the output stage do what is wanted, unless something keeps it off."""
-        self._watch_external_fault()
-        self._use(self._commands.parameters)
-        command = self._commands.now(self._parameters)
+        opened = self.terminals.opened(Input.NOT_EXTERNAL_FAULT)
+        if opened and EXTERNAL_FAULT not in self.faults.codes:
+            self.trip(EXTERNAL_FAULT, cause_present=True)
+        command = self._commands.now
+        if command.parameters is not self._parameters:
+            self._parameters = command.parameters
+            self.motor.plate = self.nameplate()
         if command.inhibited or self.factory_left or (self.faults and not self._ramps_in_fault):
             self._sequence.off()
         else:
-            enable = command.enable and not self.faults
-            self._sequence.follow(replace(command, enable=enable), self._parameters)
+            self._sequence.follow(replace(command, enable=False) if self.faults else command)
         turns = self.motor.ramp or self.motor.demand
         if self.motor.driven and turns:
             self._clockwise = turns > 0
@@ -336,11 +341,6 @@ class MovitracControlUnit(ControlUnit):
             speed=60 * (1 - _SLIP) * chosen.f_base / number(f'motor.pole_pairs_{chosen.number}'),
             limit=usual.current * number(f'motor.i_max_{chosen.number}') / 100,
         )
-
-    def _use(self, parameters: ParameterSet) -> None:
-        if parameters is not self._parameters:
-            self._parameters = parameters
-            self.motor.plate = self.nameplate()
 
     @property
     def _ramps_in_fault(self) -> bool:
@@ -372,7 +372,7 @@ class MovitracControlUnit(ControlUnit):
     @property
     def number(self) -> int:
         """The inverter status."""
-        command = self._commands.now(self._parameters)
+        command = self._commands.now
         if command.inhibited or self.factory_left or (self.faults and not self._sequence.moving):
             return Number.INHIBIT
         number = self._sequence.number
@@ -392,10 +392,14 @@ class MovitracControlUnit(ControlUnit):
         fault = self.faults.shown - FAULTS if self.faults else 0
         x20, x21 = places(self.option_card)
         flags = Flag.VOLTAGE_SIGNAL
-        flags |= Flag.SECOND_SET if self._commands.second_set else Flag(0)
+        flags |= Flag.SECOND_SET if self._second_set else Flag(0)
         flags |= Flag.CW if self._clockwise else Flag(0)
         shown = (self._coded(fault), self._coded(self.number), x21 << 4 | x20, flags)
         return int.from_bytes(bytes(shown), 'big')
+
+    @property
+    def _second_set(self) -> bool:
+        return self._commands.now.parameters.number == 2
 
     def _coded(self, number: int) -> int:
         """Return a number as a byte shows it: binary, or as two decimal digits [C105]."""
@@ -414,7 +418,7 @@ class MovitracControlUnit(ControlUnit):
             yield Output.NOT_FAULT
         if self._commands.manual:
             yield Output.MANUAL
-        if self._commands.second_set:
+        if self._second_set:
             yield Output.SECOND_SET
         if self.motor.reached:
             yield Output.AT_SETPOINT
@@ -423,7 +427,7 @@ class MovitracControlUnit(ControlUnit):
 
     def report(self) -> dict[str, Any]:
         """Return what it shows and what is wanted of it."""
-        command = self._commands.now(self._parameters)
+        command = self._commands.now
         return {
             'mode': int(self._commands.mode),
             'manual': self._commands.manual,
@@ -437,6 +441,6 @@ class MovitracControlUnit(ControlUnit):
             'inhibited': command.inhibited,
             'direction': command.direction,
             'terminals': {
-                str(number): self.terminals.closed(number) for number in self.terminals.inputs
+                str(number): number in self.terminals.closed for number in self.terminals.inputs
             },
         }

@@ -56,7 +56,6 @@ DISPLAYS: Mapping[str, Callable[[Motor], int]] = {
     'status.dc_link_voltage': lambda motor: _whole(motor.dc_link, 1000),
     'status.motor_voltage': lambda motor: _whole(motor.voltage, 1000),
     'status.apparent_current': _current,
-    'status.external_current_limit': lambda _: 100 * 100,
     'status.inverter_utilization': _utilization,
     'status.motor_utilization_1': _utilization,
 }

@@ -85,6 +85,7 @@ _FACTORY: Mapping[str, Value] = {
     'setpoint.n11': 5.0,
     'setpoint.n12': 25.0,
     'setpoint.n13': 50.0,
+    'status.external_current_limit': 100.0,
     'status.inverter_type': 'MOVITRAC 31..',
     'status.output_stage': '31C015-503-4-00',
 }

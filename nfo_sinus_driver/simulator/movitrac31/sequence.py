@@ -22,7 +22,6 @@ import enum
 from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.movitrac31.codes import Number
 from nfo_sinus_driver.simulator.movitrac31.commands import Command
-from nfo_sinus_driver.simulator.movitrac31.parameter_set import ParameterSet
 
 
 class Phase(enum.Enum):
@@ -77,9 +76,10 @@ class Sequence:
         self.phase = Phase.OFF
         self._motor.release()
 
-    def follow(self, command: Command, parameters: ParameterSet) -> None:
+    def follow(self, command: Command) -> None:
         """Do what is wanted now."""
-        phase = self._next(command, parameters)
+        parameters = command.parameters
+        phase = self._next(command)
         if phase is not self.phase:
             times = {
                 Phase.MAGNETIZING: parameters.premagnetization,
@@ -119,7 +119,8 @@ class Sequence:
             return Number.CHANGE_DIRECTION
         return _NUMBERS[self.phase]
 
-    def _next(self, command: Command, parameters: ParameterSet) -> Phase:
+    def _next(self, command: Command) -> Phase:
+        parameters = command.parameters
         if command.enable and command.direction:
             starts = self.phase is Phase.OFF and parameters.premagnetization
             if starts or (self.phase is Phase.MAGNETIZING and self._left):

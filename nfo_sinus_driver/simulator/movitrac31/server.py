@@ -15,7 +15,7 @@
 """
 What a MOVITRAC 31.. does with the parameters that it is asked for ([M4 §2.1.2], [M4 §3]).
 
-It looks at a request in the order of the return codes, and tells the first thing that is wrong.
+Of what is wrong with a request it tells the first thing that it comes to.
 """
 
 from __future__ import annotations

@@ -53,13 +53,14 @@ class Terminals:
     :param card: the option card, which may bring more of them.
 
     :ivar inputs: the numbers of the binary inputs.
+    :ivar closed: those that are closed.
     """
 
     def __init__(self, memory: Memory, card: str) -> None:
         self._memory = memory
         self.inputs = (CW, 42, ENABLE, 47, *_MORE_INPUTS.get(card, ()))
         self._outputs = (_BRAKE, 62, *_MORE_OUTPUTS.get(card, ()))
-        self._closed: set[int] = set()
+        self.closed: frozenset[int] = frozenset()
 
     def switch(self, number: int, closed: bool) -> None:
         """
@@ -70,22 +71,15 @@ class Terminals:
         if number not in self.inputs:
             known = ', '.join(map(str, self.inputs))
             raise ValueError(f'there is no binary input {number}, only {known}')
-        if closed:
-            self._closed.add(number)
-        else:
-            self._closed.discard(number)
-
-    def closed(self, number: int) -> bool:
-        """Whether a binary input is closed."""
-        return number in self._closed
+        self.closed = self.closed | {number} if closed else self.closed - {number}
 
     def on(self, function: Input) -> bool:
         """Whether an input that has a function is closed."""
-        return any(number in self._closed for number in self._having(function))
+        return any(number in self.closed for number in self._having(function))
 
     def opened(self, function: Input) -> bool:
         """Whether an input that has a function is open, as for those with a slash."""
-        return any(number not in self._closed for number in self._having(function))
+        return any(number not in self.closed for number in self._having(function))
 
     def word(self, active: Collection[Output]) -> int:
         """
@@ -93,7 +87,7 @@ class Terminals:
 
         :param active: the functions of outputs that are on.
         """
-        word = sum(1 << _BITS[number] for number in self._closed)
+        word = sum(1 << _BITS[number] for number in self.closed)
         for number in self._outputs:
             function = self._memory.number(f'terminal.output_{number}')
             if (Output.BRAKE_RELEASED if number == _BRAKE else function) in active:

@@ -214,11 +214,3 @@ def test_another_address_counts_at_once(bench):
     assert bench.write(ADDRESS, 7) == ACK
     assert bench.say(enquiry(HEAT_SINK, 0)) == b''
     assert bench.say(enquiry(HEAT_SINK, 7)) != b''
-
-
-def test_nobody_is_heard_in_master_slave_operation():
-    bench = MovitracBench(option_card='fea')
-    timing = bench.unit.hears('movitrac', None)
-    assert timing
-    assert bench.write(212, 1) == ACK
-    assert not bench.unit.hears('movitrac', None)

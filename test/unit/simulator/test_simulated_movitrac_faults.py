@@ -223,14 +223,27 @@ def test_fault_45_can_ramp_the_motor_down():
     assert not bench.running
     assert bench.number == CONTROLLER_INHIBIT
     assert bench.fault == LINE
+
+
+def test_another_fault_lets_the_motor_coast_that_fault_45_ramps_down():
+    bench = MovitracBench(timeout_stop='ramps')
+    bench.set(t13_stop=5.0)
+    bench.run(25.0)
+    bench.set(pc_timeout=1.0)
+    bench.wait(1.1)
+    assert bench.running
     trip(bench, OVERCURRENT)
-    bench.bits(0)
+    assert not bench.running
+
+
+def test_an_injected_external_fault_lasts_until_its_cause_is_gone(bench):
+    trip(bench, EXTERNAL, cause_present=True)
     bench.bits(RESET)
-    bench.bits(CW | ENABLE)
-    bench.wait(1.0)
-    bench.wait(0.5)
-    trip(bench, OVERCURRENT)
-    assert not bench.running, 'another fault lets it coast'
+    assert bench.fault == EXTERNAL
+    bench.bits(0)
+    bench.drive.end_fault_causes()
+    bench.bits(RESET)
+    assert bench.fault == 0
 
 
 def test_a_reassigned_terminal_42_turns_nothing(bench):

@@ -55,12 +55,11 @@ class FakePort:
 class Rig:
     """A line whose time is a number."""
 
-    def __init__(self, addresses=(0,), *, settings=None, **options):
+    def __init__(self, addresses=(0,), *, settings=None, option_card='none', **options):
         self.now = 100.0
         way = endpoint('movitrac')
-        self.drives = [
-            simulated_drive('movitrac31', address, settings=settings) for address in addresses
-        ]
+        more = {'settings': settings, 'option_card': option_card}
+        self.drives = [simulated_drive('movitrac31', address, **more) for address in addresses]
         self.port = FakePort(lambda: self.now)
         clock = self.port.clock
         self.line = Line(self.port, way.make(0.0), self.drives, way.timing, clock, **options)
@@ -140,6 +139,15 @@ def test_each_answers_for_itself():
     rig.send(enquiry(25, address=13))
     rig.wait(1.0)
     assert rig.heard == ACK + data(25, bcd(1.0)) + data(25, bcd(3.7))
+
+
+def test_no_master_is_heard_in_master_slave_operation():
+    rig = Rig(option_card='fea')
+    rig.send(select(212, bcd(1)))
+    assert rig.heard == ACK
+    rig.send(enquiry(HEAT_SINK))
+    rig.wait(1.0)
+    assert rig.heard == ACK
 
 
 def test_a_line_that_is_silent_is_a_fault_and_damaged_frames_are_silence():
