@@ -30,6 +30,7 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.family import usual_family
 from nfo_sinus_driver.catalog.parameter import NO_SETTINGS
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -102,16 +103,25 @@ _Column = tuple[str, Callable[[Parameter], str]]
 
 def page() -> str:
     """Return the whole page in Markdown."""
-    parts = [part for name in families() for part in _family(load_family(name))]
+    # the usual one first, so that who looks for it finds it there
+    names = sorted(families(), key=lambda name: name != usual_family())
+    taken: list[str] = []
+    parts = [part for name in names for part in _family(load_family(name), taken)]
     return '\n'.join([_INTRODUCTION, *parts])
 
 
-def _family(family: Family) -> Iterator[str]:
+def _family(family: Family, taken: list[str]) -> Iterator[str]:
+    """
+    Return the parts of a family.
+
+    :param taken: the titles of groups that stand on the page already: their links have a number.
+    """
     yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
     if groups:
-        names = ', '.join(f'[{group}](#{_anchor(group)})' for group in groups)
+        names = ', '.join(f'[{group}](#{_anchor(group, taken)})' for group in groups)
+        taken += groups
         yield _SETTINGS.format(count=len(family.settings), groups=names)
     else:
         yield _NO_SETTINGS
@@ -149,9 +159,13 @@ def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
 
 
 def _long_lists(rows: Sequence[Parameter]) -> Iterator[str]:
+    lists: dict[str, list[str]] = {}
     for parameter in rows:
         if parameter.kind is str and len(parameter.labels) > _MOST_LABELS:
-            yield f'`{parameter.key}` is one of {_labels(parameter)}.\n'
+            lists.setdefault(_labels(parameter), []).append(f'`{parameter.key}`')
+    for labels, keys in lists.items():
+        are = 'is' if len(keys) == 1 else 'are each'
+        yield f'{", ".join(keys)} {are} one of {labels}.\n'
 
 
 def _labels(parameter: Parameter) -> str:
@@ -203,8 +217,9 @@ def _number(number: Fraction) -> str:
     return f'{float(number):.6f}'.rstrip('0').rstrip('.')
 
 
-def _anchor(title: str) -> str:
-    return title.lower().replace(' ', '-')
+def _anchor(title: str, taken: Sequence[str]) -> str:
+    before = taken.count(title)
+    return title.lower().replace(' ', '-') + (f'-{before}' if before else '')
 
 
 _ADDRESSES: tuple[_Column, ...] = (

@@ -383,7 +383,7 @@ class Profile:
 
     :ivar title: what its maker calls it.
     :ivar status_word: what its status word means.
-    :ivar holders: who has control, by the code of the control source.
+    :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
     :ivar setpoints: where set-points go, by control mode.
     :ivar in_charge: finds out by which control method the bus has control of a drive, from whom was
@@ -395,12 +395,13 @@ class Profile:
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
+    :ivar unsigned: what it measures without a sign, which the fact REVERSE of its status tells.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     """
 
     title: str
     status_word: StatusWord
-    holders: Mapping[int, Holder]
+    holders: Mapping[Value, Holder]
     methods: Mapping[str, type[ControlMethod]]
     setpoints: Mapping[str, SetpointTarget]
     in_charge: Callable[[Status | None], Steps[str]]
@@ -411,6 +412,7 @@ class Profile:
     releases: Value = ''
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
+    unsigned: frozenset[Role] = frozenset()
     uncertain: Mapping[str, float] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
