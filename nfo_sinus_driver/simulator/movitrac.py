@@ -46,7 +46,13 @@ class Nack(Refused):
 
 
 class Server(abc.ABC):
-    """What one drive does with the parameters that it is asked for; its family says."""
+    """
+    What one drive does with the parameters that it is asked for; its family says.
+
+    :ivar any_address: it answers whatever address it is asked by, as on RS-232 [M4 §2.4.4].
+    """
+
+    any_address: bool
 
     @abc.abstractmethod
     def enquiry(self, index: int) -> bytes:
@@ -96,13 +102,12 @@ class Movitrac:
     @staticmethod
     def concerns(drive: SimulatedDrive, request: Request) -> bool:
         """Whether the drive is meant; there is no broadcast."""
-        return request.address == drive.address
+        return _server(drive).any_address or request.address == drive.address
 
     @staticmethod
     def answer(drive: SimulatedDrive, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        server = drive.servers['movitrac']
-        assert isinstance(server, Server)
+        server = _server(drive)
         message = movitrac_frames.parse(request.body)
         assert message is not None
         try:
@@ -117,3 +122,9 @@ class Movitrac:
     def instead(request: Request, there: bool) -> Reply | None:
         """Nothing: on a wire, silence is silence."""
         return None
+
+
+def _server(drive: SimulatedDrive) -> Server:
+    server = drive.servers['movitrac']
+    assert isinstance(server, Server)
+    return server

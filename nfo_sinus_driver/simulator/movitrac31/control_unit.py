@@ -21,6 +21,7 @@ Where the manual leaves it open, its :class:`Variant` says.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Mapping
 from collections.abc import Sequence as Several
 from dataclasses import replace
 from typing import Any
@@ -59,6 +60,8 @@ from nfo_sinus_driver.simulator.movitrac31.variant import Variant
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
 from nfo_sinus_driver.simulator.timing import Timing
 
+#: What its line is: on RS-232 the address is of no significance [M4 §2.4.4].
+INTERFACES = ('rs485', 'rs232')
 #: How its line is set, which nothing changes [M4 §2.3.3].
 _TIMING = Timing(9600, '8N1')
 _ADDRESS = 'serial.inverter_address'
@@ -74,7 +77,9 @@ _YES = 100
 #: The slip of the simulated motor, as a share of f_base.
 _SLIP = 0.04
 #: The bits of the control word for manual operation, by the direction of the key.
-_KEY_BITS = {-1: 1, 0: 0, 1: 2}
+_KEY_BITS: Mapping[int, int] = {-1: 1, 0: 0, 1: 2}
+#: What an enable without a direction is shown as, however the drive is read [C105].
+_STOPPED: Mapping[str, Number] = {'normal_stop': Number.NORMAL_STOP, 'enable': Number.ENABLE}
 
 
 class MovitracControlUnit(ControlUnit):
@@ -82,11 +87,13 @@ class MovitracControlUnit(ControlUnit):
     Takes what terminals, line and keypad want.
 
     :param option_card: one of :data:`~.option_cards.CARDS`.
+    :param interface: one of :data:`INTERFACES`.
     :param left_open: fields of :class:`Variant`.
     :raises ValueError: one of these cannot be that.
 
     :ivar variant: what it does where the manual leaves it open.
     :ivar option_card: the card that is plugged in.
+    :ivar any_address: it answers whatever address it is asked by.
     :ivar terminals: the binary terminals.
     :ivar eeprom: what is saved.
     :ivar ambient: the temperature around the drive (°C); set it at any time.
@@ -98,15 +105,26 @@ class MovitracControlUnit(ControlUnit):
     faults: MovitracFaults
 
     def __init__(
-        self, memory: Memory, address: int, *, option_card: str = 'none', **left_open: str
+        self,
+        memory: Memory,
+        address: int,
+        *,
+        option_card: str = CARDS[0],
+        interface: str = INTERFACES[0],
+        **left_open: str,
     ) -> None:
-        if option_card not in CARDS:
-            raise ValueError(f'option_card: choose one of {", ".join(CARDS)}')
+        for name, given, choices in (
+            ('option_card', option_card, CARDS),
+            ('interface', interface, INTERFACES),
+        ):
+            if given not in choices:
+                raise ValueError(f'{name}: choose one of {", ".join(choices)}')
         if _ADDRESS in memory.given:
             raise ValueError(f'{_ADDRESS} is given with --address')
         memory.set(_ADDRESS, address)
         self.variant = Variant(**left_open)
         self.option_card = option_card
+        self.any_address = interface == 'rs232'
         self.terminals = Terminals(memory, option_card)
         self.eeprom = Eeprom(memory)
         self.ambient = AMBIENT
@@ -140,8 +158,8 @@ class MovitracControlUnit(ControlUnit):
                 raise ValueError(f'{protocol} has {usual}, not {timing.baud} {timing.char_format}')
 
     def hears(self, protocol: str, timing: Timing) -> bool:
-        """Whether it hears a master: not in master-slave operation [M4 §2.3.2]."""
-        return not self.memory.raw(_MASTER_SLAVE)
+        """Whether it hears a master: not in master-slave operation on RS-485 [M4 §2.3.2]."""
+        return self.any_address or not self.memory.raw(_MASTER_SLAVE)
 
     def heard(self) -> None:
         """Take note of a valid frame: the cause of a PC time-out is gone."""
@@ -168,7 +186,12 @@ class MovitracControlUnit(ControlUnit):
         return True
 
     def admit(self, key: str) -> None:
-        """Take note that a setting will be written; all may be, at any time."""
+        """Refuse a setting that needs what is not so, and take note of the others."""
+        needs = self.variant.settings_need
+        if needs == 'output_off' and self.motor.driven:
+            raise Nack(ReturnCode.NOT_INHIBITED, 'the motor is driven')
+        if needs == 'inhibit' and not self._commands.now.inhibited:
+            raise Nack(ReturnCode.NEEDS_INHIBIT, 'there is no controller inhibit')
         self.eeprom.before(key)
 
     def stored(self, key: str) -> None:
@@ -376,9 +399,9 @@ class MovitracControlUnit(ControlUnit):
         if command.inhibited or self.factory_left or (self.faults and not self._sequence.moving):
             return Number.INHIBIT
         number = self._sequence.number
-        if self.variant.stop_status == 'enable' and command.enable and not command.direction:
-            stops = number in (Number.NO_ENABLE, Number.NORMAL_STOP)
-            return Number.ENABLE if stops else number
+        stops = number in (Number.NO_ENABLE, Number.NORMAL_STOP)
+        if stops and command.enable and not command.direction:
+            return _STOPPED.get(self.variant.stop_status, number)
         return number
 
     @property

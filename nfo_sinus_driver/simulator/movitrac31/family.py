@@ -32,6 +32,7 @@ from nfo_sinus_driver.simulator.injections import Argument
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.movitrac31.commands import KEYS
+from nfo_sinus_driver.simulator.movitrac31.control_unit import INTERFACES
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
 from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 from nfo_sinus_driver.simulator.movitrac31.server import Server
@@ -86,6 +87,8 @@ _FACTORY: Mapping[str, Value] = {
     'setpoint.n12': 25.0,
     'setpoint.n13': 50.0,
     'status.external_current_limit': 100.0,
+    # the example of [M4 §4]: 821 123 4.11
+    'special.software_system': 0x21123411,
     'status.inverter_type': 'MOVITRAC 31..',
     'status.output_stage': '31C015-503-4-00',
 }
@@ -132,6 +135,7 @@ FAMILY = SimulatedFamily(
     machine=_machine,
     servers={_PROTOCOL: Server},
     options=(
+        Option('interface', 'what its line is (default: rs485)', INTERFACES),
         Option('option_card', 'the option card that is plugged in (default: none)', CARDS),
         *OPTIONS,
     ),

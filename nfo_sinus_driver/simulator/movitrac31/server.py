@@ -46,6 +46,7 @@ class Server(movitrac.Server):
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, MovitracControlUnit)
+        self.any_address = drive.control_unit.any_address
         self._drive = drive
         self._unit = drive.control_unit
         self._memory = drive.memory

@@ -44,8 +44,12 @@ class Variant:
         down as if the enable were gone.
     :ivar outside_remote_control: what becomes of bits and set-point that the control mode has no
         use for [C110]: ``refused``, ``ignored``, or ``taken`` and followed once the mode allows.
-    :ivar stop_status: what a drive with an enable and no direction shows: ``normal_stop`` on the
-        way down and No enable at standstill, or ``enable`` all the time.
+    :ivar stop_status: what a drive shows at standstill with an enable and no direction, after
+        Normal stop on the way down: ``no_enable``, or ``normal_stop`` still; or ``enable``, then
+        and on the way down.
+    :ivar settings_need: what a setting is not written without: ``nothing``; ``output_off``, so that
+        a driven motor refuses it (1Ch); or the controller ``inhibit`` (2Bh). The manual has these
+        return codes and does not say for which parameters.
     :ivar bits_after_power_on: what becomes of bits and set-point by power-off: they are ``cleared``
         or ``kept``.
     :ivar bits_in_fault: what a fault does to the bits: they are ``kept``, or ``cleared``.
@@ -72,7 +76,16 @@ class Variant:
         text='what becomes of function bits and set-point without use in the control mode',
     )
     stop_status: str = _open(
-        'normal_stop', 'enable', text='what is shown with an enable but no direction'
+        'no_enable',
+        'normal_stop',
+        'enable',
+        text='what is shown at standstill with an enable but no direction',
+    )
+    settings_need: str = _open(
+        'nothing',
+        'output_off',
+        'inhibit',
+        text='what has to be so for a setting to be written',
     )
     bits_after_power_on: str = _open(
         'cleared', 'kept', text='what becomes of function bits and set-point by power-off'

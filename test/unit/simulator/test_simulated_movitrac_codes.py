@@ -214,3 +214,27 @@ def test_another_address_counts_at_once(bench):
     assert bench.write(ADDRESS, 7) == ACK
     assert bench.say(enquiry(HEAT_SINK, 0)) == b''
     assert bench.say(enquiry(HEAT_SINK, 7)) != b''
+
+
+def ends_of(parameter):
+    """The least and the greatest value, or code."""
+    if parameter.labels:
+        return min(parameter.labels), max(parameter.labels)
+    return float(parameter.minimum), float(parameter.maximum)
+
+
+def test_every_setting_has_both_its_ends():
+    # but those that end the conversation, and those that stand against each other
+    aside = {LOCK, SAVE_TO_EEPROM, USER_MENU, ADDRESS, 170, 172, 194, 195}
+    settings = [
+        parameter
+        for parameter in MovitracBench().drive.model.settings
+        if not parameter.option and parameter.at('movitrac').index not in aside
+    ]
+    assert len(settings) > 140
+    for parameter in settings:
+        bench, index = MovitracBench(), parameter.at('movitrac').index
+        for end in ends_of(parameter):
+            assert bench.write(index, end) == ACK, (parameter.key, end)
+            assert bench.read(index) == end
+        assert bench.write(index, ends_of(parameter)[1] + 1) == nack(0x15), parameter.key

@@ -20,6 +20,8 @@ from movitrac_bench import CONTROL_MODE
 from movitrac_bench import CW
 from movitrac_bench import ENABLE
 from movitrac_bench import ENABLED
+from movitrac_bench import HEAT_SINK
+from movitrac_bench import INHIBIT
 from movitrac_bench import NO_ENABLE
 from movitrac_bench import NORMAL_STOP
 from movitrac_bench import RAPID_STOP
@@ -28,7 +30,9 @@ from movitrac_bench import REMOTE_SETPOINT
 from movitrac_bench import RESET
 from movitrac_bench import SETPOINT
 from movitrac_bench import STANDARD
+from movitrac_bench import T11_UP
 from movitrac_bench import MovitracBench
+from movitrac_bench import enquiry
 from movitrac_bench import nack
 import pytest
 
@@ -119,7 +123,11 @@ def test_a_reset_bit_that_waits_for_the_mode_is_no_edge_before():
 
 @pytest.mark.parametrize(
     ('stop_status', 'on_the_way', 'standing'),
-    [('normal_stop', NORMAL_STOP, NO_ENABLE), ('enable', ENABLED, ENABLED)],
+    [
+        ('no_enable', NORMAL_STOP, NO_ENABLE),
+        ('normal_stop', NORMAL_STOP, NORMAL_STOP),
+        ('enable', ENABLED, ENABLED),
+    ],
 )
 def test_what_is_shown_with_an_enable_and_no_direction(stop_status, on_the_way, standing):
     bench = MovitracBench(stop_status=stop_status)
@@ -158,6 +166,33 @@ def test_standard_mode_is_never_a_use_for_either():
     bench.run(25.0)
     bench.write(CONTROL_MODE, STANDARD)
     assert bench.write(SETPOINT, 20.0) == nack(0x1B)
+
+
+def test_a_setting_can_need_an_output_stage_that_is_off():
+    bench = MovitracBench(settings_need='output_off')
+    bench.run(25.0)
+    assert bench.write(T11_UP, 2.0) == nack(0x1C)
+    assert bench.write(CONTROL_MODE, STANDARD) == nack(0x1C)
+    assert bench.write(SETPOINT, 20.0) == ACK
+    assert bench.bits(CW | ENABLE | INHIBIT) == ACK
+    assert bench.write(T11_UP, 2.0) == ACK
+
+
+def test_a_setting_can_need_the_controller_inhibit():
+    bench = MovitracBench(
+        settings_need='inhibit', settings={'terminal.input_47': '/Controller inhibit'}
+    )
+    bench.terminal(47, True)
+    assert bench.write(CONTROL_MODE, REMOTE_CONTROL) == nack(0x2B)
+    bench.terminal(47, False)
+    assert bench.write(CONTROL_MODE, REMOTE_CONTROL) == ACK
+
+
+def test_on_rs_232_every_address_is_answered():
+    bench = MovitracBench(interface='rs232', option_card='fea')
+    for address in (0, 12, 255):
+        assert bench.say(enquiry(HEAT_SINK, address)) == bench.say(enquiry(HEAT_SINK))
+        assert bench.say(enquiry(HEAT_SINK)) != b''
 
 
 @pytest.mark.parametrize('option', load('movitrac31').options, ids=lambda option: option.name)
