@@ -51,7 +51,6 @@ from nfo_sinus_driver.simulator.movitrac31.displays import readings
 from nfo_sinus_driver.simulator.movitrac31.eeprom import Eeprom
 from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory
 from nfo_sinus_driver.simulator.movitrac31.fault_memory import MovitracFaults
-from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 from nfo_sinus_driver.simulator.movitrac31.option_cards import places
 from nfo_sinus_driver.simulator.movitrac31.sequence import Sequence
 from nfo_sinus_driver.simulator.movitrac31.terminals import ENABLE
@@ -60,8 +59,6 @@ from nfo_sinus_driver.simulator.movitrac31.variant import Variant
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
 from nfo_sinus_driver.simulator.timing import Timing
 
-#: What its line is: on RS-232 the address is of no significance [M4 §2.4.4].
-INTERFACES = ('rs485', 'rs232')
 #: How its line is set, which nothing changes [M4 §2.3.3].
 _TIMING = Timing(9600, '8N1')
 _ADDRESS = 'serial.inverter_address'
@@ -76,7 +73,8 @@ _FACTORY_TIME = 2.0
 _YES = 100
 #: The slip of the simulated motor, as a share of f_base.
 _SLIP = 0.04
-#: The bits of the control word for manual operation, by the direction of the key.
+#: The bits of the control word for manual operation, by the direction of the key; in which order
+#: they stand [M4 §4] no longer shows.
 _KEY_BITS: Mapping[int, int] = {-1: 1, 0: 0, 1: 2}
 #: What an enable without a direction is shown as, however the drive is read [C105].
 _STOPPED: Mapping[str, Number] = {'normal_stop': Number.NORMAL_STOP, 'enable': Number.ENABLE}
@@ -86,14 +84,10 @@ class MovitracControlUnit(ControlUnit):
     """
     Takes what terminals, line and keypad want.
 
-    :param option_card: one of :data:`~.option_cards.CARDS`.
-    :param interface: one of :data:`INTERFACES`.
-    :param left_open: fields of :class:`Variant`.
+    :param chosen: fields of :class:`Variant`.
     :raises ValueError: one of these cannot be that.
 
-    :ivar variant: what it does where the manual leaves it open.
-    :ivar option_card: the card that is plugged in.
-    :ivar any_address: it answers whatever address it is asked by.
+    :ivar variant: how it is fitted out, and what it does where the manual leaves it open.
     :ivar terminals: the binary terminals.
     :ivar eeprom: what is saved.
     :ivar ambient: the temperature around the drive (°C); set it at any time.
@@ -104,28 +98,12 @@ class MovitracControlUnit(ControlUnit):
 
     faults: MovitracFaults
 
-    def __init__(
-        self,
-        memory: Memory,
-        address: int,
-        *,
-        option_card: str = CARDS[0],
-        interface: str = INTERFACES[0],
-        **left_open: str,
-    ) -> None:
-        for name, given, choices in (
-            ('option_card', option_card, CARDS),
-            ('interface', interface, INTERFACES),
-        ):
-            if given not in choices:
-                raise ValueError(f'{name}: choose one of {", ".join(choices)}')
+    def __init__(self, memory: Memory, address: int, **chosen: str) -> None:
         if _ADDRESS in memory.given:
             raise ValueError(f'{_ADDRESS} is given with --address')
         memory.set(_ADDRESS, address)
-        self.variant = Variant(**left_open)
-        self.option_card = option_card
-        self.any_address = interface == 'rs232'
-        self.terminals = Terminals(memory, option_card)
+        self.variant = Variant(**chosen)
+        self.terminals = Terminals(memory, self.variant.option_card)
         self.eeprom = Eeprom(memory)
         self.ambient = AMBIENT
         self.factory_left = 0.0
@@ -135,6 +113,9 @@ class MovitracControlUnit(ControlUnit):
         self._fault_memory = FaultMemory()
         self._sequence = Sequence(self.motor)
         self._clockwise = True
+        #: A terminal said so when it was last looked at.
+        self._external_fault = False
+        #: How long no frame has come, and how long a fault has been without a cause (s).
         self._silence = 0.0
         self._without_cause = 0.0
 
@@ -144,6 +125,11 @@ class MovitracControlUnit(ControlUnit):
     def address(self) -> int:
         """The address that is in effect, P842."""
         return round(self.memory.number(_ADDRESS))
+
+    @property
+    def any_address(self) -> bool:
+        """Whether it answers whatever address it is asked by."""
+        return self.variant.interface == 'rs232'
 
     @property
     def response_time(self) -> float:
@@ -198,8 +184,6 @@ class MovitracControlUnit(ControlUnit):
         """Take note of a setting that has a new value."""
         self.eeprom.after(key)
         self._commands.changed(key)
-        if key.startswith('terminal.'):
-            self._external_fault_ends()
 
     def _take(self, key: str, raw: int, of_use: bool) -> None:
         if not of_use and self.variant.outside_remote_control == 'ignored':
@@ -246,7 +230,6 @@ class MovitracControlUnit(ControlUnit):
     def _switch(self, number: int, closed: bool) -> None:
         before = self.terminals.on(Input.RESET)
         self.terminals.switch(number, closed)
-        self._external_fault_ends()
         if self.terminals.on(Input.RESET) and not before:
             self.reset()
 
@@ -288,9 +271,13 @@ class MovitracControlUnit(ControlUnit):
         if self.variant.bits_in_fault == 'cleared':
             self.memory.put(FUNCTION_BITS, 0)
 
-    def _external_fault_ends(self) -> None:
-        if not self.terminals.opened(Input.NOT_EXTERNAL_FAULT):
+    def _watch_external_fault(self) -> None:
+        opened = self.terminals.opened(Input.NOT_EXTERNAL_FAULT)
+        if opened and EXTERNAL_FAULT not in self.faults.codes:
+            self.trip(EXTERNAL_FAULT, cause_present=True)
+        if self._external_fault and not opened:
             self.faults.end_cause(EXTERNAL_FAULT)
+        self._external_fault = opened
 
     @property
     def _resets_itself(self) -> bool:
@@ -308,9 +295,7 @@ class MovitracControlUnit(ControlUnit):
         if lost and PC_TIMEOUT not in self.faults.codes:
             self.trip(PC_TIMEOUT, cause_present=True)
         self._without_cause = self._without_cause + dt if self._resets_itself else 0.0
-        if self._resets_itself and self._without_cause >= self.memory.number(
-            'special.restart_time'
-        ):
+        if self._without_cause >= self.memory.number('special.restart_time'):
             self.reset()
         if self.factory_left:
             self.factory_left = max(0.0, self.factory_left - dt)
@@ -327,9 +312,7 @@ class MovitracControlUnit(ControlUnit):
 
     def settle(self) -> None:
         """Let the output stage do what is wanted, unless something keeps it off."""
-        opened = self.terminals.opened(Input.NOT_EXTERNAL_FAULT)
-        if opened and EXTERNAL_FAULT not in self.faults.codes:
-            self.trip(EXTERNAL_FAULT, cause_present=True)
+        self._watch_external_fault()
         command = self._commands.now
         if command.parameters is not self._parameters:
             self._parameters = command.parameters
@@ -384,7 +367,7 @@ class MovitracControlUnit(ControlUnit):
         if key == 'status.terminals':
             return self._terminal_word
         if key == 'status.options':
-            x20, x21 = places(self.option_card)
+            x20, x21 = places(self.variant.option_card)
             return x20 << 16 | x21 << 8
         if key == 'status.manual_control_word':
             return _KEY_BITS[self._commands.key] if self._commands.manual else 0
@@ -413,7 +396,7 @@ class MovitracControlUnit(ControlUnit):
     def status_word(self) -> int:
         """Index 284: fault, status, option cards and flags, a byte each."""
         fault = self.faults.shown - FAULTS if self.faults else 0
-        x20, x21 = places(self.option_card)
+        x20, x21 = places(self.variant.option_card)
         flags = Flag.VOLTAGE_SIGNAL
         flags |= Flag.SECOND_SET if self._second_set else Flag(0)
         flags |= Flag.CW if self._clockwise else Flag(0)

@@ -26,15 +26,12 @@ from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog.codec import Bcd
 from nfo_sinus_driver.catalog.codec import codec_of
-from nfo_sinus_driver.simulator.family import Option
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import Argument
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.movitrac31.commands import KEYS
-from nfo_sinus_driver.simulator.movitrac31.control_unit import INTERFACES
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
-from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 from nfo_sinus_driver.simulator.movitrac31.server import Server
 from nfo_sinus_driver.simulator.movitrac31.variant import OPTIONS
 
@@ -134,11 +131,7 @@ FAMILY = SimulatedFamily(
     factory=_FACTORY,
     machine=_machine,
     servers={_PROTOCOL: Server},
-    options=(
-        Option('interface', 'what its line is (default: rs485)', INTERFACES),
-        Option('option_card', 'the option card that is plugged in (default: none)', CARDS),
-        *OPTIONS,
-    ),
+    options=OPTIONS,
     verbs={
         'terminal': Verb(
             'close or open a binary input',

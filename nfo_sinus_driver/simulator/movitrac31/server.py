@@ -84,7 +84,7 @@ class Server(movitrac.Server):
         parameter = self._by_index.get(index)
         if parameter is None:
             raise Nack(ReturnCode.ILLEGAL_INDEX, f'there is no index {index}')
-        if not suffices(self._unit.option_card, parameter.option):
+        if not suffices(self._unit.variant.option_card, parameter.option):
             raise Nack(ReturnCode.OPTION_MISSING, f'{parameter.key} needs {parameter.option}')
         return parameter
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the manual leaves open of a MOVITRAC 31..: a simulated one does it this way or that."""
+"""How a simulated MOVITRAC 31.. is fitted out, and what it does where the manual is open."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from dataclasses import field
 from dataclasses import fields
 
 from nfo_sinus_driver.simulator.family import Option
+from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS
 
 
-def _open(usual: str, *others: str, text: str) -> str:
-    """Return a field for what can be read in several ways, and the usual one."""
+def _one_of(usual: str, *others: str, text: str) -> str:
+    """Return a field that can be several things, and what it is by default."""
     choices = (usual, *others)
     found: str = field(default=usual, metadata={'choices': choices, 'text': text})
     return found
@@ -33,8 +34,10 @@ def _open(usual: str, *others: str, text: str) -> str:
 @dataclass(frozen=True)
 class Variant:
     """
-    One way to read the manual; by default the one that its words are nearest to.
+    One way to fit out a drive, and to read the manual: by default the one its words are nearest to.
 
+    :ivar option_card: the card that is plugged in.
+    :ivar interface: what its line is; on ``rs232`` its address is of no significance [M4 §2.4.4].
     :ivar negative_nibble: the first half-byte of a negative number [C70]: the figure is missing.
     :ivar status_numbers: how status and fault stand in index 284 [C105].
     :ivar enable_bit: ``ored``: with an enable at the terminals the bit for it changes nothing, for
@@ -56,41 +59,43 @@ class Variant:
     :raises ValueError: one of them cannot be that.
     """
 
-    negative_nibble: str = _open('F', '8', '1', text='first half-byte of a negative number')
-    status_numbers: str = _open(
+    option_card: str = _one_of(*CARDS, text='the option card that is plugged in')
+    interface: str = _one_of('rs485', 'rs232', text='what its line is')
+    negative_nibble: str = _one_of('F', '8', '1', text='first half-byte of a negative number')
+    status_numbers: str = _one_of(
         'binary', 'bcd', text='how status and fault number stand in index 284'
     )
-    enable_bit: str = _open(
+    enable_bit: str = _one_of(
         'ored',
         'anded',
         'either',
         text='whether the enable of the terminals will do, the bit is needed too, or either does',
     )
-    timeout_stop: str = _open(
+    timeout_stop: str = _one_of(
         'coasts', 'ramps', text='what fault 45, PC time-out, does to the motor'
     )
-    outside_remote_control: str = _open(
+    outside_remote_control: str = _one_of(
         'ignored',
         'refused',
         'taken',
         text='what becomes of function bits and set-point without use in the control mode',
     )
-    stop_status: str = _open(
+    stop_status: str = _one_of(
         'no_enable',
         'normal_stop',
         'enable',
         text='what is shown at standstill with an enable but no direction',
     )
-    settings_need: str = _open(
+    settings_need: str = _one_of(
         'nothing',
         'output_off',
         'inhibit',
         text='what has to be so for a setting to be written',
     )
-    bits_after_power_on: str = _open(
+    bits_after_power_on: str = _one_of(
         'cleared', 'kept', text='what becomes of function bits and set-point by power-off'
     )
-    bits_in_fault: str = _open(
+    bits_in_fault: str = _one_of(
         'kept', 'cleared', text='what a fault does to the function bits'
     )
 

@@ -15,6 +15,7 @@
 """Frames of the MOVITRAC's protocol: golden ones of [M4], how they are cut, and their sums."""
 
 from hypothesis import given
+from hypothesis import settings
 from hypothesis import strategies as st
 from movitrac_bench import ACK
 from movitrac_bench import MovitracBench
@@ -72,6 +73,7 @@ def test_what_a_drive_says():
     assert movitrac_frames.refuse(ReturnCode.TOO_LARGE) == bytes.fromhex('F3 15 08') == nack(0x15)
 
 
+@settings(deadline=None)
 @given(requests, st.integers(0, 12), st.integers(1, 255))
 def test_a_damaged_byte_is_noticed(frame, place, change):
     damaged = bytearray(frame)
@@ -79,6 +81,7 @@ def test_a_damaged_byte_is_noticed(frame, place, change):
     assert Movitrac.unwrap(bytes(damaged)) is None
 
 
+@settings(deadline=None)
 @given(requests, st.binary(max_size=20))
 def test_a_frame_is_cut_where_it_ends(frame, rest):
     assert Movitrac.cut(frame + rest) == len(frame)
@@ -86,6 +89,7 @@ def test_a_frame_is_cut_where_it_ends(frame, rest):
     assert Movitrac.unwrap(frame).body == frame
 
 
+@settings(deadline=None)
 @given(st.binary(min_size=1).filter(lambda noise: not set(noise) & {0xB5, 0xA9, 0xAD}), requests)
 def test_noise_without_a_start_delimiter_is_no_part_of_a_frame(noise, frame):
     assert Movitrac.cut(noise) == len(noise)

@@ -14,6 +14,9 @@
 
 """What a MOVITRAC 31.. does not carry out, and the return code that says why [M4 §2.1.2]."""
 
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
 from movitrac_bench import ACK
 from movitrac_bench import ADDRESS
 from movitrac_bench import CONTROL_MODE
@@ -33,11 +36,20 @@ from movitrac_bench import long_data
 from movitrac_bench import long_select
 from movitrac_bench import nack
 from movitrac_bench import select
+from movitrac_bench import summed
 import pytest
 
 N2_OFFSET = 98
 GEAR_RATIO, FRS_COUNTER, LIMIT_SWITCH_CW = 263, 254, 1001
 USER_MENU, SAVE_TO_EEPROM = 270, 236
+
+#: Whatever fits in a frame: any bytes, and decimal digits, whole numbers above all.
+VALUES = st.one_of(
+    st.binary(min_size=4, max_size=4),
+    st.binary(min_size=8, max_size=8),
+    st.integers(0, 5000).map(lambda number: bcd(number / 20)),
+    st.integers(0, 50).map(bcd),
+)
 
 
 @pytest.fixture
@@ -238,3 +250,18 @@ def test_every_setting_has_both_its_ends():
             assert bench.write(index, end) == ACK, (parameter.key, end)
             assert bench.read(index) == end
         assert bench.write(index, ends_of(parameter)[1] + 1) == nack(0x15), parameter.key
+
+
+@settings(deadline=None)
+@given(st.data())
+def test_whatever_is_written_is_answered(data):
+    bench = MovitracBench(interface='rs232', option_card='fpi')
+    known = sorted(one.at('movitrac').index for one in bench.drive.model.values())
+    index = data.draw(st.sampled_from(known) | st.integers(0, 0xFFFF))
+    value = data.draw(VALUES)
+    frame = select(index, value) if len(value) == 4 else long_select(index, value)
+    answer = bench.say(frame)
+    assert answer == ACK or (answer[0] == 0xF3 and answer == summed(answer[:-1]))
+    answer = bench.say(enquiry(index))
+    assert answer[0] in {0xC8, 0xAC, 0xF3}
+    assert answer == summed(answer[:-1])
