@@ -105,8 +105,11 @@ class Variant:
                 raise ValueError(f'{one.name}: choose one of {", ".join(one.metadata["choices"])}')
 
 
+def _option(name: str, text: str, choices: tuple[str, ...]) -> Option:
+    return Option(name, f'of a MOVITRAC: {text} (default: {choices[0]})', choices)
+
+
 #: The same as options of a drive.
 OPTIONS = tuple(
-    Option(one.name, f'{one.metadata["text"]} (default: {one.default})', one.metadata['choices'])
-    for one in fields(Variant)
+    _option(one.name, one.metadata['text'], one.metadata['choices']) for one in fields(Variant)
 )

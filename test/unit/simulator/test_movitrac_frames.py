@@ -17,14 +17,14 @@
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
-from movitrac_bench import ACK
-from movitrac_bench import MovitracBench
-from movitrac_bench import data
-from movitrac_bench import enquiry
-from movitrac_bench import long_data
-from movitrac_bench import long_select
-from movitrac_bench import nack
-from movitrac_bench import select
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import MovitracBench
+from movitrac_drive_bench import data
+from movitrac_drive_bench import enquiry
+from movitrac_drive_bench import long_data
+from movitrac_drive_bench import long_select
+from movitrac_drive_bench import nack
+from movitrac_drive_bench import select
 import pytest
 
 from nfo_sinus_driver.simulator import movitrac_frames

@@ -14,32 +14,32 @@
 
 """A MOVITRAC 31.. that is commanded: by its terminals, by the line, by its keypad."""
 
-from movitrac_bench import ACK
-from movitrac_bench import CCW
-from movitrac_bench import CHANGE_DIRECTION
-from movitrac_bench import CONTROL_MODE
-from movitrac_bench import CONTROLLER_INHIBIT
-from movitrac_bench import CW
-from movitrac_bench import ENABLE
-from movitrac_bench import ENABLED
-from movitrac_bench import F_MIN
-from movitrac_bench import FIELDBUS
-from movitrac_bench import FREQUENCY
-from movitrac_bench import INHIBIT
-from movitrac_bench import INPUT_47
-from movitrac_bench import MANUAL_OPERATION
-from movitrac_bench import NO_ENABLE
-from movitrac_bench import NORMAL_STOP
-from movitrac_bench import RAPID_STOP
-from movitrac_bench import REMOTE_CONTROL
-from movitrac_bench import REMOTE_SETPOINT
-from movitrac_bench import SECOND_RAMP
-from movitrac_bench import SECOND_SET
-from movitrac_bench import SETPOINT
-from movitrac_bench import SPEED
-from movitrac_bench import STANDARD
-from movitrac_bench import TERMINALS
-from movitrac_bench import MovitracBench
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import CCW
+from movitrac_drive_bench import CHANGE_DIRECTION
+from movitrac_drive_bench import CONTROL_MODE
+from movitrac_drive_bench import CONTROLLER_INHIBIT
+from movitrac_drive_bench import CW
+from movitrac_drive_bench import ENABLE
+from movitrac_drive_bench import ENABLED
+from movitrac_drive_bench import F_MIN
+from movitrac_drive_bench import FIELDBUS
+from movitrac_drive_bench import FREQUENCY
+from movitrac_drive_bench import INHIBIT
+from movitrac_drive_bench import INPUT_47
+from movitrac_drive_bench import MANUAL_OPERATION
+from movitrac_drive_bench import NO_ENABLE
+from movitrac_drive_bench import NORMAL_STOP
+from movitrac_drive_bench import RAPID_STOP
+from movitrac_drive_bench import REMOTE_CONTROL
+from movitrac_drive_bench import REMOTE_SETPOINT
+from movitrac_drive_bench import SECOND_RAMP
+from movitrac_drive_bench import SECOND_SET
+from movitrac_drive_bench import SETPOINT
+from movitrac_drive_bench import SPEED
+from movitrac_drive_bench import STANDARD
+from movitrac_drive_bench import TERMINALS
+from movitrac_drive_bench import MovitracBench
 import pytest
 
 OFFSET_MANUAL = 197

@@ -17,18 +17,18 @@
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
-from movitrac_bench import ADDRESS
-from movitrac_bench import CONTROL_MODE
-from movitrac_bench import F_MAX
-from movitrac_bench import F_MIN
-from movitrac_bench import FREQUENCY
-from movitrac_bench import INPUT_42
-from movitrac_bench import INPUT_47
-from movitrac_bench import PC_TIMEOUT
-from movitrac_bench import SETPOINT
-from movitrac_bench import STATUS
-from movitrac_bench import T13_STOP
-from movitrac_bench import MovitracBench
+from movitrac_drive_bench import ADDRESS
+from movitrac_drive_bench import CONTROL_MODE
+from movitrac_drive_bench import F_MAX
+from movitrac_drive_bench import F_MIN
+from movitrac_drive_bench import FREQUENCY
+from movitrac_drive_bench import INPUT_42
+from movitrac_drive_bench import INPUT_47
+from movitrac_drive_bench import PC_TIMEOUT
+from movitrac_drive_bench import SETPOINT
+from movitrac_drive_bench import STATUS
+from movitrac_drive_bench import T13_STOP
+from movitrac_drive_bench import MovitracBench
 import pytest
 
 from nfo_sinus_driver.simulator.family import load

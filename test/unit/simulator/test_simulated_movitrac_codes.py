@@ -17,26 +17,26 @@
 from hypothesis import given
 from hypothesis import settings
 from hypothesis import strategies as st
-from movitrac_bench import ACK
-from movitrac_bench import ADDRESS
-from movitrac_bench import CONTROL_MODE
-from movitrac_bench import FACTORY_SETTING
-from movitrac_bench import HEAT_SINK
-from movitrac_bench import INPUT_48
-from movitrac_bench import LOCK
-from movitrac_bench import REMOTE_CONTROL
-from movitrac_bench import SETPOINT
-from movitrac_bench import STATUS
-from movitrac_bench import T11_UP
-from movitrac_bench import T13_STOP
-from movitrac_bench import MovitracBench
-from movitrac_bench import bcd
-from movitrac_bench import enquiry
-from movitrac_bench import long_data
-from movitrac_bench import long_select
-from movitrac_bench import nack
-from movitrac_bench import select
-from movitrac_bench import summed
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import ADDRESS
+from movitrac_drive_bench import CONTROL_MODE
+from movitrac_drive_bench import FACTORY_SETTING
+from movitrac_drive_bench import HEAT_SINK
+from movitrac_drive_bench import INPUT_48
+from movitrac_drive_bench import LOCK
+from movitrac_drive_bench import REMOTE_CONTROL
+from movitrac_drive_bench import SETPOINT
+from movitrac_drive_bench import STATUS
+from movitrac_drive_bench import T11_UP
+from movitrac_drive_bench import T13_STOP
+from movitrac_drive_bench import MovitracBench
+from movitrac_drive_bench import bcd
+from movitrac_drive_bench import enquiry
+from movitrac_drive_bench import long_data
+from movitrac_drive_bench import long_select
+from movitrac_drive_bench import nack
+from movitrac_drive_bench import select
+from movitrac_drive_bench import summed
 import pytest
 
 N2_OFFSET = 98

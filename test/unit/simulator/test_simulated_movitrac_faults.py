@@ -14,21 +14,21 @@
 
 """Faults of a MOVITRAC 31..: the motor coasts, they are remembered, and reset by an edge."""
 
-from movitrac_bench import ACK
-from movitrac_bench import CONTROLLER_INHIBIT
-from movitrac_bench import CW
-from movitrac_bench import ENABLE
-from movitrac_bench import FAULT_T0
-from movitrac_bench import FAULT_T1
-from movitrac_bench import FREQUENCY
-from movitrac_bench import HEAT_SINK
-from movitrac_bench import INPUT_42
-from movitrac_bench import INPUT_47
-from movitrac_bench import NO_ENABLE
-from movitrac_bench import RAPID_STOP
-from movitrac_bench import RESET
-from movitrac_bench import STANDARD
-from movitrac_bench import MovitracBench
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import CONTROLLER_INHIBIT
+from movitrac_drive_bench import CW
+from movitrac_drive_bench import ENABLE
+from movitrac_drive_bench import FAULT_T0
+from movitrac_drive_bench import FAULT_T1
+from movitrac_drive_bench import FREQUENCY
+from movitrac_drive_bench import HEAT_SINK
+from movitrac_drive_bench import INPUT_42
+from movitrac_drive_bench import INPUT_47
+from movitrac_drive_bench import NO_ENABLE
+from movitrac_drive_bench import RAPID_STOP
+from movitrac_drive_bench import RESET
+from movitrac_drive_bench import STANDARD
+from movitrac_drive_bench import MovitracBench
 import pytest
 
 OVERCURRENT, OVERHEATING, EXTERNAL, LINE = 1, 6, 27, 45

@@ -17,16 +17,16 @@
 import json
 import os
 
-from movitrac_bench import ACK
-from movitrac_bench import BITS
-from movitrac_bench import CW
-from movitrac_bench import ENABLE
-from movitrac_bench import HEAT_SINK
-from movitrac_bench import bcd
-from movitrac_bench import data
-from movitrac_bench import enquiry
-from movitrac_bench import nack
-from movitrac_bench import select
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import BITS
+from movitrac_drive_bench import CW
+from movitrac_drive_bench import ENABLE
+from movitrac_drive_bench import HEAT_SINK
+from movitrac_drive_bench import bcd
+from movitrac_drive_bench import data
+from movitrac_drive_bench import enquiry
+from movitrac_drive_bench import nack
+from movitrac_drive_bench import select
 import pytest
 
 from nfo_sinus_driver.simulator.endpoints import endpoint

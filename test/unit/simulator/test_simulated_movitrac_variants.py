@@ -14,26 +14,26 @@
 
 """What the manual of the MOVITRAC 31.. leaves open: each reading is a switch."""
 
-from movitrac_bench import ACK
-from movitrac_bench import CCW
-from movitrac_bench import CONTROL_MODE
-from movitrac_bench import CW
-from movitrac_bench import ENABLE
-from movitrac_bench import ENABLED
-from movitrac_bench import HEAT_SINK
-from movitrac_bench import INHIBIT
-from movitrac_bench import NO_ENABLE
-from movitrac_bench import NORMAL_STOP
-from movitrac_bench import RAPID_STOP
-from movitrac_bench import REMOTE_CONTROL
-from movitrac_bench import REMOTE_SETPOINT
-from movitrac_bench import RESET
-from movitrac_bench import SETPOINT
-from movitrac_bench import STANDARD
-from movitrac_bench import T11_UP
-from movitrac_bench import MovitracBench
-from movitrac_bench import enquiry
-from movitrac_bench import nack
+from movitrac_drive_bench import ACK
+from movitrac_drive_bench import CCW
+from movitrac_drive_bench import CONTROL_MODE
+from movitrac_drive_bench import CW
+from movitrac_drive_bench import ENABLE
+from movitrac_drive_bench import ENABLED
+from movitrac_drive_bench import HEAT_SINK
+from movitrac_drive_bench import INHIBIT
+from movitrac_drive_bench import NO_ENABLE
+from movitrac_drive_bench import NORMAL_STOP
+from movitrac_drive_bench import RAPID_STOP
+from movitrac_drive_bench import REMOTE_CONTROL
+from movitrac_drive_bench import REMOTE_SETPOINT
+from movitrac_drive_bench import RESET
+from movitrac_drive_bench import SETPOINT
+from movitrac_drive_bench import STANDARD
+from movitrac_drive_bench import T11_UP
+from movitrac_drive_bench import MovitracBench
+from movitrac_drive_bench import enquiry
+from movitrac_drive_bench import nack
 import pytest
 
 from nfo_sinus_driver.simulator.family import load
