@@ -39,8 +39,18 @@ class Frame(NamedTuple):
     data: bytes
 
 
+#: What is wrong where frames do not leave.
+CANNOT_SEND = 'frames do not leave: is anybody else on the bus, with this bit rate?'
+
+
 class CanPort(Protocol):
-    """What carries frames; it drops those of which it is sure that nobody wants them."""
+    """
+    What carries frames.
+
+    :ivar trouble: what keeps frames off the bus, as far as it knows; ``''``: nothing.
+    """
+
+    trouble: str
 
     def open(self) -> None:
         """
@@ -54,9 +64,9 @@ class CanPort(Protocol):
 
     def send(self, frame: Frame) -> None:
         """
-        Hand a frame over.
+        Hand a frame over; :attr:`trouble` says where it could not leave.
 
-        :raises PortError: it is gone, or takes nothing.
+        :raises PortError: it is gone.
         """
 
     def receive(self, until: float) -> Sequence[Frame]:
