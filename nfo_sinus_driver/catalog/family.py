@@ -240,6 +240,11 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
     labels = {int(code, 0): label for code, label in pairs}
     if len(labels) != len(pairs) or len(set(labels.values())) != len(pairs):
         raise ValueError('a code or a label stands twice')
+    steps = tuple(_steps(row.get('steps', ''), minimum))
+    counts = [number for pair in steps for number in pair] + [Fraction(code) for code in labels]
+    for address in addresses.values():
+        if any((number / address.factor).denominator != 1 for number in counts):
+            raise ValueError(f'not all steps are counts on {address.protocol}')
     return Parameter(
         key=row['parameter'],
         name=row['name'],
@@ -249,15 +254,29 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
         unit=row['unit'],
         minimum=minimum,
         maximum=maximum,
+        steps=steps,
         decimals=int(row['decimals']),
         labels=labels,
         access=Access(row['access']),
         stopped={'init': True, 'run': False, '': False}[row['when']],
         since=table.fraction(row['since']),
         older={'yes': True, '': False}[row['older']],
+        option=row.get('option', ''),
         description=row['description'],
         source=row['source'],
     )
+
+
+def _steps(text: str, minimum: Fraction | None) -> Iterator[tuple[Fraction, Fraction]]:
+    """Return what ``0.05|10:0.5`` says: by 0.05 from the minimum, by 0.5 from 10 on."""
+    start = minimum
+    for part in text.split('|') if text else ():
+        *begins, step = part.split(':')
+        if begins:
+            start = Fraction(begins[0])
+        if start is None:
+            raise ValueError('steps begin at the minimum, and there is none')
+        yield start, Fraction(step)
 
 
 def _status_code(row: table.Row) -> StatusCode:

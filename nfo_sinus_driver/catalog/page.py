@@ -32,6 +32,8 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.family import usual_family
+from nfo_sinus_driver.catalog.parameter import NO_SETTINGS
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
 
@@ -66,6 +68,7 @@ How to read the tables:
 - **Step** is the difference between two values that the drive can hold. Two steps: the one over
   Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of
   the process regulator are the factory's; the drive's scale factors change them.
+- **Option**: the option cards of which the drive needs one for it.
 - **Stopped**: it can only be written while the motor stands.
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
   low word first), **PROFIBUS** its parameter number, **CANopen** its index.
@@ -108,16 +111,25 @@ _Column = tuple[str, Callable[[Parameter], str]]
 
 def page() -> str:
     """Return the whole page in Markdown."""
-    parts = [part for name in families() for part in _family(load_family(name))]
+    # the usual one first, so that who looks for it finds it there
+    names = sorted(families(), key=lambda name: name != usual_family())
+    taken: list[str] = []
+    parts = [part for name in names for part in _family(load_family(name), taken)]
     return '\n'.join([_INTRODUCTION, *parts])
 
 
-def _family(family: Family) -> Iterator[str]:
+def _family(family: Family, taken: list[str]) -> Iterator[str]:
+    """
+    Return the parts of a family.
+
+    :param taken: the titles of groups that stand on the page already: their links have a number.
+    """
     yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
     if groups:
-        names = ', '.join(f'[{group}](#{_anchor(group)})' for group in groups)
+        names = ', '.join(f'[{group}](#{_anchor(group, taken)})' for group in groups)
+        taken += groups
         yield _SETTINGS.format(count=len(family.settings), groups=names)
     else:
         yield _NO_SETTINGS
@@ -126,6 +138,11 @@ def _family(family: Family) -> Iterator[str]:
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
+    only_read = [row for row in family.values() if row.access is Access.READ]
+    only_read = [row for row in only_read if row.group not in NO_SETTINGS]
+    if only_read:
+        yield '### Only read\n'
+        yield _table(_OTHER_COLUMNS, only_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
         if rows:
@@ -152,9 +169,13 @@ def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
 
 
 def _long_lists(rows: Sequence[Parameter]) -> Iterator[str]:
+    lists: dict[str, list[str]] = {}
     for parameter in rows:
         if parameter.kind is str and len(parameter.labels) > _MOST_LABELS:
-            yield f'`{parameter.key}` is one of {_labels(parameter)}.\n'
+            lists.setdefault(_labels(parameter), []).append(f'`{parameter.key}`')
+    for labels, keys in lists.items():
+        are = 'is' if len(keys) == 1 else 'are each'
+        yield f'{", ".join(keys)} {are} one of {labels}.\n'
 
 
 def _labels(parameter: Parameter) -> str:
@@ -178,6 +199,8 @@ def _values(parameter: Parameter) -> str:
 def _step(parameter: Parameter) -> str:
     if parameter.labels:
         return ''
+    if parameter.steps:
+        return parameter.shown_steps
     steps = [_number(address.factor) for address in parameter.addresses.values()]
     return ', '.join(dict.fromkeys(steps))
 
@@ -205,8 +228,9 @@ def _number(number: Fraction) -> str:
     return f'{float(number):.6f}'.rstrip('0').rstrip('.')
 
 
-def _anchor(title: str) -> str:
-    return title.lower().replace(' ', '-')
+def _anchor(title: str, taken: Sequence[str]) -> str:
+    before = taken.count(title)
+    return title.lower().replace(' ', '-') + (f'-{before}' if before else '')
 
 
 @functools.cache
@@ -229,6 +253,7 @@ _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('Unit', lambda row: row.unit),
     ('Step', _step),
     ('Stopped', lambda row: 'yes' if row.stopped else ''),
+    ('Option', lambda row: row.option),
 )
 _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Name', lambda row: row.name),
@@ -237,6 +262,7 @@ _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Values', _values),
     ('Unit', lambda row: row.unit),
     ('Step', lambda row: _step(row) if row.unit or row.kind is float else ''),
+    ('Option', lambda row: row.option),
     ('Type', _types),
 )
 

@@ -365,7 +365,8 @@ class Drive:
             raise DriveError(Report(Cause.ENDING)) from None
 
     def _explain(self, error: LinkError) -> Report:
-        return explain(error, self._unit, known=self._inverter.identity is not None)
+        known = self._inverter.identity is not None
+        return explain(error, self._unit, check=None if known else self._bus.protocol.check)
 
     async def _command(
         self, command: Callable[[Controller], Awaitable[Report]], *, connected: bool = False

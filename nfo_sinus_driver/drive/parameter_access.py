@@ -120,7 +120,7 @@ class ParameterAccess:
         low, high = parameter.span(self.protocol)
         low = max(low, Fraction(0)) if parameter.never_negative else low
         high = self._highest(key) or high
-        return float(low), float(high), float(parameter.factor(self.protocol))
+        return float(low), float(high), float(parameter.step(self.protocol))
 
     def _highest(self, key: str) -> Fraction | None:
         """Return the end that the line sets: beyond it a drive could not be asked again [C10]."""

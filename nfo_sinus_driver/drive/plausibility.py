@@ -24,10 +24,10 @@ from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 
-_CODES: Mapping[Role | None, Callable[[Family, int], bool]] = {
+_CODES: Mapping[Role | None, Callable[[Family, Value], bool]] = {
     Role.STATUS_CODE: lambda model, code: code in model.status_codes,
-    Role.CONTROL_SOURCE: lambda model, code: code in model.profile.holders,
-    Role.STATUS_WORD: lambda model, word: _may_say(model, word),
+    Role.CONTROL_SOURCE: lambda model, source: source in model.profile.holders,
+    Role.STATUS_WORD: lambda model, word: _may_say(model, int(word)),
 }
 
 
@@ -35,7 +35,7 @@ def can_be(model: Family, key: str, value: Value) -> bool:
     """Tell whether a value of a drive is one that its manual knows, as far as the manual says."""
     parameter, role = model[key], model.role_of.get(key)
     if role in _CODES:
-        return _CODES[role](model, int(value))
+        return _CODES[role](model, value)
     if isinstance(value, str):
         return not parameter.labels or value in parameter.labels.values()
     most = abs(value) if role is None else model.profile.most.get(role, abs(value))

@@ -48,7 +48,7 @@ from nfo_sinus_driver.drive.settings import AUTO
 MADE_UP = Path(__file__).parent / 'made_up'
 PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
 RUN, RESET = 1 << 0, 1 << 3
-RUNNING, TRIPPED, LINE, BACKWARDS = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+RUNNING, TRIPPED, BACKWARDS = 1 << 0, 1 << 1, 1 << 3
 
 
 class Bolt(FarEnd):
@@ -78,7 +78,7 @@ class Bolt(FarEnd):
             registers[HERTZ] = has + max(-self.step, min(self.step, wanted - has))
         runs = (registers[BITS] & RUN or registers[HERTZ]) and not self.fault
         registers[TOLD] = self.fault or (2 if runs else 1)
-        facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault) | LINE * registers[SOURCE]
+        facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault)
         registers[TOLD + 1] = facts | BACKWARDS * self.backwards
 
     def was_written(self, before: dict[int, int]) -> None:
@@ -140,9 +140,9 @@ def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: B
     seen = drive.snapshot.status
     assert seen is not None
     assert (seen.code, drive.snapshot.text) == (2, 'Run')
-    assert seen.word == 2 << 16 | RUNNING | LINE
+    assert seen.word == 2 << 16 | RUNNING
     # the code is not published a second time
-    assert seen.shown_word == RUNNING | LINE
+    assert seen.shown_word == RUNNING
     with bolt.lock:
         bolt.reads.clear()
     wait_until(lambda: bolt.reads.count(TOLD) > 20)
@@ -162,6 +162,24 @@ def test_the_word_tells_the_sign_of_what_is_measured(bolt: Bolt, bus: Bus) -> No
     wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (-40.0, -1200.0))
     # in size it has not changed
     assert drive.snapshot.status is not None and drive.snapshot.status.keeps_running
+
+
+def test_who_has_control_is_asked_now_and_then(bolt: Bolt, bus: Bus) -> None:
+    notes = Notes()
+    drive = turning(bolt, bus, notes)
+    with bolt.lock:
+        bolt.reads.clear()
+    wait_until(lambda: SOURCE in bolt.reads)
+    wait_until(lambda: bolt.reads.count(SOURCE) > 1)
+    with bolt.lock:
+        asked = [number for number in bolt.reads if number in (TOLD, SOURCE)]
+    first = asked.index(SOURCE)
+    # not with every status
+    assert asked.index(SOURCE, first + 1) - first > 10
+    with bolt.lock:
+        bolt.registers[SOURCE] = 0
+    wait_until(lambda: notes.told(Cause.OTHERS_IN_CONTROL))
+    wait_until(lambda: not drive.snapshot.enabled)
 
 
 def test_a_stop_is_confirmed_by_a_frequency_that_falls(bolt: Bolt, bus: Bus) -> None:
