@@ -179,11 +179,7 @@ def _movitrac_request(random: Random) -> bytes:
 def _movitrac_body(frame: bytes) -> tuple[int, bytes] | None:
     size = _MOVITRAC_VALUES.get(frame[0])
     whole = size is not None and len(frame) == 5 + size
-    return (frame[1], frame) if whole and frame == _summed(frame[:-1]) else None
-
-
-def _summed(message: bytes) -> bytes:
-    return message + bytes((sum(message) % 256,))
+    return (frame[1], frame) if whole and frame == judges.seal_movitrac(frame[:-1]) else None
 
 
 def _seal_tcp(message: bytes) -> bytes:
@@ -269,6 +265,6 @@ OTHER_CASES: Mapping[str, Case] = {
     ),
     'simulator classic': _receiving(Classic, _classic_request, judges.seal_classic, _classic_body),
     'simulator movitrac': _receiving(
-        Movitrac, _movitrac_request, _summed, _movitrac_body, 'movitrac31'
+        Movitrac, _movitrac_request, judges.seal_movitrac, _movitrac_body, 'movitrac31'
     ),
 }
