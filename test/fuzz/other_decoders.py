@@ -58,6 +58,13 @@ _PARAMETERS = [
     for protocol in ('modbus', 'classic')
     if protocol in parameter.addresses
 ]
+#: How many bits of two words count [C24], [C26].
+_LOW_BITS = {
+    ('status.op_time', 'classic'): 24,
+    ('status.rn_time', 'classic'): 24,
+    ('status.br_time', 'classic'): 24,
+    ('fieldbus.drive_status', 'modbus'): 16,
+}
 
 
 # --- catalog --------------------------------------------------------------------------------------
@@ -83,6 +90,8 @@ def _catalog(random: Random, frames: int) -> None:
         form = {(1, False): '<H', (1, True): '<h', (2, False): '<I', (2, True): '<i'}
         data = struct.pack(f'<{count}H', *raw)
         number = struct.unpack(form[count, place.number.signed], data)[0]
+        if (bits := _LOW_BITS.get((parameter.key, protocol))) is not None:
+            number &= (1 << bits) - 1
         assert type(value) is parameter.kind, f'{parameter.key}: {value!r}'
         if parameter.labels:
             label = parameter.labels.get(number, str(number))
