@@ -163,4 +163,6 @@ def _acknowledge(control: ControlSession, seen: InverterStatus) -> Report:
     answer = control.finish(drive.acknowledge(), _LONGEST)
     # nobody is here afterwards to keep the drive from timing out
     released = control.finish(drive.disconnect(1.0), _LONGEST)
-    return Report(Cause.CONTROL_RELEASED, stop=answer) if released.cause in RELEASED else answer
+    if released.cause not in RELEASED:
+        return answer
+    return Report(released.cause, **{**released.values, 'stop': answer})

@@ -102,7 +102,7 @@ class Drive:
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
-        if settings.control_method != 'monitor':
+        if settings.method != 'monitor':
             commands = Commands(settings, self._registers, self._inverter.tell)
             self._controller = Controller(bus, self._inverter, commands, self._setpoint)
         self._watch = Poller(
@@ -365,7 +365,8 @@ class Drive:
             raise DriveError(Report(Cause.ENDING)) from None
 
     def _explain(self, error: LinkError) -> Report:
-        return explain(error, self._unit, known=self._inverter.identity is not None)
+        known = self._inverter.identity is not None
+        return explain(error, self._unit, check=None if known else self._bus.protocol.check)
 
     async def _command(
         self, command: Callable[[Controller], Awaitable[Report]], *, connected: bool = False
@@ -484,7 +485,7 @@ class Drive:
             return
         seen = await self._inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
-            method = self.settings.control_method
+            method = self.settings.method
             raise DriveError(self._inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     async def _stop_for_good(self, patience: float) -> Report | None:

@@ -314,7 +314,7 @@ class ParameterWriter:
 
     def explain(self, error: LinkError) -> Report:
         """Return what a failed transaction means."""
-        return explain(error, self._inverter.settings.address, known=True)
+        return explain(error, self._inverter.settings.address)
 
     async def _why(
         self, key: str, data: bytes, kept: bytes | None, error: LinkError | None

@@ -454,4 +454,4 @@ class Poller:
     def _explain(self, error: LinkError | DriveError) -> Report:
         if isinstance(error, DriveError):
             return error.report
-        return explain(error, self._inverter.settings.address, known=True)
+        return explain(error, self._inverter.settings.address)

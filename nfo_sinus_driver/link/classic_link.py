@@ -43,8 +43,8 @@ from nfo_sinus_driver.link.errors import NoAnswer
 from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import NothingToAsk
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.port import Port
@@ -391,14 +391,3 @@ class ClassicLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
-
-
-class NothingToAsk:
-    """An inquiry without questions."""
-
-    done = True
-    found = Identification()
-
-    def ask(self) -> Reply:
-        """Ask nothing: there is no question."""
-        raise IndexError('there is no question left')

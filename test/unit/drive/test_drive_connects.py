@@ -34,7 +34,12 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import LineProtocol
+from nfo_sinus_driver.link import NoAnswer
 
 OVERLOAD = 5
 #: Read registers, and who are you.
@@ -80,6 +85,15 @@ def test_nobody_at_this_address(make_rig: MakeRig) -> None:
     assert hints == sorted(hints)
     assert rig.drive.identity is None
     assert not rig.drive.snapshot.connected
+
+
+@pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
+def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
+    silent = NoAnswer('unit 3 did not answer')
+    first = explain(silent, 3, check=protocol.check)
+    assert first == Report(Cause.NO_RESPONSE, address=3, check=protocol.check)
+    # what has answered once is set right
+    assert explain(silent, 3).cause is Cause.NOT_REACHED
 
 
 def test_rubbish_at_this_address(make_rig: MakeRig) -> None:
@@ -211,7 +225,7 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
     [
         ({'address': -1}, 'allowed are 0 to 247'),
         ({'address': 248}, 'allowed are 0 to 247'),
-        ({'model': 'sinus_h'}, "choose one of 'sinus_g2'"),
+        ({'model': 'sinus_x'}, "'sinus_g2', "),
         ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'monitor'"),
         (
             {'reference': 'analog', 'control_method': 'drive_control'},
