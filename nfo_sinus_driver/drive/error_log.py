@@ -25,36 +25,24 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
-#: The operating time of an entry [M2 §9].
-_TICKS = 0xFFFFFF
 #: Of how many entries it is remembered when they came.
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
 _TRIES = 3
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
-
-
-def code_of(entry: int) -> int:
-    """Return the inverter status code of an entry as it stands in the drive."""
-    return entry >> 24
-
-
-def hours_of(entry: int) -> float:
-    """Return the operating time of an entry as it stands in the drive, h."""
-    return (entry & _TICKS) * TICK
 
 
 class ErrorLog:
@@ -75,6 +63,11 @@ class ErrorLog:
         """A manual says where it stands."""
         return self._registers.protocol in self._inverter.model.error_logs
 
+    @property
+    def timed(self) -> bool:
+        """It is documented, and tells when an error happened."""
+        return self.documented and self.area.timed
+
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """
         Read the error log, newest entry first ([M0 §8.4], [M2 §9]).
@@ -82,10 +75,25 @@ class ErrorLog:
         :param most: how many entries at most; 0 is all that every drive has, 32 [C4].
         :raises DriveError: the model's is not documented, or it cannot be read.
         """
-        area = self._area()
+        area = self.area
         limit = min(most or area.entries, area.limit)
         entries = await self._read(area, limit, 0, Priority.POLL)
+        if not area.timed:
+            return tuple([await self._with_readings(*found) for found in enumerate(entries)])
         return self.understood(entries, await self.read_time(Priority.POLL))
+
+    async def _with_readings(self, number: int, entry: int) -> LogEntry:
+        """Return what an entry without a time says, and what the drive has kept of it."""
+        told: list[str] = []
+        for what, key in self.area.readings_of(number):
+            try:
+                value = await self._registers.read_number(key, Priority.POLL)
+            except (Refused, ValueError):
+                # what cannot be told, such as a temperature below 0, is left out
+                continue
+            told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
+        code = self.area.code(entry)
+        return LogEntry(code, self._inverter.text_of(code), readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
@@ -94,7 +102,7 @@ class ErrorLog:
         :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
         :raises DriveError: the model's log is not documented, or it cannot be read.
         """
-        area = self._area()
+        area = self.area
         if known is None:
             return await self._read(area, 1, 0, priority)
         return await self._read(area, area.entries, known, priority)
@@ -134,10 +142,10 @@ class ErrorLog:
         :raises DriveError: it was not erased, and why.
         """
         with self._procedures.begun(Reset.ERROR_LOG) as access:
-            area = self._area()
+            area = self.area
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
-                if code_of(await self._entry(area, 0)):
+                if area.code(await self._entry(area, 0)):
                     raise DriveError(Report(Cause.LOG_NOT_ERASED))
         return Report(Cause.LOG_ERASED)
 
@@ -168,7 +176,13 @@ class ErrorLog:
                     raise DriveError(Report(Cause.ENERGY_NOT_RESET, key=energy, energy=after))
         return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
 
-    def _area(self) -> ErrorLogArea:
+    @property
+    def area(self) -> ErrorLogArea:
+        """
+        Where it stands.
+
+        :raises DriveError: the model's is not documented.
+        """
         if not self.documented:
             raise DriveError(Report(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name))
         return self._inverter.model.error_logs[self._registers.protocol]
@@ -196,7 +210,7 @@ class ErrorLog:
                 if len(found) < area.entries:
                     raise
                 break
-            if not code_of(entry) or entry == known:
+            if not area.code(entry) or entry == known:
                 break
             found.append(entry)
         return found
@@ -212,7 +226,7 @@ class ErrorLog:
         return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
-        code, then = code_of(entry), hours_of(entry)
+        code, then = self.area.code(entry), self.area.hours(entry)
         # one tick of doubt, for the drive rounds
         age = at = latest = math.nan
         if now > then - TICK:

@@ -24,16 +24,14 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import code_of
-from nfo_sinus_driver.drive.error_log import hours_of
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.link import LinkError
@@ -76,8 +74,12 @@ class ErrorLogMonitor:
         self._tries = 0
 
     def begin(self) -> None:
-        """Poller from now on, where it is documented how to read the log."""
-        if not self._error_log.documented:
+        """
+        Watch from now on, where it is documented how to read the log.
+
+        Where entries have no time, nothing tells a new one from the same fault before.
+        """
+        if not self._error_log.timed:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf
@@ -135,7 +137,8 @@ class ErrorLogMonitor:
         if known is None:
             self.newest = next(iter(log.understood(news, now)), None)
             # what is older than this driver is no news, but for the fault that stands
-            news = [entry for entry in news if fault and code_of(entry) == fault.code]
+            code = fault and fault.code
+            news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
             news = [newest]
         for entry in reversed(news):
@@ -149,13 +152,15 @@ class ErrorLogMonitor:
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
         """Tell whether a fault has left the same entry as the one before, within one tick."""
-        same = code_of(newest) == fault.code and now - hours_of(newest) < 2 * TICK
+        area = self._error_log.area
+        same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
         return same and self._told_at < fault.at - _SOON
 
     def _moment(self, entry: int, began: float) -> float:
         """Return when a new entry came, as far as that was seen; else NaN."""
         fault = self._fault
-        if fault and fault.code == code_of(entry) and self._inverter.fault_is_fresh:
+        code = self._error_log.area.code(entry)
+        if fault and fault.code == code and self._inverter.fault_is_fresh:
             return fault.at
         return began if began - self._looked_at < 2 * _PERIOD else math.nan
 
