@@ -356,9 +356,9 @@ def test_drive_that_was_off_for_long(make_rig: MakeRig) -> None:
     wait_until(lambda: rig.drive.snapshot.connected)
     rig.next_snapshots(3)
     lines = warnings(rig)
-    assert len([text for text in lines if text.startswith('lost: ')]) == 1
-    assert 'check the cable and that the drive has power' in lines[0]
-    assert 'then call ~/enable to go on' in lines[0]
+    (lost,) = (text for text in lines if text.startswith('lost: '))
+    assert 'check the cable and that the drive has power' in lost
+    assert 'then call ~/enable to go on' in lost
     meanwhile = [text for text in lines if 'the bus has lost control meanwhile (24 Stop)' in text]
     assert len(meanwhile) == 1
     assert 'was switched off and on' in meanwhile[0]
