@@ -179,7 +179,7 @@ class ControlSession:
         while not future.done():
             show()
             if time.monotonic() > deadline:
-                raise DriveError(Report(Cause.TOO_LATE, timeout=timeout))
+                raise DriveError(Cause.TOO_LATE, timeout=timeout)
             self.signal(_LOOK_PERIOD)
         return future.result()
 

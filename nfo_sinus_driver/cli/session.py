@@ -48,8 +48,8 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.settings import MONITOR
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link

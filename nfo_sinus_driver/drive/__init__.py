@@ -22,12 +22,12 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.snapshot import Telemetry
 from nfo_sinus_driver.drive.tuning import Tuned

@@ -36,7 +36,6 @@ from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -77,7 +76,7 @@ async def carry_out(
             assert isinstance(refused.__cause__, Refused)
             raise refused.__cause__ from None
         except NotPossible as error:
-            raise DriveError(Report(Cause.NOT_POSSIBLE, why=str(error))) from error
+            raise DriveError(Cause.NOT_POSSIBLE, why=str(error)) from error
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
@@ -165,9 +164,7 @@ class Commands:
         steps = self._method.acknowledge(shown, control_mode)
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
-    async def begin(
-        self, procedure: Procedure | Reset, require_wanted: Callable[[], None]
-    ) -> None:
+    async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """
         Have the drive begin a procedure; once, for nobody knows what happened before a second time.
 

@@ -62,9 +62,7 @@ class CommunicationWatchdog:
             barred = inverter.settings_need_control and seen is not None and not seen.from_bus
             if not barred and (seen is None or not seen.faulted):
                 raise
-            self._inverter.tell(
-                Severity.WARNING, Report(Cause.OWN_TIMEOUT_LATER, why=error.report)
-            )
+            self._inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
 
     async def require_set(self) -> None:
         """
@@ -84,11 +82,11 @@ class CommunicationWatchdog:
         :raises DriveError: nothing is written to this drive, or it has none.
         """
         if not self._commanded:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
+            raise DriveError(Cause.MONITOR_ONLY)
         if not seconds:
             return ()
         if not self._inverter.can_time_out:
-            raise DriveError(Report(Cause.OWN_TIMEOUT_IMPOSSIBLE))
+            raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
         key = self._inverter.model.key
         wanted = {key(Role.COMMUNICATION_TIMEOUT): seconds, key(Role.STOP_AT_TIMEOUT): True}
         return await self._parameters.change_now(

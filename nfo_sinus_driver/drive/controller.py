@@ -84,7 +84,7 @@ class ExclusiveAccess:
         :raises DriveError: somebody has.
         """
         if self._aborted:
-            raise DriveError(Report(Cause.PROCEDURE_NOT_BEGUN, what=self.what))
+            raise DriveError(Cause.PROCEDURE_NOT_BEGUN, what=self.what)
 
 
 class Controller:
@@ -236,14 +236,14 @@ class Controller:
             return
         if self._access is not None:
             other = self._access.what
-            raise DriveError(Report(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other))
+            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
         if self.commanded:
-            raise DriveError(Report(Cause.MOTOR_ENABLED, what=what))
+            raise DriveError(Cause.MOTOR_ENABLED, what=what)
         if self._state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.ENDING))
+            raise DriveError(Cause.ENDING)
         if self.blocked_by_fault and self._inverter.seen is not None:
             require_no_fault(self._inverter, self._inverter.seen)
-        raise DriveError(Report(Cause.STOP_NOT_CONFIRMED_YET, what=what))
+        raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
     async def _require_enable(self) -> None:
         """
@@ -255,16 +255,16 @@ class Controller:
         if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
             return
         if self._enabling is not None:
-            raise DriveError(Report(Cause.ENABLING_ALREADY))
+            raise DriveError(Cause.ENABLING_ALREADY)
         if self._access is not None:
-            raise DriveError(Report(Cause.PROCEDURE_GOES_ON, what=self._access.what))
+            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._access.what)
         if self._state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
+            raise DriveError(Cause.NOT_ACTIVE)
         if self.blocked_by_fault:
             seen = await self._inverter.look(Priority.SERVICE)
             self._explain_refusal(seen)
             require_no_fault(self._inverter, seen)
-        raise DriveError(Report(Cause.STOP_PENDING))
+        raise DriveError(Cause.STOP_PENDING)
 
     # --- what a person asks for ---------------------------------------------------------------
 
@@ -290,7 +290,7 @@ class Controller:
                 raise Cancelled
             self._setpoint.arm(control_mode)
         except Cancelled:
-            raise DriveError(Report(Cause.STOPPED_WHILE_ENABLING)) from None
+            raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
@@ -364,9 +364,7 @@ class Controller:
                 if may_run:
                     await self._method.quick_stop(self._inverter.control_mode)
                     await self._confirmation.wait(
-                        lambda seen: not seen.driven,
-                        Priority.STOP,
-                        confirmation.TIMEOUT,
+                        lambda seen: not seen.driven, Priority.STOP, confirmation.TIMEOUT
                     )
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
@@ -506,7 +504,7 @@ class Controller:
         if self._refusal is not None:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
-            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPING_BECAUSE, why=reason))
+            self._inverter.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
         self._happened(ControlEvent.LOST)
         if self._lost_in_use:
             self._stop()
@@ -552,10 +550,9 @@ class Controller:
     def _tell_stopped(self, reason: Report) -> None:
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
-            stopped = Report(Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
-            self._inverter.tell(Severity.ERROR, stopped)
+            self._inverter.tell(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
         else:
-            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPED_BECAUSE, why=reason))
+            self._inverter.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 
     # --- how --------------------------------------------------------------------------------
 

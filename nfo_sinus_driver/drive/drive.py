@@ -45,12 +45,11 @@ from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.drive_state import Identity
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log_monitor import ErrorLogMonitor
+from nfo_sinus_driver.drive.error_log import ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
@@ -61,6 +60,7 @@ from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
@@ -229,18 +229,14 @@ class Drive:
 
     def require_standing(self) -> Future[None]:
         """
-        Make sure that another control method may follow: no motor may run by this one any more.
+        Make sure that no motor runs by this control method any more, so that another may follow.
 
         It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
         """
         return self.run(lambda: self._require_standing())
 
     def disconnect(self, timeout: float) -> Future[Report]:
-        """
-        Stop the motor, give control back and leave the drive alone.
-
-        :param timeout: how long the motor may take to stand before it is left to its ramp, s.
-        """
+        """Stop the motor, wait so long, s, until it stands, and give control back."""
         return self.run(lambda: self._disconnect(timeout))
 
     def activate(self) -> None:
@@ -248,19 +244,11 @@ class Drive:
         self._bus.call(lambda: self._set_active(True))
 
     def deactivate(self) -> Future[Report | None]:
-        """
-        Stop the motor and only keep watch; it cannot be enabled until it is active again.
-
-        The result is ``None`` where there is nothing to stop.
-        """
+        """Stop the motor, if it may run, and only keep watch until it is active again."""
         return self.run(lambda: self._deactivate())
 
     def stop_for_good(self, patience: float) -> Future[Report | None]:
-        """
-        Stop the motor as :meth:`deactivate` does; it can never be enabled again.
-
-        :param patience: how long the drive may take to confirm it, s.
-        """
+        """Stop the motor within so many s; it can never be enabled again."""
         return self.run(lambda: self._stop_for_good(patience))
 
     def enable(self) -> Future[Report]:
@@ -286,11 +274,7 @@ class Drive:
         return self._bus.run(self._explained(command))
 
     def identify(self, *, thoroughly: bool = True) -> Future[Identity]:
-        """
-        Find out who answers, without connecting to it: a motor that runs runs on.
-
-        :param thoroughly: also ask for model and serial number.
-        """
+        """Find out who answers, thoroughly with model and serial number; what runs runs on."""
 
         async def ask() -> Identity:
             identity = await self._inverter.identify()
@@ -351,7 +335,7 @@ class Drive:
         """
         if not self.settings.follows_setpoints:
             reference = self.settings.reference
-            raise DriveError(Report(Cause.OWN_REFERENCE, reference=reference))
+            raise DriveError(Cause.OWN_REFERENCE, reference=reference)
         self._setpoint.request(value)
 
     # --- on the bus ---------------------------------------------------------------------------
@@ -362,7 +346,7 @@ class Drive:
         except LinkError as error:
             raise DriveError(self._explain(error)) from error
         except Cancelled:
-            raise DriveError(Report(Cause.ENDING)) from None
+            raise DriveError(Cause.ENDING) from None
 
     def _explain(self, error: LinkError) -> Report:
         return explain(error, self._unit, known=self._inverter.identity is not None)
@@ -371,19 +355,19 @@ class Drive:
         self, command: Callable[[Controller], Awaitable[Report]], *, connected: bool = False
     ) -> Report:
         if self._controller is None:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
+            raise DriveError(Cause.MONITOR_ONLY)
         if connected:
             self._require_connected()
         return await command(self._controller)
 
     def _require_connected(self) -> None:
         if not self._inverter.connected:
-            raise DriveError(Report(Cause.NOT_CONNECTED, address=self._unit))
+            raise DriveError(Cause.NOT_CONNECTED, address=self._unit)
 
     async def _enable(self) -> Report:
         # looked at on the bus, where a deactivation cannot come between
         if not self._watch.active:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
+            raise DriveError(Cause.NOT_ACTIVE)
         answer = await self._command(
             lambda controller: controller.enable(self._watchdog.require_set), connected=True
         )
@@ -397,7 +381,7 @@ class Drive:
     async def _unless_closed(self, procedure: Callable[[], Awaitable[Report]]) -> Report:
         # it would take control that nobody gives back any more
         if self._controller is not None and self._controller.state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.ENDING))
+            raise DriveError(Cause.ENDING)
         return await procedure()
 
     async def _tune(
@@ -405,7 +389,7 @@ class Drive:
     ) -> Tuned:
         # as with enable, the motor may turn
         if not self._watch.active:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
+            raise DriveError(Cause.NOT_ACTIVE)
 
         def tell(seen: InverterStatus, elapsed: float) -> None:
             if progress is not None:
@@ -439,7 +423,7 @@ class Drive:
             if error.code == Refused.BUSY:
                 raise
             raise DriveError(
-                Report(Cause.OTHER_MODEL, error=str(error), model=inverter.model.name)
+                Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
             ) from error
         await inverter.read_control_mode()
         await inverter.read_timeout()
@@ -456,10 +440,11 @@ class Drive:
         name = '' if identity.model else inverter.model.name
         if identity.model and not inverter.model.profile.names_itself:
             title = inverter.model.profile.title
-            unexpected = Report(Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title)
-            inverter.tell(Severity.WARNING, unexpected)
+            inverter.tell(
+                Severity.WARNING, Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title
+            )
         told = ', '.join(part for part in (name, str(identity)) if part)
-        inverter.tell(Severity.INFO, Report(Cause.CONNECTED, drive=told))
+        inverter.tell(Severity.INFO, Cause.CONNECTED, drive=told)
         self._watchdog.warn_if_unfit()
 
     async def _disconnect(self, timeout: float) -> Report:

@@ -256,8 +256,7 @@ class DriveState:
             self._told_impossible.add(key)
             unit = self.model[key].unit
             shown = f'{value:g} {unit}'.rstrip()
-            impossible = Report(Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
-            self.tell(Severity.WARNING, impossible)
+            self.tell(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
 
     def last_polled(self, role: Role | None) -> Measured:
@@ -312,10 +311,12 @@ class DriveState:
             if before is None:
                 # what the older firmware knows the newer one knows, too
                 self.identity, self._older = Identity(), True
-                not_asked = Report(
-                    Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
+                self.tell(
+                    Severity.WARNING,
+                    Cause.FIRMWARE_NOT_ASKED,
+                    before=dialect.before,
+                    dialect=dialect.name,
                 )
-                self.tell(Severity.WARNING, not_asked)
             else:
                 self._older = was_older
             return self.identity or Identity()
@@ -455,8 +456,9 @@ class DriveState:
         firmware = self.identity.firmware if self.identity else math.nan
         return since is None or not firmware < float(since) - 0.001
 
-    def tell(self, severity: Severity, report: Report) -> None:
+    def tell(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
         """Tell the listener; what cannot be told keeps nothing from being done."""
+        report = what if isinstance(what, Report) else Report(what, **values)
         code = None if self.seen is None else self.seen.code
         try:
             self._listener.on_event(Event(severity, report, code))

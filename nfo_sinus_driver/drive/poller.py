@@ -29,8 +29,8 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.conditions import Conditions
 from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.diagnosis import Conditions
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -151,7 +151,7 @@ class Poller:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
-        self._bus.recorder.forget_cycle(self._inverter.settings.address)
+        self._bus.recorder.cycle(self._inverter.settings.address, math.nan)
         self._publish(None)
 
     def told(self, reply: Reply) -> None:
@@ -214,7 +214,7 @@ class Poller:
                 self._failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
-                self._failed(DriveError(Report(Cause.DRIVER_ERROR, error=repr(error))))
+                self._failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
                 if self._inverter.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._inverter.settings.address, started - polled_at)
@@ -308,11 +308,7 @@ class Poller:
                 # somebody else has looked since
                 told = None
             return await inverter.look(
-                Priority.POLL,
-                once=True,
-                alarming=alarming,
-                told=told,
-                code_for=self._code_holds,
+                Priority.POLL, once=True, alarming=alarming, told=told, code_for=self._code_holds
             )
 
         # both words of a status are of one moment, so they are repeated together
@@ -331,9 +327,7 @@ class Poller:
         if self._mode_is_due:
             self._mode_read_at = time.monotonic()
             before = inverter.control_mode
-            mode = await self._insist(
-                lambda: inverter.read_control_mode(Priority.POLL, once=True)
-            )
+            mode = await self._insist(lambda: inverter.read_control_mode(Priority.POLL, once=True))
             if mode != before and self._controller:
                 # before it is told: a set-point never has the unit of another mode
                 self._controller.judge(seen)
@@ -356,7 +350,7 @@ class Poller:
         code = seen.code if seen.faulted else 0
         if code and code != self._told_fault and not told:
             fault = explain_fault(self._inverter, seen)
-            self._inverter.tell(Severity.ERROR, Report(Cause.FAULT_APPEARED, fault=fault))
+            self._inverter.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
         self._told_fault = code
 
     async def _measure(self, role: Role) -> float:
@@ -423,10 +417,10 @@ class Poller:
         inverter = self._inverter
         inverter.connected = False
         why = self._explain(error)
-        self._bus.recorder.forget_cycle(inverter.settings.address)
+        self._bus.recorder.cycle(inverter.settings.address, math.nan)
         in_use = self._controller is not None and self._controller.lost()
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
-        inverter.tell(Severity.ERROR, Report(cause, why=why))
+        inverter.tell(Severity.ERROR, cause, why=why)
         try:
             self._publish(None)
         except Exception:

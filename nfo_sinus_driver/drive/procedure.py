@@ -46,14 +46,10 @@ _LONGEST_BUSY = 0.5
 
 
 def require_known(procedure: Procedure | Reset, model: Family) -> None:
-    """
-    See to it that a model has a procedure.
-
-    :raises DriveError: it has no command for it.
-    """
+    """Raise a :class:`DriveError` if a model has no command for a procedure."""
     if not model.profile.methods_with(procedure):
         what = procedure.value
-        raise DriveError(Report(Cause.UNKNOWN_PROCEDURE, what=what, model=model.name))
+        raise DriveError(Cause.UNKNOWN_PROCEDURE, what=what, model=model.name)
 
 
 class Procedures:
@@ -61,6 +57,7 @@ class Procedures:
     Has one drive carry out procedures; used on the bus alone.
 
     :param controller: who commands the drive else; ``None`` if this driver only reads.
+    :raises DriveError: the drive cannot be had, has no such procedure, or does not confirm.
     """
 
     def __init__(self, bus: Bus, inverter: DriveState, controller: Controller | None) -> None:
@@ -71,60 +68,41 @@ class Procedures:
     @property
     def _commands(self) -> Controller:
         if self._controller is None:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
+            raise DriveError(Cause.MONITOR_ONLY)
         return self._controller
 
     def require(self, procedure: Procedure | Reset) -> None:
-        """
-        See to it that a procedure may begin.
-
-        :raises DriveError: the drive has no such procedure, or its control method is another; or
-            somebody has the drive.
-        """
+        """See to it that a procedure may begin."""
         controller, inverter = self._commands, self._inverter
         if not inverter.connected:
-            raise DriveError(Report(Cause.NOT_CONNECTED, address=inverter.settings.address))
+            raise DriveError(Cause.NOT_CONNECTED, address=inverter.settings.address)
         require_known(procedure, inverter.model)
         profile = inverter.model.profile
         have = profile.methods_with(procedure)
         if inverter.settings.control_method not in have:
             raise DriveError(
-                Report(
-                    Cause.OTHER_METHOD_NEEDED,
-                    what=procedure.value,
-                    means=profile.methods[have[0]].means,
-                    method=have[0],
-                )
+                Cause.OTHER_METHOD_NEEDED,
+                what=procedure.value,
+                means=profile.methods[have[0]].means,
+                method=have[0],
             )
         controller.require_idle(procedure.value)
 
     @contextlib.contextmanager
     def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for a procedure, from its first preparations on.
-
-        :raises DriveError: it cannot be had, and why.
-        """
+        """Have the drive for a procedure, from its first preparations on."""
         self.require(procedure)
         with self.exclusive(procedure.value) as access:
             yield access
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for what every control method may do, also while connecting.
-
-        :raises DriveError: somebody has the drive.
-        """
+        """Have the drive for what every control method may do, also while connecting."""
         with self._commands.exclusive(what) as access:
             yield access
 
     async def in_control(self, priority: Priority) -> bool:
-        """
-        Tell whether the bus has control of the drive.
-
-        :raises DriveError: this driver only reads.
-        """
+        """Tell whether the bus has control of the drive."""
         return await self._commands.method.in_control(priority)
 
     @contextlib.asynccontextmanager
@@ -132,10 +110,7 @@ class Procedures:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
-        A drive that its keypad or terminals control is not taken: giving it back to them could
-        start the motor [C43].
-
-        :raises DriveError: it cannot be had, and why.
+        Not from keypad or terminals: giving it back to them could start the motor [C43].
         """
         found = await self._take(access)
         try:
@@ -148,11 +123,7 @@ class Procedures:
         await self._give_back(found)
 
     async def abort(self) -> Report | None:
-        """
-        End the procedure that has the drive; anything else goes on.
-
-        :raises DriveError: the drive does not confirm it; it is retried until it does.
-        """
+        """End the procedure that has the drive; anything else goes on."""
         controller = self._controller
         procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
         if controller is None or controller.state not in procedure:
@@ -163,11 +134,8 @@ class Procedures:
         """
         Have the drive begin; once, for nobody knows what has happened before a second time.
 
-        It waits for its turn with the stops, so that one which comes later does not overtake it,
-        and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
-        told again for a while, for it has done nothing.
-
-        :raises DriveError: it was stopped meanwhile.
+        It waits for its turn with the stops, so that none that comes later overtakes it. Only a
+        drive that is busy is told again for a while, for it has done nothing.
         """
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:

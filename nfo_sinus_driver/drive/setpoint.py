@@ -309,8 +309,9 @@ class Setpoint:
             return
         if not self._told_missed:
             self._told_missed = True
-            missed = Report(Cause.BROADCAST_MISSED, value=self._meant({address: kept}))
-            self._inverter.tell(Severity.WARNING, missed)
+            self._inverter.tell(
+                Severity.WARNING, Cause.BROADCAST_MISSED, value=self._meant({address: kept})
+            )
         self._written = {}
         self._bus.request(self._slot)
 
@@ -327,7 +328,7 @@ class Setpoint:
         self._expired = False
         if self._warned:
             self._warned = False
-            self._inverter.tell(Severity.INFO, Report(Cause.SETPOINTS_AGAIN))
+            self._inverter.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
     def _make(self) -> Transfer | None:
@@ -340,8 +341,7 @@ class Setpoint:
         limited = self._accept(request)
         if self.clamped and not self._clamp_told:
             self._inverter.tell(
-                Severity.WARNING,
-                Report(Cause.SETPOINT_LIMITED, value=request.value, limited=limited),
+                Severity.WARNING, Cause.SETPOINT_LIMITED, value=request.value, limited=limited
             )
         self._clamp_told = self.clamped
         due = self.due(request)
@@ -453,9 +453,7 @@ class Setpoint:
         if self._standing != dict(map(self._registers.target, zero)):
             if not self._warned:
                 self._warned = True
-                self._inverter.tell(
-                    Severity.WARNING, Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
-                )
+                self._inverter.tell(Severity.WARNING, Cause.SETPOINT_TIMED_OUT, timeout=timeout)
             before = self._request
             for step in zero:
                 if self._request is not before:

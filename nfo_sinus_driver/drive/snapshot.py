@@ -11,15 +11,16 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """What a drive tells the outside: immutable pictures of one moment."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from datetime import datetime
 import functools
 import math
+import time
 from typing import NamedTuple
 from typing import Protocol
 
@@ -31,7 +32,6 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import StatusCode
 from nfo_sinus_driver.drive.events import Event
-from nfo_sinus_driver.drive.log_entry import LogEntry
 
 NAN = math.nan
 #: Stands for an inverter status that has not been read; no drive has it.
@@ -265,3 +265,47 @@ class Listener(Protocol):
 
     def on_event(self, event: Event) -> None:
         """Take what an operator should know."""
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """
+    One entry of the error log.
+
+    :ivar code: as the inverter status has it.
+    :ivar text: as on the display.
+    :ivar operating_time: the drive's operating time when it happened, h.
+    :ivar age: operating hours ago; NaN if the drive does not tell.
+    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
+        to come, or the drive is known to have had power ever since; else NaN.
+    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
+    """
+
+    code: int
+    text: str
+    operating_time: float
+    age: float
+    at: float = math.nan
+    latest: float = math.nan
+
+    @property
+    def wall_time(self) -> str:
+        """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
+        if not math.isnan(self.at):
+            return _local(self.at)
+        latest = '' if math.isnan(self.latest) else _local(self.latest)
+        return f'{latest} or before' if latest else ''
+
+    def __str__(self) -> str:
+        age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
+        wall_time = f' ({self.wall_time})' if self.wall_time else ''
+        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
+
+
+def _local(at: float) -> str:
+    try:
+        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    except (ValueError, OverflowError, OSError):
+        # no calendar goes back so far: the drive tells nonsense
+        return ''
+    return moment.isoformat(' ', 'minutes')

@@ -32,7 +32,6 @@ from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
 
@@ -62,7 +61,7 @@ class StartSequence:
         if expected and control_mode != expected:
             key = inverter.model.key(Role.CONTROL_MODE)
             raise DriveError(
-                Report(Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key)
+                Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self.take_control(control_mode)
         await self._confirmation.wait_for_step(lambda now: now.from_bus)
@@ -90,7 +89,7 @@ class StartSequence:
             # in standby after the start delay it has forgotten the start, and must not wait for
             # another one
             if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(Report(Cause.NO_RUN_INPUT))
+                raise DriveError(Cause.NO_RUN_INPUT)
             if seen.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
                 deadline += await self._inverter.read_start_delay()

@@ -165,9 +165,9 @@ class StopSequence:
             # who waits for a drive that is not there keeps others waiting, and learns no more
             lost = patience is None and not self._inverter.connected and self._outcome is not None
             if lost or time.monotonic() > deadline:
-                raise DriveError(Report(Cause.STOP_UNCONFIRMED, why=self._unconfirmed))
+                raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
-            raise DriveError(Report(Cause.STOP_UNCONFIRMED_AT_END))
+            raise DriveError(Cause.STOP_UNCONFIRMED_AT_END)
 
     async def _keep_trying(self) -> None:
         complain_at = self._due
@@ -180,9 +180,7 @@ class StopSequence:
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
                 complain_at = time.monotonic() + pause
-                self._inverter.tell(
-                    Severity.ERROR, Report(Cause.CANNOT_STOP, why=self._unconfirmed)
-                )
+                self._inverter.tell(Severity.ERROR, Cause.CANNOT_STOP, why=self._unconfirmed)
             await self._rest()
         self._task = None
         self._report_end()

@@ -56,9 +56,7 @@ _DENIALS = 3
 _OFF_PERIOD = 0.5
 
 
-async def watch_telemetry(
-    bus: Bus, inverter: DriveState, listener: Listener
-) -> None:
+async def watch_telemetry(bus: Bus, inverter: DriveState, listener: Listener) -> None:
     """
     Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
 

@@ -115,7 +115,7 @@ class Tuning:
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
                 async with self._procedures.in_standby(access):
-                    self._inverter.tell(Severity.INFO, Report(Cause.TUNING_BEGINS, what=what))
+                    self._inverter.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
                     how = await self._outcome(what, access, progress)
                 result = Tuned(how.cause is Cause.TUNED, how, await changes())
@@ -126,11 +126,9 @@ class Tuning:
         for role in _PLATE:
             key = self._inverter.model.key(role)
             if not await self._registers.read_number(key, Priority.SERVICE) > 0:
-                raise DriveError(Report(Cause.TUNING_NEEDS, what=what, key=key))
+                raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
-    async def _outcome(
-        self, what: str, access: ExclusiveAccess, progress: Progress
-    ) -> Report:
+    async def _outcome(self, what: str, access: ExclusiveAccess, progress: Progress) -> Report:
         """Wait until the drive says how it ended."""
         inverter = self._inverter
         started = time.monotonic()

@@ -27,7 +27,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive.broadcast import broadcast_stop
+from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS

@@ -38,7 +38,6 @@ from support.said import said
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import parameters as parameters_module
 from nfo_sinus_driver.simulator.refusal import Reason
@@ -300,7 +299,7 @@ def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig
 
 
 @pytest.mark.parametrize(
-    'error', [DriveError(Report(Cause.NOT_ACTIVE)), RuntimeError('a mistake')]
+    'error', [DriveError(Cause.NOT_ACTIVE), RuntimeError('a mistake')]
 )
 def test_a_first_reading_that_fails_leaves_nothing_connected(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception
