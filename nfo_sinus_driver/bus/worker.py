@@ -241,9 +241,9 @@ class Bus:
         self._advance(task, None, None)
         return task
 
-    def cancel(self, task: Task) -> None:
-        """End a task: it sees :class:`Cancelled` where it stands, and sends nothing more."""
-        if task.future.done() or task.cancelled:
+    def cancel(self, task: Task | None) -> None:
+        """End a task, if any: it sees :class:`Cancelled` where it stands; nothing more is sent."""
+        if task is None or task.future.done() or task.cancelled:
             return
         task.cancelled = True
         if task.running:
@@ -254,9 +254,9 @@ class Bus:
         task.pause += 1
         self._advance(task, None, Cancelled())
 
-    def wake(self, task: Task) -> None:
+    def wake(self, task: Task | None) -> None:
         """End the pause of a task early; harmless if it is not in one."""
-        if task.asleep:
+        if task is not None and task.asleep:
             self._end_pause(task)
 
     # --- the worker ---------------------------------------------------------------------------

@@ -293,15 +293,12 @@ class ErrorLogMonitor:
     def end(self) -> None:
         """Leave the log alone."""
         self._inverter.on_fault = lambda: None
-        if self._task is not None:
-            task, self._task = self._task, None
-            self._bus.cancel(task)
+        self._bus.cancel(self._task)
 
     def _expect(self) -> None:
         """Look for the entry of the fault that stands, if one does."""
         self._fault, self._tries = self._inverter.fault, _TRIES
-        if self._task is not None:
-            self._bus.wake(self._task)
+        self._bus.wake(self._task)
 
     async def _watch_for_ever(self) -> None:
         inverter = self._inverter

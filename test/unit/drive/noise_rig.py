@@ -177,7 +177,7 @@ class NoiseRig(Rig):
 
     def register(self, key: str) -> int:
         """Return where a parameter stands."""
-        return self.drive._registers.address(key).index
+        return self.drive.registers.address(key).index
 
     @property
     def ends(self) -> list[str]:

@@ -186,7 +186,7 @@ def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
     rig = make_rig(control_method=method)
     rig.connect()
     assert rig.enable().startswith('enabled')
-    inverter = rig.drive._inverter
+    inverter = rig.drive.inverter
 
     async def read(priority: Priority = Priority.SERVICE) -> str:
         inverter.control_mode = '7'
