@@ -23,13 +23,13 @@ import time
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import RELEASED
 from nfo_sinus_driver.cli.control_session import ControlSession
+from nfo_sinus_driver.cli.control_session import Stopping
 from nfo_sinus_driver.cli.control_session import control_session
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.status_line import as_line
-from nfo_sinus_driver.cli.stopping import RELEASED
-from nfo_sinus_driver.cli.stopping import Stopping
+from nfo_sinus_driver.cli.screen import as_line
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive

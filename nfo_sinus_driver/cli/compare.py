@@ -25,14 +25,14 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.errors import UsageError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import columns
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import remark
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import read_file
-from nfo_sinus_driver.cli.progress import put
-from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.table import columns
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
 

@@ -29,11 +29,11 @@ import threading
 from nfo_sinus_driver.cli.command import ack
 from nfo_sinus_driver.cli.command import stop
 from nfo_sinus_driver.cli.compare import diff
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import remark
 from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
-from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.read import errors
 from nfo_sinus_driver.cli.read import get
 from nfo_sinus_driver.cli.read import info

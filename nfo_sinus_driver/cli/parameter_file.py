@@ -35,8 +35,8 @@ import yaml
 
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import listed
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import listed
 
 #: What the header says, in this order.
 HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')

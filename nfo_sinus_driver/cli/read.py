@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """The verbs that read one drive: ``info``, ``list``, ``get`` and ``errors``."""
 
 from __future__ import annotations
@@ -26,17 +25,20 @@ import math
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.erase import erase
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.progress import progress
-from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import columns
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import require_yes
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.table import columns
 from nfo_sinus_driver.cli.values import measured
 from nfo_sinus_driver.cli.values import readable
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.link import Refused
@@ -233,3 +235,28 @@ def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
                     raise
             step()
     return found
+
+
+_MUTE = {*NO_TIMEOUT, Cause.FAULT_APPEARED}
+_LONGEST = 15.0
+
+
+def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
+    """
+    Erase the error log, and see that it is empty.
+
+    :param entries: what stands in it.
+    :param rows: the same for a script.
+    """
+    count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
+    if entries:
+        require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
+        with control_session(options, mute=_MUTE) as control:
+            drive = control.drive()
+            control.finish(drive.connect(), _LONGEST)
+            control.finish(drive.erase_error_log(), _LONGEST)
+    if options.json:
+        put(json.dumps({'erased': rows}, ensure_ascii=False, indent=2))
+    else:
+        put(f'erased: {count}' if entries else 'the error log is empty already')
+    return 0

@@ -22,16 +22,16 @@ import math
 import time
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.control_session import SHUTDOWN_TIMEOUT
 from nfo_sinus_driver.cli.control_session import ControlSession
 from nfo_sinus_driver.cli.control_session import Ended
+from nfo_sinus_driver.cli.control_session import Stopping
 from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.control_session import spoken
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
-from nfo_sinus_driver.cli.status_line import as_json
-from nfo_sinus_driver.cli.status_line import as_line
-from nfo_sinus_driver.cli.stopping import SHUTDOWN_TIMEOUT
-from nfo_sinus_driver.cli.stopping import Stopping
+from nfo_sinus_driver.cli.screen import as_json
+from nfo_sinus_driver.cli.screen import as_line
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError

@@ -31,10 +31,10 @@ from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_profile
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
-from nfo_sinus_driver.cli.progress import progress
-from nfo_sinus_driver.cli.progress import remark
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import remark
 from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive

@@ -19,10 +19,10 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
-from nfo_sinus_driver.cli.errors import listed
-from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.cli.console import put
 from nfo_sinus_driver.cli.read import as_json
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.values import BARRED

@@ -25,8 +25,8 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import listed
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.drive.parameter_writer import show
 
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}

@@ -23,8 +23,11 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import classic_refusal
 from nfo_sinus_driver.link.classic import BROADCAST
+from nfo_sinus_driver.link.classic import INV_ST
+from nfo_sinus_driver.link.classic import MODE
+from nfo_sinus_driver.link.classic import SIO_ERR
+from nfo_sinus_driver.link.classic import SIO_FAIL
 from nfo_sinus_driver.link.classic import Enquiry
 from nfo_sinus_driver.link.classic import Kind
 from nfo_sinus_driver.link.classic import Message
@@ -33,10 +36,6 @@ from nfo_sinus_driver.link.classic import Request
 from nfo_sinus_driver.link.classic import Select
 from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
-from nfo_sinus_driver.link.classic_refusal import INV_ST
-from nfo_sinus_driver.link.classic_refusal import MODE
-from nfo_sinus_driver.link.classic_refusal import SIO_ERR
-from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
 from nfo_sinus_driver.link.errors import DamagedAnswer
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.errors import NoAnswer
@@ -276,12 +275,12 @@ class ClassicLink:
         try:
             inv_st, _ = self._enquire(unit, INV_ST)
             if inv_st != SIO_FAIL or not ours:
-                return classic_refusal.by_status(inv_st)
-            return classic_refusal.by_flags(self._enquire(unit, SIO_ERR)[0])
+                return classic.refused_by_status(inv_st)
+            return classic.refused_by_flags(self._enquire(unit, SIO_ERR)[0])
         except PortError:
             raise
         except LinkError as error:
-            return classic_refusal.unknown(error)
+            return classic.refused_unknown(error)
 
     def _settle(self, unit: int) -> None:
         """Read something, so that the next answer is believed again; if not, then not."""

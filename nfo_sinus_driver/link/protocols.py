@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nfo_sinus_driver.link.ascii_link import AsciiLink
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import Link
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.modbus_ascii import AsciiLink
+from nfo_sinus_driver.link.modbus_tcp import TcpLink
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
-from nfo_sinus_driver.link.tcp_link import TcpLink
 
 #: A new protocol is a file of this folder, and its link stands here.
 _LINKS = {link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink)}

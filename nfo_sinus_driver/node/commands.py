@@ -11,17 +11,22 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The services of one drive."""
+"""The services of one drive, those of its error log and kWh counter too."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import math
+import threading
 from typing import Any
 from typing import TypeVar
 
+from builtin_interfaces.msg import Time
+from nfo_sinus_msgs.srv import GetErrorLog
+from rclpy.callback_groups import CallbackGroup
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import SetBool
@@ -29,8 +34,9 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
+from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
@@ -121,4 +127,91 @@ class Commands:
             return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
         return self._answer(
             response, lambda: self._managed.require_active().enable(), _LONGEST_COMMAND
+        )
+
+
+class BoundedCallbackGroup(CallbackGroup):
+    """
+    Lets a number of callbacks run at once; what comes then waits in the queue of its entity.
+
+    :param most: how many.
+    """
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._most = most
+        self._running = 0
+        self._lock = threading.Lock()
+
+    def can_execute(self, entity: object) -> bool:
+        """Tell whether one more may run."""
+        return self._running < self._most
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Let one begin, if it may."""
+        with self._lock:
+            begins = self._running < self._most
+            self._running += begins
+            return begins
+
+    def ending_execution(self, entity: object) -> None:
+        """Take note that one has ended."""
+        with self._lock:
+            self._running -= 1
+
+
+#: A busy line has many other things to do, s.
+_LONGEST = 60.0
+
+
+class ErrorLogServices:
+    """
+    Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``.
+
+    :param stamp: gives the node's time of a moment of ``time.monotonic``.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        managed: ManagedDrive,
+        commands: Commands,
+        stamp: Callable[[float], Time],
+    ) -> None:
+        self._managed = managed
+        self._commands = commands
+        self._stamp = stamp
+        node.create_service(
+            GetErrorLog,
+            '~/get_error_log',
+            self._on_get,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        commands.offer('~/erase_error_log', Drive.erase_error_log, _LONGEST)
+        commands.offer('~/reset_energy', Drive.reset_energy, _LONGEST)
+
+    def _on_get(
+        self, request: GetErrorLog.Request, response: GetErrorLog.Response
+    ) -> GetErrorLog.Response:
+        def fill_in(entries: Sequence[LogEntry]) -> str:
+            response.entries = [
+                messages.error_log_entry(entry, self._stamp(entry.at)) for entry in entries
+            ]
+            return self._summary(entries)
+
+        return self._commands.answer(
+            response,
+            lambda: self._managed.drive.error_log(request.max_entries),
+            _LONGEST,
+            fill_in,
+        )
+
+    def _summary(self, entries: Sequence[LogEntry]) -> str:
+        undated = sum(math.isnan(entry.at) for entry in entries)
+        if not undated:
+            return f'{len(entries)} entries'
+        since = self._managed.drive.powered_since
+        return (
+            f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
+            f'since the driver has seen the drive with power, from operating hour {since:.1f} on'
         )

@@ -39,9 +39,9 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
+from nfo_sinus_driver.node.commands import ErrorLogServices
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
-from nfo_sinus_driver.node.error_log import ErrorLogServices
 from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED

@@ -39,8 +39,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.node.arguments import refuse_other_arguments
-from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
@@ -50,6 +48,8 @@ from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
+from nfo_sinus_driver.node.overrides import refuse_other_arguments
+from nfo_sinus_driver.node.overrides import take_out_node_name
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 from nfo_sinus_driver.signals import ENDING

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 A whole drive made of software: parameters, commands, motor, faults, power and time.
 
@@ -25,6 +24,7 @@ from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import Any
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
@@ -32,9 +32,9 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 
 #: The characters of a serial number [M0 §6.2.4].
 SERIAL_LENGTH = 16
@@ -275,3 +275,36 @@ def _serial_number(text: str | None, address: int) -> str:
     if len(text) > SERIAL_LENGTH or not (text.isascii() and text.isprintable()):
         raise ValueError(f'serial number {text!r}: at most {SERIAL_LENGTH} characters of ASCII')
     return text.ljust(SERIAL_LENGTH)
+
+
+def describe(drive: SimulatedDrive) -> dict[str, Any]:
+    """Return everything about a drive, in engineering units; it can be written as JSON."""
+    motor = drive.motor
+    return {
+        'address': drive.address,
+        'model': drive.model.name,
+        'serial_number': drive.serial_number,
+        'time': drive.time,
+        'silent': not drive.listening,
+        'run_input': drive.control_unit.run_input,
+        **drive.control_unit.report(),
+        'fault': next(iter(drive.faults.codes), 0),
+        'faults': drive.faults.codes,
+        'alarms': drive.faults.alarms,
+        'frequency': motor.frequency,
+        'speed': motor.speed,
+        'rotor_speed': motor.rotor_speed,
+        'turning': motor.turning,
+        'driven': motor.driven,
+        'current': motor.current,
+        'torque': 100 * motor.torque,
+        'dc_link': motor.dc_link,
+        'writes': dict(drive.writes),
+        'command_writes': dict(drive.command_writes),
+        'error_log': [[entry.code, entry.op_time] for entry in drive.faults.log],
+        'parameters': {
+            key: drive.peek(key)
+            for key, parameter in drive.memory.model.items()
+            if parameter.access in (Access.READ, Access.READ_WRITE)
+        },
+    }

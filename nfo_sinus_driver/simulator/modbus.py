@@ -27,10 +27,10 @@ from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import carried
 from nfo_sinus_driver.simulator.memory import kept
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 
 #: How a drive treats a function.
 KNOWN, REFUSED, SILENT = 'known', 'refused', 'silent'

@@ -32,6 +32,7 @@ from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.drive import describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.endpoints import parse_endpoint
@@ -39,10 +40,9 @@ from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.family import verbs_of
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.ports import PortError
-from nfo_sinus_driver.simulator.report import describe
 from nfo_sinus_driver.simulator.timing import sharpen_timers
-from nfo_sinus_driver.simulator.trace import Trace
 
 #: How often every drive catches up with the clock while nobody asks it (s).
 _TICK = 0.05

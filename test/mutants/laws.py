@@ -124,7 +124,7 @@ LAWS = (
         2,
         'a tuning is taken for a motor that nobody enabled',
         TABLE,
-        '        ControlState.PROCEDURE,\n',
+        ' ControlState.PROCEDURE,',
         '',
         (TUNING, '-k', 'take_over'),
     ),
@@ -334,7 +334,7 @@ LAWS = (
     Mutant(
         8,
         'any answer of a gateway is the right one',
-        'nfo_sinus_driver/link/tcp_link.py',
+        'nfo_sinus_driver/link/modbus_tcp.py',
         '                if number == self._number:',
         '                if True:',
         ('test/unit/link/test_tcp_link.py',),

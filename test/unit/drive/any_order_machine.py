@@ -37,7 +37,7 @@ import pytest
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.refusal import Refused as Refusal
+from nfo_sinus_driver.simulator.memory import Refused as Refusal
 from nfo_sinus_driver.simulator.sinus.variant import ALL
 from nfo_sinus_driver.simulator.sinus.variant import DROPS
 from nfo_sinus_driver.simulator.sinus.variant import KEEPS

@@ -36,7 +36,7 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.family import simulated_drive

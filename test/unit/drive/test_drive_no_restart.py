@@ -38,8 +38,8 @@ from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import poller as watch_module
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 

@@ -35,8 +35,8 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 DC_LOW = 7

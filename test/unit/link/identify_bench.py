@@ -31,7 +31,7 @@ from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.settings import LineSettings
 
 if opinion.OLD:

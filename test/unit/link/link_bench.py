@@ -28,7 +28,7 @@ from virtual_wire import Wire
 from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.serial_link import SerialLink
 from nfo_sinus_driver.link.settings import LineSettings
 
