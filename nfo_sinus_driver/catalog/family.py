@@ -44,6 +44,8 @@ from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
+#: The message InvSt has one byte for a status code.
+_HIGHEST_CODE = 0xFF
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,11 @@ class Family(Mapping[str, Parameter]):
     def key(self, role: Role) -> str:
         """Return the key of the parameter that has a role; ``''`` if this family has none."""
         return self.roles.get(role, '')
+
+    @property
+    def key_of_status(self) -> str:
+        """The parameter that every drive of it has: the status code, or the word that tells it."""
+        return self.key(Role.STATUS_CODE) or self.key(Role.STATUS_WORD)
 
     @functools.cached_property
     def role_of(self) -> Mapping[str, Role]:
@@ -176,8 +183,9 @@ def load_family(name: str) -> Family:
         addresses[key][found.protocol] = found
     parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
     roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
-    if Role.STATUS_CODE.value not in {role.value for role, _ in roles}:
-        raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the status_code')
+    for needed in _needed_roles(profile):
+        if needed not in dict(roles):
+            raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
     log = folder / 'error_log.csv'
     logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
@@ -189,6 +197,12 @@ def load_family(name: str) -> Family:
         error_logs={row.protocol: row for row in logs},
         profile=profile,
     )
+
+
+def _needed_roles(profile: Profile) -> Iterator[Role]:
+    yield Role.STATUS_CODE if profile.status_word.code is None else Role.STATUS_WORD
+    if profile.status_word.by_frequency:
+        yield Role.ACTUAL_FREQUENCY
 
 
 def _address(row: table.Row) -> Address:
@@ -243,8 +257,11 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
 
 
 def _status_code(row: table.Row) -> StatusCode:
+    code = int(row['code'])
+    if not 0 <= code <= _HIGHEST_CODE:
+        raise ValueError(f'code {code} is out of range, 0 to {_HIGHEST_CODE}')
     return StatusCode(
-        code=int(row['code']),
+        code=code,
         text=row['text'],
         old_text=row['old_text'] or row['text'],
         renamed=table.fraction(row['renamed']),

@@ -32,12 +32,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 import enum
+import math
 from typing import Any
 from typing import ClassVar
 from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord
@@ -94,6 +96,8 @@ class Write:
         still says how.
     :ivar once: do not repeat the request when there is no response.
     :ivar head: at the head of the bus, as the very next frame.
+    :ivar stored: it goes to a memory that wears out: it is written only where another value stands,
+        and reported.
     """
 
     key: str
@@ -101,6 +105,7 @@ class Write:
     at: str = ''
     once: bool = False
     head: bool = False
+    stored: bool = False
 
 
 @dataclass(frozen=True)
@@ -162,19 +167,35 @@ class SetpointTarget:
     :ivar key: that parameter.
     :ivar most: the greatest set-point in either direction, in the unit of the control mode.
     :ivar at: the parameter in whose place it is written, as for :class:`Write`.
+    :ivar forward_only: the drive takes none below 0.
     """
 
     key: str
     most: float
     at: str = ''
+    forward_only: bool = False
 
-    def writes(self, value: float) -> Sequence[Write]:
-        """Return what is to be written for a set-point, in this order: always the same keys."""
+    @property
+    def least(self) -> float:
+        """The least set-point: the greatest one in reverse, or 0."""
+        return 0.0 if self.forward_only else -self.most
+
+    def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
+        """
+        Return what is to be written for a set-point, in this order: always the same keys.
+
+        Only the first write that changes something is carried out; then this is asked anew, be it
+        for a newer set-point. So the motor follows each write as it comes, and each has to do no
+        harm alone: where the size stands beside the direction, one that is not 0 is made 0 before
+        the direction changes. A key may stand in it twice, then.
+
+        :param before: the set-point that the drive has; NaN if nobody knows.
+        """
         return (Write(self.key, value, at=self.at),)
 
-    def value(self, values: Sequence[Value]) -> float:
-        """Return the set-point that the values of :meth:`writes` mean to the drive."""
-        return float(values[0])
+    def value(self, values: Mapping[str, Value]) -> float:
+        """Return the set-point that the values of these keys mean to the drive."""
+        return float(values[self.key])
 
     def zero(self, *, once: bool) -> Steps[None]:
         """Write set-point 0; ``once``: do not repeat a request without a response."""
@@ -188,9 +209,9 @@ class SetpointTarget:
         :raises NotPossible: the drive keeps another value.
         """
         yield from self.zero(once=False)
-        values: list[Value] = []
-        for write in self.writes(0.0):
-            values.append((yield Read(write.key)))
+        values: dict[str, Value] = {}
+        for key in dict.fromkeys(write.key for write in self.writes(0.0)):
+            values[key] = yield Read(key)
         kept = self.value(values)
         if kept != 0:
             raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
@@ -250,6 +271,8 @@ class ControlMethod(abc.ABC):
     :cvar coasts: it can release the motor at once.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar procedures: what begins each procedure that it has.
+    :cvar keeps_control: why :meth:`release` leaves control to the bus, and how a person gets it
+        back; ``''`` where it does not.
     """
 
     means: ClassVar[str]
@@ -257,6 +280,7 @@ class ControlMethod(abc.ABC):
     coasts: ClassVar[bool] = False
     older: ClassVar[bool] = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
+    keeps_control: ClassVar[str] = ''
 
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
         self._reference = reference
@@ -269,6 +293,14 @@ class ControlMethod(abc.ABC):
     @abc.abstractmethod
     def holder(self) -> Steps[Holder]:
         """Tell who has control of the drive."""
+
+    def require_startable(self) -> Steps[None]:
+        """
+        See to it that nothing but a fault keeps the motor from being started; it only reads.
+
+        :raises NotPossible: something does, and what to do about it.
+        """
+        yield from ()
 
     @abc.abstractmethod
     def take_control(self) -> Steps[None]:
@@ -362,6 +394,7 @@ class Profile:
     :ivar writes_and_reads: it has Modbus function 23.
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
     :ivar older: its firmware that lacks parameters.
+    :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     """
 
@@ -377,6 +410,7 @@ class Profile:
     writes_and_reads: bool = False
     releases: Value = ''
     older: OlderDialect | None = None
+    most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:

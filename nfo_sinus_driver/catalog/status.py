@@ -142,12 +142,20 @@ class StatusWord:
     :ivar by_bit: which facts each bit tells.
     :ivar by_state: which facts only the state tells.
     :ivar stateless: a status word may show none; where not, such a word is none of this drive.
+    :ivar code: gives the status code that a word tells, whatever the word; ``None``: the code is a
+        parameter of its own.
+    :ivar shown: which bits of it are published.
+    :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
+        the frequency has to tell; it is read with every status.
     """
 
     state: Callable[[int], State]
     by_bit: Mapping[int, Fact]
     by_state: Mapping[State, Fact]
     stateless: bool = False
+    code: Callable[[int], int] | None = None
+    shown: int = 0xFFFFFFFF
+    by_frequency: bool = False
 
     def may_say(self, word: int) -> bool:
         """Tell whether a status word is one of those that the manual knows."""

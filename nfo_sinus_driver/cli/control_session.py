@@ -214,7 +214,7 @@ _STOP_LOOK_PERIOD = 0.05
 _LONGEST_POLL = 2.0
 
 #: How control was released.
-RELEASED = (Cause.CONTROL_RELEASED, Cause.COASTED_AND_RELEASED)
+RELEASED = (Cause.CONTROL_RELEASED, Cause.CONTROL_KEPT)
 
 _EMERGENCY = 'use the RUN input or the emergency stop if the motor turns'
 

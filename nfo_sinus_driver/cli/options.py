@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link.settings import BAUD_RATES
@@ -268,9 +269,9 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     )
     add(
         '--method',
-        choices=CONTROL_METHODS[:2],
-        default='mode_scmd',
-        help='how the drive is commanded (default: mode_scmd)',
+        choices=[name for name in CONTROL_METHODS if name != MONITOR],
+        default='',
+        help='how the drive is commanded (default: the usual way of its family)',
     )
     add(
         '--reference',

@@ -132,12 +132,11 @@ class _Ride:
         target = remote.model.profile.setpoints.get(mode)
         if target is None:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
-        most = target.most
-        if abs(options.setpoint) > most:
+        if not target.least <= options.setpoint <= target.most:
             unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
             raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
-                f'in control mode {mode} {-most:g} to {most:g} {unit}'
+                f'in control mode {mode} {target.least:g} to {target.most:g} {unit}'
             )
 
     def _start(self) -> None:

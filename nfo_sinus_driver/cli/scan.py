@@ -26,7 +26,6 @@ import json
 from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.cli.console import progress
@@ -159,7 +158,7 @@ def _ask(drive: Remote) -> dict[str, str] | None:
     :raises DriveError: the port cannot be used.
     """
     try:
-        status = drive.model.key(Role.STATUS_CODE)
+        status = drive.model.key_of_status
         drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))
         identity = drive.identify()
     except DriveError as error:

@@ -30,7 +30,6 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import progress
@@ -209,16 +208,12 @@ class Session:
         except ValueError as error:
             raise UsageError(str(error)) from None
 
-    @property
-    def _usual_method(self) -> str:
-        return next(iter(load_profile(self._options.model).methods))
-
     def _settings(self, address: int, **others: Any) -> DriveSettings:
         options = self._options
         usual: dict[str, Any] = {
             'address': address,
             'model': options.model,
-            'control_method': self._usual_method if self._writes else MONITOR,
+            'control_method': '' if self._writes else MONITOR,
             'retries': options.retries,
             'allow_communication_changes': getattr(options, 'allow_communication_changes', False),
         }

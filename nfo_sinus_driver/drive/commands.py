@@ -36,6 +36,8 @@ from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -51,16 +53,22 @@ async def _not_reached(condition: Callable[[InverterStatus], bool]) -> None:
     raise AssertionError('nothing is awaited here')
 
 
+def _not_told(severity: Severity, report: Report) -> None:
+    raise AssertionError('nothing is stored here')
+
+
 async def carry_out(
     steps: profile.Steps[_T],
     registers: ParameterAccess,
     priority: Priority,
     reached: Reached = _not_reached,
+    tell: Callable[[Severity, Report], None] = _not_told,
 ) -> _T:
     """
     Carry out a sequence of a profile on the bus.
 
     :param reached: for a sequence that waits for the drive's status between two steps.
+    :param tell: for one that writes to a memory that wears out: told what it has written.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer; or it refuses, and the sequence ends by that.
     """
@@ -81,6 +89,8 @@ async def carry_out(
         try:
             if isinstance(step, profile.Read):
                 brought = await registers.read(step.key, priority, once=step.once)
+            elif isinstance(step, profile.Write) and step.stored:
+                await _store(step, registers, priority, tell)
             elif isinstance(step, profile.Write):
                 await registers.write(step, priority)
             elif isinstance(step, profile.Acknowledge):
@@ -94,25 +104,55 @@ async def carry_out(
             refusal.__cause__ = error
 
 
+async def _store(
+    step: profile.Write,
+    registers: ParameterAccess,
+    priority: Priority,
+    tell: Callable[[Severity, Report], None],
+) -> None:
+    """Write to a memory that wears out, and only what does not stand there; report it."""
+    address, data = registers.target(step)
+    before = await registers.read_from(address, priority)
+    if before == data:
+        return
+    await registers.write(step, priority)
+    old, new = registers.value(step.key, before), registers.value(step.key, data)
+    name = registers.model[step.key].name
+    tell(Severity.INFO, Report(Cause.STORED, key=step.key, name=name, old=old, new=new))
+
+
 class Commands:
     """
     The commands of one drive, by the control method that its settings choose; for the bus.
 
     Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
 
+    :param tell: told what is written to a memory that wears out.
+
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
     """
 
-    def __init__(self, settings: DriveSettings, registers: ParameterAccess) -> None:
+    def __init__(
+        self,
+        settings: DriveSettings,
+        registers: ParameterAccess,
+        tell: Callable[[Severity, Report], None],
+    ) -> None:
         method = registers.model.profile.methods[settings.control_method]
         self._method = method(settings.reference, registers.reaches)
         self._registers = registers
+        self._tell = tell
 
     @property
     def coasts(self) -> bool:
         """It can release the motor at once."""
         return self._method.coasts
+
+    @property
+    def keeps_control(self) -> str:
+        """Why control stays with the bus at :meth:`release`; ``''`` where it does not."""
+        return self._method.keeps_control
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
@@ -122,10 +162,14 @@ class Commands:
         """Tell who has control of the drive."""
         return await carry_out(self._method.holder(), self._registers, priority)
 
+    async def require_startable(self) -> None:
+        """See to it that nothing but a fault keeps the motor from being started; only reads."""
+        await carry_out(self._method.require_startable(), self._registers, Priority.SERVICE)
+
     async def take_control(self, reached: Reached) -> None:
         """Put the drive under bus control with no run command standing."""
         steps = self._method.take_control()
-        await carry_out(steps, self._registers, Priority.SERVICE, reached)
+        await carry_out(steps, self._registers, Priority.SERVICE, reached, self._tell)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """Write set-point 0 in the unit of a control mode, and read it back."""

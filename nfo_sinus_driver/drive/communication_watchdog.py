@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -31,7 +32,7 @@ from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
 
 class CommunicationWatchdog:
     """
-    SioTot with AutoStop of one drive [C91]; used on the bus alone.
+    The time-out of one drive, and that it stops the motor then [C91]; used on the bus alone.
 
     :param commanded: this driver may command the drive, and not only watch it.
     """
@@ -88,7 +89,9 @@ class CommunicationWatchdog:
         if not self._inverter.can_time_out:
             raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
         key = self._inverter.model.key
-        wanted = {key(Role.COMMUNICATION_TIMEOUT): seconds, key(Role.STOP_AT_TIMEOUT): True}
+        wanted: dict[str, Value] = {key(Role.COMMUNICATION_TIMEOUT): seconds}
+        if key(Role.STOP_AT_TIMEOUT):
+            wanted[key(Role.STOP_AT_TIMEOUT)] = True
         return await self._parameters.change_now(
             wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
         )
@@ -101,15 +104,19 @@ class CommunicationWatchdog:
             self._inverter.tell(Severity.WARNING, complaint)
 
     def _complaint(self) -> Report | None:
-        inverter = self._inverter
+        inverter, model = self._inverter, self._inverter.model
         timeout, margin = inverter.sio_tot, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
         if not inverter.can_time_out:
             return Report(Cause.NO_OWN_TIMEOUT)
+        name = model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
-            return Report(Cause.OWN_TIMEOUT_OFF)
+            return Report(Cause.OWN_TIMEOUT_OFF, name=name)
         if not inverter.auto_stop:
-            return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING)
+            stop = model[model.key(Role.STOP_AT_TIMEOUT)].name
+            return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop)
         if timeout < least - 1e-9:
-            return Report(Cause.OWN_TIMEOUT_SHORT, timeout=timeout, margin=margin, least=least)
+            return Report(
+                Cause.OWN_TIMEOUT_SHORT, name=name, timeout=timeout, margin=margin, least=least
+            )
         return None

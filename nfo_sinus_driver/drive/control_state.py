@@ -44,6 +44,7 @@ class ControlEvent(enum.Enum):
     CONNECTED = 'the drive is connected'
     LOST = 'the drive is lost, or left alone'
     ENABLE = 'somebody enables the motor'
+    REFUSED = 'an enable is refused before anything was written'
     RUNNING = 'the status says that the motor runs, at set-point 0'
     STOP = 'a reason to stop: a service, a fault, a refusal, control lost, a failed enable …'
     STOPPED = 'the status confirms that the drive stops'
@@ -60,6 +61,7 @@ _TABLE = """
 CONNECTED     IDLE      .         .        .        .         .        .        .        .
 LOST          .         OFFLINE   STOPPING STOPPING ABORTING  .        .        STOPPING .
 ENABLE        .         ENABLING  .        .        .         .        .        .        .
+REFUSED       .         .         IDLE     .        .         .        .        .        .
 RUNNING       .         .         ENABLED  .        .         .        .        .        .
 STOP          STOPPING  STOPPING  STOPPING STOPPING ABORTING  .        .        .        .
 STOPPED       .         .         .        .        .         .        IDLE     .        .

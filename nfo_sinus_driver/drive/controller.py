@@ -282,26 +282,48 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            if self._refusal is not None:
-                self._explain_refusal(await self._inverter.look(Priority.SERVICE))
-            control_mode = await self._starting.start(prepare)
-            self._happened(ControlEvent.RUNNING)
-            if not self.enabled:
-                raise Cancelled
-            self._setpoint.arm(control_mode)
+            control_mode = await self._check()
+            await self._start(control_mode, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
-        except Exception as error:
-            # whatever went wrong, a run command may stand by now
-            self._stop()
-            await self._settle()
-            raise DriveError(report_of(error)) from error
         finally:
             self._enabling = None
         if self._inverter.settings.follows_setpoints:
             return Report(Cause.ENABLED)
         reference = self._inverter.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
+
+    async def _check(self) -> str:
+        """
+        See to it that nothing keeps the motor from being started; return the control mode.
+
+        :raises DriveError: something does; nothing was written.
+        """
+        try:
+            if self._refusal is not None:
+                self._explain_refusal(await self._inverter.look(Priority.SERVICE))
+            return await self._starting.check()
+        except Exception as error:
+            self._happened(ControlEvent.REFUSED)
+            raise DriveError(report_of(error)) from error
+
+    async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+        """
+        Start the motor, and follow set-points from then on.
+
+        :raises DriveError: it does not run, and why; the run command is removed then.
+        """
+        try:
+            await self._starting.start(control_mode, prepare)
+            self._happened(ControlEvent.RUNNING)
+            if not self.enabled:
+                raise Cancelled
+            self._setpoint.arm(control_mode)
+        except Exception as error:
+            # whatever went wrong, a run command may stand by now
+            self._stop()
+            await self._settle()
+            raise DriveError(report_of(error)) from error
 
     async def stop(self, patience: float | None = None) -> Report:
         """
@@ -456,16 +478,17 @@ class Controller:
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
             raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
-        released = Report(Cause.CONTROL_RELEASED, stop=stopped)
         try:
             await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
             if not self._inverter.sio_tot:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
-            released = Report(Cause.COASTED_AND_RELEASED)
+            stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self._method.release()
-        return released
+        if self._method.keeps_control:
+            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self._method.keeps_control)
+        return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     def close(self) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""

@@ -124,7 +124,7 @@ class Drive:
         )
         self._controller: Controller | None = None
         if settings.control_method != 'monitor':
-            commands = Commands(settings, self.registers)
+            commands = Commands(settings, self.registers, self.inverter.tell)
             self._controller = Controller(bus, self.inverter, commands, self.setpoint)
         self._watch = Poller(
             bus,

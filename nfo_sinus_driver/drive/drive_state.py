@@ -23,6 +23,7 @@ from fractions import Fraction
 import functools
 import logging
 import math
+import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
@@ -38,6 +39,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.drive.snapshot import NEVER
 from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import InverterStatus
@@ -156,6 +158,11 @@ class DriveState:
             word, at = await self._read_word(priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
+        code_of = self.model.profile.status_word.code
+        if code_of is not None:
+            seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+            alarmed = before is not None and word != before.word and alarming(seen)
+            return await self._with_frequency(seen, Priority.STOP if alarmed else priority, once)
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -181,7 +188,25 @@ class DriveState:
         if differs:
             word, at = await self._read_word(priority, once)
             seen = replace(seen, word=word, at=at)
-        return self._saw(seen)
+        return await self._with_frequency(seen, priority, once)
+
+    async def _with_frequency(
+        self, seen: InverterStatus, priority: Priority, once: bool
+    ) -> InverterStatus:
+        """Complete a status by the frequency, where its word alone does not tell a stop."""
+        if not seen.by_frequency:
+            return self._saw(seen)
+        try:
+            frequency = await self.measure(Role.ACTUAL_FREQUENCY, priority, once=once)
+        except Refused:
+            frequency = math.nan
+        self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
+        before, fell = self.seen, NEVER
+        if before is not None and abs(frequency) < abs(before.frequency):
+            fell = before.at, seen.at
+        elif before is not None and abs(frequency) == abs(before.frequency):
+            fell = before.fell
+        return self._saw(replace(seen, frequency=frequency, fell=fell))
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
         reply = await self._registers.read_reply(self.word_key, priority, once=once)
@@ -193,8 +218,8 @@ class DriveState:
         return self.model.key(Role.STATUS_WORD)
 
     def status_word(self, data: bytes) -> int:
-        """Return what counts of a status word: the upper half is described nowhere [C24]."""
-        return int(self._registers.number(self.word_key, data)) & 0xFFFF
+        """Return the status word that bytes mean."""
+        return int(self._registers.number(self.word_key, data))
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
@@ -237,18 +262,19 @@ class DriveState:
         self.answering = False
         self.on_missed()
 
-    async def measure(self, role: Role, priority: Priority) -> float:
+    async def measure(self, role: Role, priority: Priority, *, once: bool = True) -> float:
         """
-        Read a measured value once; NaN if its family has none such.
+        Read a measured value; NaN if its family has none such.
 
         NaN, too, if the drive says what cannot be, and that again.
 
+        :param once: do not repeat a request when there is no response.
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self._registers.read_data(key, priority, once=True)
+        data = await self._registers.read_data(key, priority, once=once)
         value = self._registers.number(key, data)
         if not self._registers.is_odd(key):
             return value
@@ -276,16 +302,21 @@ class DriveState:
     @property
     def can_time_out(self) -> bool:
         """It has a time-out of its own that can be read and set over this line."""
-        needed = (Role.COMMUNICATION_TIMEOUT, Role.STOP_AT_TIMEOUT)
-        return all(self.has(self.model.key(role)) for role in needed)
+        stop = self.model.key(Role.STOP_AT_TIMEOUT)
+        needed = (self.model.key(Role.COMMUNICATION_TIMEOUT), *([stop] if stop else []))
+        return all(self.has(key) for key in needed)
 
     async def read_timeout(self) -> None:
         """Read whether the drive has a time-out of its own."""
         if not self.can_time_out:
             return
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
-        stop = self.model.key(Role.STOP_AT_TIMEOUT)
         self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
+        stop = self.model.key(Role.STOP_AT_TIMEOUT)
+        if not stop:
+            # where nothing can keep it from that, it stops the motor
+            self.auto_stop = True
+            return
         data = await self._registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
         self.auto_stop = data == self._registers.encode(stop, True)
@@ -299,7 +330,7 @@ class DriveState:
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self._registers.read(self.model.key(Role.STATUS_CODE), priority, once=not patient)
+        await self._registers.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
         self._older = dialect is not None and self.settings.classic_dialect == dialect.name

@@ -24,18 +24,10 @@ from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 
-#: Beyond what any reference of the drive asks for in either direction, 150 Hz, 9000 rpm and 200 %
-#: ([M0 table 4], [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
-_MOST: Mapping[Role | None, float] = {
-    Role.ACTUAL_FREQUENCY: 180.0,
-    Role.ACTUAL_SPEED: 10800.0,
-    Role.ACTUAL_TORQUE: 400.0,
-}
 _CODES: Mapping[Role | None, Callable[[Family, int], bool]] = {
     Role.STATUS_CODE: lambda model, code: code in model.status_codes,
     Role.CONTROL_SOURCE: lambda model, code: code in model.profile.holders,
-    # the upper half is described nowhere [C24]
-    Role.STATUS_WORD: lambda model, word: model.profile.status_word.may_say(word & 0xFFFF),
+    Role.STATUS_WORD: lambda model, word: _may_say(model, word),
 }
 
 
@@ -46,7 +38,14 @@ def can_be(model: Family, key: str, value: Value) -> bool:
         return _CODES[role](model, int(value))
     if isinstance(value, str):
         return not parameter.labels or value in parameter.labels.values()
-    return abs(value) <= _MOST.get(role, abs(value)) and _in_range(parameter, value)
+    most = abs(value) if role is None else model.profile.most.get(role, abs(value))
+    return abs(value) <= most and _in_range(parameter, value)
+
+
+def _may_say(model: Family, word: int) -> bool:
+    status_word = model.profile.status_word
+    told = status_word.code is None or status_word.code(word) in model.status_codes
+    return told and status_word.may_say(word)
 
 
 def _in_range(parameter: Parameter, value: float) -> bool:

@@ -323,6 +323,7 @@ class Poller:
 
     async def _poll(self) -> None:
         inverter = self._inverter
+        last = self.snapshot.actual
         seen = await self._look()
         if self._mode_is_due:
             self._mode_read_at = time.monotonic()
@@ -334,10 +335,7 @@ class Poller:
         actual = _ACTUAL.get(inverter.control_mode)
         steady = True
         if actual is not None:
-            asked_at = time.monotonic()
-            last = inverter.last_polled(actual).value
             now = await self._measure(actual)
-            self._turn = time.monotonic() - asked_at
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
             age = time.monotonic() - inverter.last_polled(role).at
@@ -355,8 +353,15 @@ class Poller:
 
     async def _measure(self, role: Role) -> float:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
+        inverter = self._inverter
+        if role is Role.ACTUAL_FREQUENCY and inverter.seen and inverter.seen.by_frequency:
+            # it came with the status
+            return inverter.frequency
+        asked_at = time.monotonic()
         value = await self._read_measured(role)
-        self._inverter.polled[role] = Measured(value, time.monotonic())
+        inverter.polled[role] = Measured(value, time.monotonic())
+        if role in inverter.model.roles:
+            self._turn = time.monotonic() - asked_at
         return value
 
     async def _read_measured(self, role: Role) -> float:

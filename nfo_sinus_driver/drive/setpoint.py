@@ -245,6 +245,12 @@ class Setpoint:
         return self.control_mode, self._inverter.unit
 
     @property
+    def place(self) -> tuple[frozenset[Address], bool]:
+        """Where it takes a set-point, and whether only forward."""
+        assert self._target is not None
+        return frozenset(self._keys), self._target.forward_only
+
+    @property
     def most(self) -> float:
         """The greatest set-point that it may be given, in either direction."""
         assert self._target is not None
@@ -273,7 +279,8 @@ class Setpoint:
         assert self._target is not None
         now, period = time.monotonic(), self._rewrite_period
         found: list[tuple[Address, bytes]] = []
-        for step in self._target.writes(self._limited(request)):
+        before_all = self._meant(self._standing)
+        for step in self._target.writes(self._limited(request), before_all):
             address, data = self._registers.target(step)
             before, since = self._written.get(address, (b'', -math.inf))
             if data != before or now - since >= period:
@@ -318,8 +325,9 @@ class Setpoint:
     # --- to this drive ------------------------------------------------------------------------
 
     def _limited(self, request: Request) -> float:
+        assert self._target is not None
         most = min(self.most, request.most)
-        return max(-most, min(most, request.value))
+        return max(self._target.least, -most, min(most, request.value))
 
     def _accept(self, request: Request) -> float:
         """Take note that a request counts; return what it is limited to."""
@@ -428,7 +436,7 @@ class Setpoint:
             return NAN
         keys = self._keys.items()
         value = self._registers.value
-        return self._target.value([value(key, standing[address]) for address, key in keys])
+        return self._target.value({key: value(key, standing[address]) for address, key in keys})
 
     async def _watch_age(self) -> None:
         try:
@@ -449,7 +457,7 @@ class Setpoint:
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
-        zero = self._target.writes(0.0)
+        zero = self._target.writes(0.0, self._meant(self._standing))
         if self._standing != dict(map(self._registers.target, zero)):
             if not self._warned:
                 self._warned = True

@@ -119,6 +119,9 @@ class SetpointAll:
                 f'{name}: {" ".join(quantity).strip()}' for quantity, name in meanings.items()
             )
             return Report(Cause.MEMBERS_DIFFER, meanings=told)
+        places = {setpoint.place: name for name, setpoint in setpoints.items()}
+        if len(places) > 1:
+            return Report(Cause.MEMBERS_WRITTEN_DIFFERENTLY, names=' and '.join(places.values()))
         return None
 
 

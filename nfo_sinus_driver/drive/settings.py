@@ -78,6 +78,7 @@ class DriveSettings:
 
     :ivar address: one that the protocol of the line has.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
+    :ivar control_method: ``''`` becomes the usual one of the model, once that is known.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
@@ -97,7 +98,7 @@ class DriveSettings:
 
     address: int = 1
     model: str = usual_family()
-    control_method: str = 'mode_scmd'
+    control_method: str = ''
     reference: str = 'fieldbus'
     poll_rate: float = 0.0
     idle_poll_rate: float = 0.0
@@ -119,7 +120,11 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         _one_of('model', self.model, (*families(), AUTO))
-        _one_of('control_method', self.control_method, _control_methods(self.model))
+        if not self.control_method and self.model != AUTO:
+            usual = next(iter(load_profile(self.model).methods))
+            object.__setattr__(self, 'control_method', usual)
+        if self.control_method:
+            _one_of('control_method', self.control_method, _control_methods(self.model))
         _one_of('reference', self.reference, REFERENCES)
         kind = f'{self.control_method} on {self.model}'
         allowed = _references(self.model, self.control_method)

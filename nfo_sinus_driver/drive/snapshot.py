@@ -34,6 +34,11 @@ from nfo_sinus_driver.catalog import StatusCode
 from nfo_sinus_driver.drive.events import Event
 
 NAN = math.nan
+#: A frequency that was seen to fall, and has not risen since, counts as falling so long, s: the
+#: steps of a slow ramp come seldom.
+_FALLS_FOR = 2.0
+#: Of what has not happened: when it began, and when it was over.
+NEVER = (-math.inf, -math.inf)
 #: Stands for an inverter status that has not been read; no drive has it.
 NO_CODE = -1
 
@@ -63,12 +68,16 @@ class InverterStatus:
     What the drive's status word and its inverter status say at one moment.
 
     :ivar at: when the answer arrived, s of ``time.monotonic``; that of the word, if there is one.
-    :ivar word: DriveStatus, the low 16 bits [C24]; ``None`` if the drive has none [C21].
+    :ivar word: the status word; ``None`` if the drive has none [C21].
     :ivar code: the inverter status code, read without acknowledging.
     :ivar code_at: when that arrived, likewise.
     :ivar model: whose words these are.
     :ivar by_mode: where there is no status word and the code does not say who controls: MODE says
         that the bus does.
+    :ivar frequency: Hz, read with it where the family's status word tells no stop; NaN elsewhere,
+        and where the drive refuses to tell it.
+    :ivar fell: when the last two statuses in a row were between which the frequency fell; minus
+        infinity if it has not, or has risen since.
     """
 
     at: float
@@ -77,6 +86,8 @@ class InverterStatus:
     model: Family
     by_mode: bool = False
     code_at: float = -math.inf
+    frequency: float = NAN
+    fell: tuple[float, float] = NEVER
 
     @functools.cached_property
     def listed(self) -> StatusCode:
@@ -86,6 +97,11 @@ class InverterStatus:
     def means(self, *meanings: Meaning) -> bool:
         """Tell whether the code means one of these."""
         return not self.listed.meanings.isdisjoint(meanings)
+
+    @property
+    def shown_word(self) -> int:
+        """What is published of the status word; 0 if the drive has none."""
+        return (self.word or 0) & self.model.profile.status_word.shown
 
     @functools.cached_property
     def facts(self) -> Fact:
@@ -152,7 +168,25 @@ class InverterStatus:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing tells a stop from a lower reference
         may_stop = self.word is None and self.means(Meaning.SLOWING)
-        return self.runs_by_bus and not may_stop
+        falls = self.fell[1] >= self.at - _FALLS_FOR
+        slows = self.by_frequency and (self.frequency == 0 or falls)
+        return self.runs_by_bus and not may_stop and not slows
+
+    def keeps_running_since(self, told: float) -> bool:
+        """
+        Tell whether it keeps running, although it was told to stop.
+
+        :param told: when, s of ``time.monotonic``: a frequency that fell before says nothing.
+        """
+        if not self.by_frequency:
+            return self.keeps_running
+        stands = self.at > told and self.frequency == 0
+        return self.runs_by_bus and not stands and not self.fell[0] > told
+
+    @property
+    def by_frequency(self) -> bool:
+        """Its word goes on saying that the motor runs while that ramps to a stop."""
+        return self.model.profile.status_word.by_frequency
 
     @property
     def tuning(self) -> bool:
@@ -184,7 +218,8 @@ class InverterStatus:
         """The output stage drives the motor, be it only to a stop."""
         if self.state is State.UNKNOWN or self.tuning:
             return self.tuning or self._driven_by_code
-        return self.state in _DRIVEN
+        stands = self.by_frequency and self.frequency == 0
+        return self.state in _DRIVEN and not (self.runs and stands)
 
     @property
     def _from_bus_by_code(self) -> bool:

@@ -45,13 +45,12 @@ class StartSequence:
         self._method = method
         self._confirmation = Confirmation(bus, inverter)
 
-    async def start(self, prepare: Callable[[], Awaitable[None]]) -> str:
+    async def check(self) -> str:
         """
-        Take control and run at set-point 0.
+        See to it that nothing keeps the motor from being started; nothing is written.
 
-        :param prepare: does what has to be done before a run command, once the bus has control.
-        :returns: the control mode in which it runs.
-        :raises DriveError: it does not run, and why; a run command may stand all the same.
+        :returns: the control mode in which it will run.
+        :raises DriveError: something does, and what to do about it.
         """
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
@@ -63,14 +62,23 @@ class StartSequence:
             raise DriveError(
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
+        await self._method.require_startable()
+        return control_mode
+
+    async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+        """
+        Take control and run at set-point 0.
+
+        :param prepare: does what has to be done before a run command, once the bus has control.
+        :raises DriveError: it does not run, and why; a run command may stand all the same.
+        """
         await self.take_control(control_mode)
         await self._confirmation.wait_for_step(lambda now: now.from_bus)
-        if inverter.settings.follows_setpoints:
+        if self._inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
         await self._method.run(self._await_start)
         await self._await_start(lambda now: now.runs)
-        return control_mode
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
 import enum
+import math
 import time
 
 from nfo_sinus_driver.bus import Bus
@@ -95,6 +96,8 @@ class StopSequence:
         self._reasons = 0
         #: Why it has not been confirmed yet.
         self._unconfirmed = _NO_ANSWER_YET
+        #: When the drive had been told to stop for the reasons that there are.
+        self._told_at = math.inf
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
 
@@ -136,6 +139,7 @@ class StopSequence:
         if self._task is None:
             self._outcome = None
             self._unconfirmed = _NO_ANSWER_YET
+            self._told_at = math.inf
             self._due = time.monotonic() + confirmation.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
@@ -146,6 +150,7 @@ class StopSequence:
             self.request()
         else:
             self._outcome = None
+            self._told_at = math.inf
             self._reasons += 1
             self._report_fault()
             self._bus.wake(self._task)
@@ -231,6 +236,7 @@ class StopSequence:
             self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
         if self._reasons > reasons:
             self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
+            self._told_at = math.inf
         self._tried_at = time.monotonic()
         self._report_fault()
         return self._outcome
@@ -253,6 +259,7 @@ class StopSequence:
         refusal: Refused | None = None
         try:
             await self._method.stop(control_mode)
+            self._told_at = min(self._told_at, time.monotonic())
         except Refused as error:
             if error.code == Refused.BUSY:
                 self._unconfirmed = report_of(error)
@@ -283,4 +290,5 @@ class StopSequence:
             return self._inverter.report(Cause.TUNING_ENERGISES)
         if refusal and not seen.local:
             return report_of(refusal)
-        return self._inverter.report(Cause.DRIVE_SAYS) if seen.keeps_running else None
+        keeps_running = seen.keeps_running_since(self._told_at)
+        return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None

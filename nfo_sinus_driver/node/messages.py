@@ -36,11 +36,6 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 
-_CONTROL_METHODS = {
-    'mode_scmd': DriveStatus.MODE_SCMD,
-    'drive_control': DriveStatus.DRIVE_CONTROL,
-    'monitor': DriveStatus.MONITOR,
-}
 _CONTROL_MODES = {
     'Freque': DriveStatus.FREQUE,
     'PI-Reg': DriveStatus.PI_REG,
@@ -79,7 +74,7 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
         enabled=snapshot.enabled,
-        control_method=_CONTROL_METHODS[snapshot.control_method],
+        control_method=getattr(DriveStatus, snapshot.control_method.upper()),
         control_mode=_CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
         unit=snapshot.unit,
         setpoint=snapshot.setpoint,
@@ -96,7 +91,7 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
 def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
     facts = int(seen.facts)
     message.state = _STATES[seen.state]
-    message.status_word = seen.word or 0
+    message.status_word = seen.shown_word
     message.valid = seen.valid.value
     for name, bit in _FACTS:
         setattr(message, name, bool(facts & bit))
@@ -112,7 +107,8 @@ def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
         raise ValueError('no inverter status without a connection')
     return InvSt(
         header=Header(stamp=stamp, frame_id=frame_id),
-        code=snapshot.status.code & 0xFF,
+        # a code that no table has may be greater than one byte: it is told by the text
+        code=min(snapshot.status.code, 0xFF),
         text=snapshot.text,
         description=snapshot.description,
         kind=_KINDS[snapshot.kind],

@@ -179,9 +179,9 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'control_method',
-        'mode_scmd',
-        'How the drive is commanded; monitor: not one write to it',
-        constraints=f'one of {", ".join(CONTROL_METHODS)}',
+        '',
+        "How the drive is commanded; '': as usual for its family; monitor: not one write to it",
+        constraints=f"'' or one of {', '.join(CONTROL_METHODS)}",
     ),
     Setting(
         'reference',

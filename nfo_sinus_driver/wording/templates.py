@@ -63,7 +63,7 @@ TEMPLATES: Mapping[Cause, str] = {
     'it at once',
     # --- why a command is not carried out
     Cause.MONITOR_ONLY: 'control_method is monitor: this driver only reads; set control_method to '
-    'mode_scmd',
+    'another one',
     Cause.NOT_CONNECTED: 'the drive at address {address} is not connected',
     Cause.NOT_ACTIVE: 'the drive is not active',
     Cause.ENDING: 'this {call.program} is ending',
@@ -111,8 +111,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.NEXT_FAULT: 'acknowledged {acknowledged}, but {still}',
     Cause.NOT_IN_CONTROL: 'not under bus control',
     Cause.CONTROL_RELEASED: '{stop}; control released',
-    Cause.COASTED_AND_RELEASED: 'released to coast, for the time-out of the drive would end the '
-    'ramp; control released',
+    Cause.COASTED_FOR_TIMEOUT: 'released to coast, for the time-out of the drive would end the '
+    'ramp',
+    Cause.CONTROL_KEPT: '{stop}; the bus keeps control: {why}',
     Cause.LEFT_TO_RAMP: '{stop}; it was left to its ramp, under bus control',
     Cause.RELEASE_BLOCKED: 'fault {status} is active and the drive takes no command: a run command '
     'may still stand in it when the fault is acknowledged',
@@ -171,6 +172,7 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.MEMBER_NOT_ENABLED: '{name} is not enabled',
     Cause.MEMBER_TAKES_SEVERAL_WRITES: '{name} takes a set-point in several writes',
     Cause.MEMBERS_DIFFER: 'it would not mean the same to all drives ({meanings})',
+    Cause.MEMBERS_WRITTEN_DIFFERENTLY: 'it would not be written alike to all drives ({names})',
     Cause.SHARED_SETPOINT_LIMITED: '{value:g} is limited to {limited:g}, the least that a drive '
     'allows ({name})',
     # --- what the drive says of itself
@@ -186,17 +188,18 @@ TEMPLATES: Mapping[Cause, str] = {
         why='none is known of this model', remedy='use the RUN input'
     ),
     Cause.OWN_TIMEOUT_OFF: _NO_TIMEOUT.format(
-        why='SioTot is 0', remedy='{call.set_drive_timeout}'
+        why='{name} is 0', remedy='{call.set_drive_timeout}'
     ),
     Cause.OWN_TIMEOUT_STOPS_NOTHING: _NO_TIMEOUT.format(
-        why='AutoStop is OFF', remedy='{call.set_drive_timeout}'
+        why='{name} is OFF', remedy='{call.set_drive_timeout}'
     ),
-    Cause.OWN_TIMEOUT_SHORT: 'the time-out of the drive itself (SioTot {timeout:g} s) is less than '
+    Cause.OWN_TIMEOUT_SHORT: 'the time-out of the drive itself ({name} {timeout:g} s) is less than '
     'lost_after + {margin:g} s: noise that this {call.program} waits out may stop the '
     'motor; {call.set_drive_timeout}, at least {least:g} s',
     Cause.OWN_TIMEOUT_LATER: '{call.drive_timeout} cannot be set yet, and will be when it is '
     'enabled: {why}',
-    Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no SioTot, so it must be 0',
+    Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
+    'that can be set, so it must be 0',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',
@@ -244,6 +247,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.BAD_VALUE: '{error}',
     Cause.CHANGED: '{change}',
     Cause.CHANGED_FOR_TIMEOUT: '{change} ({call.drive_timeout})',
+    Cause.STORED: '{key} ({name}) was changed to take control, and is stored in the drive: '
+    '{old} -> {new}',
     Cause.CHANGED_AS_WANTED: '{change}, as the parameter file says',
     Cause.CHANGED_AT_DRIVE: 'changed at the drive: {change}',
     Cause.NOT_AS_WANTED: '{key} is {has} in the drive, but {wanted} was asked for: it is left so',

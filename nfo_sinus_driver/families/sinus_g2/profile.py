@@ -45,6 +45,7 @@ from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.profile import one
 from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -75,6 +76,13 @@ _SETPOINTS = {
     'PI-Reg': SetpointTarget('status.reg_set', 150.0, at=_COMMON),
     'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON),
     'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON),
+}
+#: Beyond what any reference asks for in either direction, 150 Hz, 9000 rpm and 200 % ([M0 table 4],
+#: [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
+MOST = {
+    Role.ACTUAL_FREQUENCY: 180.0,
+    Role.ACTUAL_SPEED: 10800.0,
+    Role.ACTUAL_TORQUE: 400.0,
 }
 #: The run command that each reference has; the fixed ones are made of their number.
 _COMMANDS = {
@@ -463,6 +471,7 @@ PROFILE = Profile(
     older=OlderDialect(
         'classic', 'v5.0', before=4.28, harmless=frozenset((Holder.NOBODY, Holder.LOCAL))
     ),
+    most=MOST,
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
 )

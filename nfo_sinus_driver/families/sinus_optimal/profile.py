@@ -42,6 +42,7 @@ from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2.profile import CONTROL_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import MODE
+from nfo_sinus_driver.families.sinus_g2.profile import MOST
 from nfo_sinus_driver.families.sinus_g2.profile import STATUS_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import ModeScmd
 from nfo_sinus_driver.families.sinus_optimal import words
@@ -206,4 +207,5 @@ PROFILE = Profile(
     methods={'mode_scmd': ModeSmode, 'drive_control': DriveControl},
     setpoints=_SETPOINTS,
     in_charge=_in_charge,
+    most=MOST,
 )

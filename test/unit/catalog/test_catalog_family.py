@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import csv
 from pathlib import Path
+import re
 import shutil
 import time
 
@@ -104,6 +105,13 @@ def test_every_folder_is_a_family() -> None:
     assert [load_family(name).name for name in families()] == list(families())
 
 
+@pytest.mark.parametrize('name', families())
+def test_every_control_method_has_a_constant_in_the_message(name: str) -> None:
+    message = Path(__file__).parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
+    constants = re.findall(r'uint8 (\w+)=', message.read_text(encoding='utf-8'))
+    assert {method.upper() for method in load_family(name).profile.methods} <= set(constants)
+
+
 def test_unknown_family() -> None:
     with pytest.raises(ValueError, match="unknown model 'sinus_h': choose one of sinus_g2"):
         load_family('sinus_h')
@@ -164,6 +172,8 @@ def test_copied_tables_are_as_good(folder: Path) -> None:
             'motor.u_nom on modbus stands in line 6 already',
         ),
         (CODES, ['5'], {'code': 'five'}, 'invalid literal'),
+        (CODES, ['5'], {'code': '256'}, 'code 256 is out of range, 0 to 255'),
+        (CODES, ['5'], {'code': '-1'}, 'code -1 is out of range, 0 to 255'),
         (CODES, ['5'], {'code': '4'}, 'code 4 stands in line 6 already'),
         (CODES, ['5'], {'kind': 'disaster'}, "'disaster' is not a valid Kind"),
         (CODES, ['5'], {'requires_ack': 'maybe'}, "no 'maybe'"),

@@ -38,6 +38,8 @@ CODECS = {
     'SINT16': 'sint16_be',
     'UINT32': 'uint32_ws',
     'SINT32': 'sint32_ws',
+    # of which the upper half is described nowhere [C24]
+    'UINT32, low half': 'uint32_ws[0:15]',
 }
 
 #: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
@@ -123,7 +125,7 @@ GOLDEN_READ = [
     ('fieldbus.nfo_ver', 0x2B4, 'UINT16', '', 4018, (4018,)),
     ('fieldbus.inv_st', 0x2A5, 'UINT16', '', 37, (37,)),
     ('fieldbus.inv_st_with_ack', 0x2A4, 'UINT16', '', 5, (5,)),
-    ('fieldbus.drive_status', 0x258, 'UINT32', '', 0x0337, (0x0337, 0)),
+    ('fieldbus.drive_status', 0x258, 'UINT32, low half', '', 0x0337, (0x0337, 0)),
     ('fieldbus.spd_scl_numerator', 0x268, 'SINT32', '', 1, (1, 0)),
     ('fieldbus.spd_scl_denominator', 0x26A, 'SINT32', '', 1, (1, 0)),
 ]
@@ -322,6 +324,19 @@ def test_golden_row_of_classic(
     assert (place.numbers, place.codec.name) == (ids, CODECS[type_])
     assert row.decode(packed(*words), 'classic') == value
     assert row.encode(value, 'classic') == packed(*words)
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'data'),
+    [
+        ('modbus', packed(0x0337, 0xA5A5)),
+        ('classic', packed(0x0337)),
+        ('profibus', bytes.fromhex('A5A50337')),
+        ('canopen', bytes.fromhex('3703A5A5')),
+    ],
+)
+def test_the_upper_half_of_the_status_word_counts_on_no_bus(protocol: str, data: bytes) -> None:
+    assert G2['fieldbus.drive_status'].decode(data, protocol) == 0x0337
 
 
 def test_parameter_that_is_not_on_a_bus_says_so() -> None:

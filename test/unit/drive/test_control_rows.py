@@ -68,6 +68,9 @@ def test_every_row_is_visited(visited: Visited) -> None:
         # a whole day's work, and its end with the motor running
         state.ride(wait=1.0)
         state.stop(wait=2.5)
+        state.fault(5, standing=False, wait=1.0)
+        state.enable(wait=1.0)
+        state.acknowledge(wait=1.0)
         state.enable_without_run_input(wait=2.5)
         state.run_input_on(wait=1.0)
         state.ride(wait=1.0)

@@ -23,20 +23,17 @@ its direction in another register.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from collections.abc import Sequence
 import dataclasses
 import math
 from pathlib import Path
 import shutil
 import struct
-import threading
-import time
-from types import SimpleNamespace
 from typing import Any
 
 from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
+from made_up_rig import FarEnd
 import pytest
 from support.said import raises
 from support.said import said
@@ -49,32 +46,20 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
 
 RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ, KIND = 10, 100, 101, 102, 200, 201, 202, 300
 RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15
 RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 
 
-class Acme:
-    """The registers of an Acme at the other end of a line; it refuses what it does not have."""
-
-    protocol = PROTOCOLS['modbus_rtu']
+class Acme(FarEnd):
+    """An Acme."""
 
     def __init__(self) -> None:
-        self.registers = dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0)
+        super().__init__(dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0))
         self.registers[RAMP] = 50
-        self.lock = threading.Lock()
-        #: What becomes of the next write to a register.
-        self.fates: dict[int, LinkError] = {}
-        #: Register and word of all that was written, in order.
-        self.writes: list[tuple[int, int]] = []
         self.trip(0)
 
     def trip(self, code: int) -> None:
@@ -100,48 +85,10 @@ class Acme:
         """The code of the fault that stands."""
         return self.registers[CODE] if self.registers[TOLD] & TRIPPED else 0
 
-    # --- the link, as the bus has it ---
-
-    def open(self) -> None:
-        """Nothing has to be opened."""
-
-    def close(self) -> None:
-        """Nothing has to be closed."""
-
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
-        """Nothing is ever in doubt."""
-
-    def identify(self, unit: int) -> SimpleNamespace:
-        """It does not tell who it is."""
-        return SimpleNamespace(done=True, found=Identification())
-
-    def parts(self, address: Address) -> Sequence[Address]:
-        """Whatever it has is read at once."""
-        return (address,)
-
-    def read(self, unit: int, address: Address) -> Reply:
-        with self.lock:
-            numbers = self._numbers(address)
-            words = [self.registers[number] for number in numbers]
-        return Reply(struct.pack(f'>{len(words)}H', *words), time.monotonic())
-
-    def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        with self.lock:
-            numbers = self._numbers(address)
-            words = struct.unpack(f'>{len(numbers)}H', data)
-            if address.index in self.fates:
-                raise self.fates.pop(address.index)
-            self.writes += zip(numbers, words, strict=True)
-            reset = words[0] & RESET and not self.registers[WORD] & RESET
-            self.registers.update(zip(numbers, words, strict=True))
-            self.trip(0 if reset and numbers[0] == WORD else self.fault)
-        return Reply(b'', time.monotonic())
-
-    def _numbers(self, address: Address) -> range:
-        numbers = range(address.index, address.index + address.size // 2)
-        if not all(number in self.registers for number in numbers):
-            raise Refused(Refused.ILLEGAL_ADDRESS, 'there is no such register')
-        return numbers
+    def was_written(self, before: dict[int, int]) -> None:
+        """Reset a fault on the edge, and go on as the control word says."""
+        reset = self.registers[WORD] & RESET and not before[WORD] & RESET
+        self.trip(0 if reset else self.fault)
 
 
 @pytest.fixture(autouse=True)
@@ -216,13 +163,15 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
     begun = len(acme.writes)
     drive.set_setpoint(-12.34)
     wait_until(lambda: acme.hertz == -12.34)
-    assert acme.writes[begun:] == [(TURN, 1), (SIZE, 0), (SIZE + 1, 0x1234)]
+    # the size is none before the direction changes
+    none, size = [(SIZE, 0), (SIZE + 1, 0)], [(SIZE, 0), (SIZE + 1, 0x1234)]
+    assert acme.writes[begun:] == [*none, (TURN, 1), *size]
     wait_until(lambda: drive.snapshot.actual == -12.34)
     assert (drive.snapshot.setpoint, drive.snapshot.text) == (-12.34, 'Run')
     # what stands there already is not written again
     drive.set_setpoint(-50.0)
     wait_until(lambda: acme.hertz == -50.0)
-    assert acme.writes[begun + 3 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
+    assert acme.writes[begun + 5 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
 
     with acme.lock:
         acme.trip(70)
@@ -252,11 +201,12 @@ def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bu
 
 def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, Notes())
-    acme.fates[SIZE] = NoAnswer('silence')
+    acme.fates[TURN] = NoAnswer('silence')
     begun = len(acme.writes)
     drive.set_setpoint(30.0)
     wait_until(lambda: acme.hertz == 30.0)
-    assert acme.writes[begun:] == [(TURN, 0), (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
+    none = [(SIZE, 0), (SIZE + 1, 0)]
+    assert acme.writes[begun:] == [*none, *none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
     wait_until(lambda: drive.snapshot.setpoint == 30.0)
 
 

@@ -17,8 +17,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 import enum
+import math
 
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
@@ -58,16 +60,20 @@ class Told(enum.IntFlag):
 class Frequency(SetpointTarget):
     """A frequency: its direction in one register, its size in another."""
 
-    def writes(self, value: float) -> Sequence[Write]:
-        """Return what is to be written: the direction first."""
-        turn = 'reverse' if value < 0 else 'forward'
-        return (Write(_TURN, turn), Write(_SIZE, abs(value)))
+    def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
+        """Return what is to be written: no size of the one direction is followed in the other."""
+        turn = Write(_TURN, 'reverse' if value < 0 else 'forward')
+        if value == 0:
+            return Write(_SIZE, 0.0), turn
+        if before == 0 or before * value > 0:
+            return turn, Write(_SIZE, abs(value))
+        return Write(_SIZE, 0.0), turn, Write(_SIZE, abs(value))
 
-    def value(self, values: Sequence[object]) -> float:
+    def value(self, values: Mapping[str, object]) -> float:
         """Return the frequency with its sign."""
-        turn, size = values
+        size = values[_SIZE]
         assert isinstance(size, float)
-        return -size if turn == 'reverse' else size
+        return -size if values[_TURN] == 'reverse' else size
 
 
 _FREQUENCY = Frequency(_SIZE, 400.0)

@@ -1,0 +1,169 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How a Bolt is commanded: function bits, the size of a frequency, and a source that is stored.
+
+All of its status is one word, the code included, which says that the motor runs until it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+import enum
+import math
+
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import NotPossible
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import SetpointTarget
+from nfo_sinus_driver.catalog.profile import Status
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.profile import one
+from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+
+_BITS, _SIZE, _SOURCE, _INPUTS = 'bus.bits', 'bus.size', 'bus.source', 'bus.inputs'
+_TOLD = 'bus.told'
+
+
+class Bit(enum.IntFlag):
+    """The function bits."""
+
+    RUN = 1 << 0
+    RESET = 1 << 3
+
+
+class Told(enum.IntFlag):
+    """The low half of the status word; the code is in the high one."""
+
+    RUNNING = 1 << 0
+    TRIPPED = 1 << 1
+    LINE = 1 << 2
+
+
+class Frequency(SetpointTarget):
+    """A frequency in one direction."""
+
+    def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
+        """Return what is to be written."""
+        return (Write(_SIZE, value),)
+
+    def value(self, values: Mapping[str, object]) -> float:
+        """Return the frequency."""
+        size = values[_SIZE]
+        assert isinstance(size, float)
+        return size
+
+
+_FREQUENCY = Frequency(_SIZE, 100.0, forward_only=True)
+
+
+class FunctionBits(ControlMethod):
+    """Control by function bits."""
+
+    means = 'function bits'
+    references = ('fieldbus',)
+    keeps_control = 'SOURCE is stored; set it to terminals at the keypad'
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the line has control."""
+        return bool(int((yield Read(_TOLD))) & Told.LINE)
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control."""
+        return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
+
+    def require_startable(self) -> Steps[None]:
+        """See to it that no terminal would start the motor."""
+        if (yield Read(_INPUTS)):
+            raise NotPossible('terminal X1 is closed: open it')
+
+    def take_control(self) -> Steps[None]:
+        """Take control with no run command, for ever."""
+        yield Write(_BITS, 0)
+        yield Write(_SOURCE, 'line', stored=True)
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """Write set-point 0, and read it back."""
+        yield from _FREQUENCY.set_to_zero()
+
+    def run(self) -> Steps[None]:
+        """Give the run command."""
+        yield Write(_BITS, Bit.RUN, once=True)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """Take the run command back, and write set-point 0."""
+        if (yield from self.in_control()):
+            yield Write(_BITS, 0, once=True)
+            yield from _FREQUENCY.zero(once=True)
+
+    def release(self) -> Steps[None]:
+        """Leave control where it is."""
+        yield Write(_BITS, 0)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Take the run command back."""
+        if (yield from taken(one(Write(_BITS, 0)))):
+            return Removal.COMMAND
+        return Removal.NOTHING
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """Acknowledge by an edge."""
+        for word in (0, Bit.RESET, 0):
+            yield Write(_BITS, word)
+        return ''
+
+
+def _state(word: int) -> State:
+    if word & Told.TRIPPED:
+        return State.FAULTED
+    return State.OPERATION_ENABLED if word & Told.RUNNING else State.READY_TO_SWITCH_ON
+
+
+def _in_charge(status: Status | None) -> Steps[str]:
+    yield from ()
+    return 'function_bits'
+
+
+PROFILE = Profile(
+    title='Bolt',
+    status_word=StatusWord(
+        state=_state,
+        by_bit={
+            Told.RUNNING: Fact.OPERATION_ENABLED,
+            Told.TRIPPED: Fact.FAULT,
+            Told.LINE: Fact.NETWORK_CONTROL,
+        },
+        by_state={},
+        code=lambda word: word >> 16,
+        shown=0xFFFF,
+        by_frequency=True,
+    ),
+    holders={},
+    methods={'function_bits': FunctionBits},
+    setpoints={'Freque': _FREQUENCY},
+    in_charge=_in_charge,
+    told_by=_TOLD,
+    most={Role.ACTUAL_FREQUENCY: 120.0},
+)

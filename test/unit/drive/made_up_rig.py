@@ -1,0 +1,101 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Made-up drives at the other end of a line: registers behind what the bus knows as a link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import struct
+import threading
+import time
+from types import SimpleNamespace
+
+from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+
+
+class FarEnd:
+    """The registers of a drive; it refuses what it does not have."""
+
+    protocol = PROTOCOLS['modbus_rtu']
+
+    def __init__(self, registers: dict[int, int]) -> None:
+        self.registers = registers
+        self.lock = threading.Lock()
+        #: What becomes of the next access to a register.
+        self.fates: dict[int, LinkError] = {}
+        #: Register and word of all that was written, in order; the registers read, likewise.
+        self.writes: list[tuple[int, int]] = []
+        self.reads: list[int] = []
+
+    def was_read(self, number: int) -> None:
+        """Do what time has brought; a drive may have more to do."""
+
+    def was_written(self, before: dict[int, int]) -> None:
+        """
+        Do what was written; a drive may have more to do.
+
+        :param before: the registers as they were.
+        """
+
+    # --- the link, as the bus has it ---
+
+    def open(self) -> None:
+        """Nothing has to be opened."""
+
+    def close(self) -> None:
+        """Nothing has to be closed."""
+
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """Nothing is ever in doubt."""
+
+    def identify(self, unit: int) -> SimpleNamespace:
+        """It does not tell who it is."""
+        return SimpleNamespace(done=True, found=Identification())
+
+    def parts(self, address: Address) -> Sequence[Address]:
+        """Whatever it has is read at once."""
+        return (address,)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        with self.lock:
+            numbers = self._numbers(address)
+            self.reads.append(address.index)
+            self.was_read(address.index)
+            words = [self.registers[number] for number in numbers]
+        return Reply(struct.pack(f'>{len(words)}H', *words), time.monotonic())
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        with self.lock:
+            numbers = self._numbers(address)
+            words = struct.unpack(f'>{len(numbers)}H', data)
+            before = dict(self.registers)
+            self.writes += zip(numbers, words, strict=True)
+            self.registers.update(zip(numbers, words, strict=True))
+            self.was_written(before)
+        return Reply(b'', time.monotonic())
+
+    def _numbers(self, address: Address) -> range:
+        numbers = range(address.index, address.index + address.size // 2)
+        if not all(number in self.registers for number in numbers):
+            raise Refused(Refused.ILLEGAL_ADDRESS, 'there is no such register')
+        if address.index in self.fates:
+            raise self.fates.pop(address.index)
+        return numbers
