@@ -34,12 +34,12 @@ from nfo_sinus_driver.catalog import Refusal
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
 
@@ -127,22 +127,15 @@ class Commands:
 
     Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
 
-    :param tell: told what is written to a memory that wears out.
-
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
     """
 
-    def __init__(
-        self,
-        settings: DriveSettings,
-        registers: ParameterAccess,
-        tell: Callable[[Severity, Report], None],
-    ) -> None:
-        method = registers.model.profile.methods[settings.control_method]
-        self._method = method(settings.reference, registers.reaches)
-        self._registers = registers
-        self._tell = tell
+    def __init__(self, inverter: DriveState) -> None:
+        method = inverter.model.profile.methods[inverter.settings.control_method]
+        self._method = method(inverter.settings.reference, inverter.registers.reaches)
+        self._registers = inverter.registers
+        self._tell = inverter.tell
 
     @property
     def coasts(self) -> bool:

@@ -27,16 +27,13 @@ from collections.abc import Iterator
 import contextlib
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
@@ -90,10 +87,8 @@ class ExclusiveAccess:
 class Controller:
     """Enables, stops and judges one drive."""
 
-    def __init__(
-        self, bus: Bus, inverter: DriveState, method: Commands, setpoint: Setpoint
-    ) -> None:
-        self._bus = bus
+    def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
+        self._bus = inverter.bus
         self._inverter = inverter
         self._method = method
         self._setpoint = setpoint
@@ -103,9 +98,8 @@ class Controller:
         #: What enables, and who has the drive, while there is one.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
-        self._confirmation = Confirmation(bus, inverter)
-        self._starting = StartSequence(bus, inverter, method)
-        self._sequence = StopSequence(bus, inverter, method, self._happened)
+        self._starting = StartSequence(inverter, method)
+        self._sequence = StopSequence(inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
         #: It was lost while it may have followed us.
@@ -385,9 +379,7 @@ class Controller:
                 may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
                 if may_run:
                     await self._method.quick_stop(self._inverter.control_mode)
-                    await self._confirmation.wait(
-                        lambda seen: not seen.driven, Priority.STOP, confirmation.TIMEOUT
-                    )
+                    await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP)
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()
@@ -428,10 +420,8 @@ class Controller:
         if seen.state is State.FAULT_REACTION_ACTIVE:
             # what comes before FAULTED acknowledges nothing [M0 table 16]
             with contextlib.suppress(DriveError):
-                await self._confirmation.wait(
-                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE,
-                    Priority.SERVICE,
-                    confirmation.TIMEOUT,
+                await self._inverter.wait_until(
+                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
                 )
         try:
             details = await self._method.acknowledge(seen.code, inverter.control_mode)
@@ -440,7 +430,7 @@ class Controller:
             if may_run:
                 self._sequence.request_anew()
         try:
-            await self._confirmation.wait(
+            await self._inverter.wait_until(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
             )
             await self._settle()
@@ -479,7 +469,7 @@ class Controller:
         if self.blocked_by_fault:
             raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
         try:
-            await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
             if not self._inverter.sio_tot:

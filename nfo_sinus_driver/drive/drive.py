@@ -36,7 +36,6 @@ from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
@@ -51,7 +50,6 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.picture import take_snapshot
@@ -110,41 +108,27 @@ class Drive:
     def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
         self._bus = bus
         self._unit = settings.address
-        self._listener = listener
-        self.model = load_family(settings.model)
-        self.registers = ParameterAccess(bus, self._unit, self.model, settings.retries)
-        self.inverter = DriveState(self.model, self.registers, listener, settings)
+        self.inverter = DriveState(bus, settings, listener)
+        self.model, self.registers = self.inverter.model, self.inverter.registers
         self.setpoint = Setpoint(
-            bus,
-            self._unit,
-            self.registers,
             self.inverter,
             lambda reason: self._controller.refused(reason) if self._controller else None,
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
         if settings.control_method != 'monitor':
-            commands = Commands(settings, self.registers, self.inverter.tell)
-            self._controller = Controller(bus, self.inverter, commands, self.setpoint)
+            self._controller = Controller(self.inverter, Commands(self.inverter), self.setpoint)
         self._watch = Poller(
-            bus,
-            self.inverter,
-            self.registers,
-            self.setpoint,
-            self._controller,
-            listener,
-            lambda: self._connect(patient=False),
+            self.inverter, self.setpoint, self._controller, lambda: self._connect(patient=False)
         )
-        self._procedures = procedures = Procedures(bus, self.inverter, self._controller)
-        self.parameters = Parameters(
-            bus, self.inverter, self.registers, procedures, self.run, self._take_parameters
-        )
+        self._procedures = procedures = Procedures(self.inverter, self._controller)
+        self.parameters = Parameters(self.inverter, procedures, self.run, self._take_parameters)
         self._watchdog = CommunicationWatchdog(
             self.inverter, self.parameters, commanded=self._controller is not None
         )
-        self.log = ErrorLog(self.inverter, self.registers, procedures)
-        self._error_log_monitor = ErrorLogMonitor(bus, self.inverter, self.log, listener)
-        self._tuning = Tuning(bus, self.inverter, self.registers, self.parameters, procedures)
+        self.log = ErrorLog(self.inverter, procedures)
+        self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
+        self._tuning = Tuning(self.inverter, self.parameters, procedures)
         #: What goes on while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -488,13 +472,11 @@ class Drive:
             self._watch.wake()
         if any(key(role) in keys for role in _MODE_ROLES):
             self._watch.read_mode_soon()
-        self._listener.on_parameters(keys)
+        self.inverter.listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:
         self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(
-                watch_telemetry(self._bus, self.inverter, self._listener)
-            )
+            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
             self._watch.wake()

@@ -25,15 +25,17 @@ import logging
 import math
 import time
 
+from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
@@ -50,6 +52,10 @@ from nfo_sinus_driver.link import Reply
 
 _log = logging.getLogger(__name__)
 
+#: How long a drive may take to do what it was told, its start delay not counted, s.
+TIMEOUT = 2.0
+#: How often the status is read while something is awaited, s.
+LOOK_PERIOD = 0.02
 #: No start delay of a drive is longer, s.
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
@@ -95,13 +101,15 @@ class Identity:
 class DriveState:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
-    def __init__(
-        self, model: Family, registers: ParameterAccess, listener: Listener, settings: DriveSettings
-    ) -> None:
-        self.model = model
+    def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
+        self.bus = bus
         self.settings = settings
-        self._registers = registers
-        self._listener = listener
+        #: What the catalog knows of its family.
+        self.model = load_family(settings.model)
+        #: Its parameters.
+        self.registers = ParameterAccess(bus, settings.address, self.model, settings.retries)
+        #: Who is told about every poll and event.
+        self.listener = listener
         self.connected = False
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
         self.answering = False
@@ -190,6 +198,24 @@ class DriveState:
             seen = replace(seen, word=word, at=at)
         return await self._with_frequency(seen, priority, once)
 
+    async def wait_until(
+        self,
+        wanted: Callable[[InverterStatus], bool],
+        priority: Priority = Priority.SERVICE,
+        timeout: float | None = None,
+    ) -> None:
+        """
+        Read the status until it is as wanted.
+
+        :param timeout: how long it may take, s; by default :data:`TIMEOUT`.
+        :raises DriveError: it takes longer.
+        """
+        deadline = time.monotonic() + (TIMEOUT if timeout is None else timeout)
+        while not wanted(await self.look(priority)):
+            if time.monotonic() > deadline:
+                raise DriveError(self.report(Cause.NOT_CONFIRMED))
+            await self.bus.sleep(LOOK_PERIOD)
+
     async def _with_frequency(
         self, seen: InverterStatus, priority: Priority, once: bool
     ) -> InverterStatus:
@@ -209,7 +235,7 @@ class DriveState:
         return self._saw(replace(seen, frequency=frequency, fell=fell))
 
     async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self._registers.read_reply(self.word_key, priority, once=once)
+        reply = await self.registers.read_reply(self.word_key, priority, once=once)
         return self.status_word(reply.data), reply.arrived
 
     @property
@@ -219,11 +245,11 @@ class DriveState:
 
     def status_word(self, data: bytes) -> int:
         """Return the status word that bytes mean."""
-        return int(self._registers.number(self.word_key, data))
+        return int(self.registers.number(self.word_key, data))
 
     async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
         key = self.model.key(Role.STATUS_CODE)
-        code, at = await self._registers.read_at(key, priority, once=once)
+        code, at = await self.registers.read_at(key, priority, once=once)
         assert isinstance(code, int)
         return code, at
 
@@ -233,7 +259,7 @@ class DriveState:
         seen = InverterStatus(at, None, code, self.model, code_at=at)
         if seen.means(Meaning.ANONYMOUS):
             key = self.model.key(Role.CONTROL_SOURCE)
-            source = await self._registers.read(key, priority, once=once)
+            source = await self.registers.read(key, priority, once=once)
             holder = self.model.profile.holders.get(int(source), Holder.UNKNOWN)
             seen = replace(seen, by_mode=holder is Holder.BUS)
         return self._saw(seen)
@@ -274,9 +300,9 @@ class DriveState:
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self._registers.read_data(key, priority, once=once)
-        value = self._registers.number(key, data)
-        if not self._registers.is_odd(key):
+        data = await self.registers.read_data(key, priority, once=once)
+        value = self.registers.number(key, data)
+        if not self.registers.is_odd(key):
             return value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
@@ -311,15 +337,15 @@ class DriveState:
         if not self.can_time_out:
             return
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
-        self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
+        self.sio_tot = await self.registers.read_number(timeout, Priority.SERVICE)
         stop = self.model.key(Role.STOP_AT_TIMEOUT)
         if not stop:
             # where nothing can keep it from that, it stops the motor
             self.auto_stop = True
             return
-        data = await self._registers.read_data(stop, Priority.SERVICE)
+        data = await self.registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = data == self._registers.encode(stop, True)
+        self.auto_stop = data == self.registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """
@@ -330,12 +356,12 @@ class DriveState:
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self._registers.read(self.model.key_of_status, priority, once=not patient)
+        await self.registers.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
         self._older = dialect is not None and self.settings.classic_dialect == dialect.name
         firmware_key = self.model.key(Role.FIRMWARE)
-        if self._older or not self._registers.reaches(firmware_key):
+        if self._older or not self.registers.reaches(firmware_key):
             self.identity = Identity()
             return self.identity
         if dialect is not None and not await self._may_ask_firmware(dialect):
@@ -352,9 +378,9 @@ class DriveState:
                 self._older = was_older
             return self.identity or Identity()
         try:
-            firmware = await self._registers.read_number(firmware_key, Priority.SERVICE)
+            firmware = await self.registers.read_number(firmware_key, Priority.SERVICE)
             motor_key = self.model.key(Role.MOTOR_FIRMWARE)
-            motor = await self._registers.read_number(motor_key, Priority.SERVICE)
+            motor = await self.registers.read_number(motor_key, Priority.SERVICE)
         except Refused:
             if dialect is None or self.settings.classic_dialect:
                 raise
@@ -369,7 +395,7 @@ class DriveState:
     def _dialect(self) -> OlderDialect | None:
         """The older dialect that a drive of this model may have on this line."""
         dialect = self.model.profile.older
-        here = dialect is not None and dialect.protocol == self._registers.protocol
+        here = dialect is not None and dialect.protocol == self.registers.protocol
         return dialect if here else None
 
     async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
@@ -382,7 +408,7 @@ class DriveState:
         if self.settings.classic_dialect or (method is not None and not method.older):
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
-        source = await self._registers.read(key, Priority.SERVICE)
+        source = await self.registers.read(key, Priority.SERVICE)
         return self.model.profile.holders.get(int(source)) in dialect.harmless
 
     @property
@@ -399,7 +425,7 @@ class DriveState:
         :raises PortError: the port is not open.
         """
         assert self.identity is not None
-        told = await self._registers.identify(Priority.SERVICE)
+        told = await self.registers.identify(Priority.SERVICE)
         self.identity = replace(
             self.identity,
             vendor=told.vendor,
@@ -417,7 +443,7 @@ class DriveState:
         Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
-        if self._registers.reaches(key):
+        if self.registers.reaches(key):
             mode = await self.read_label(key, priority, once=once)
         else:
             mode = self.settings.expected_control_mode or 'Freque'
@@ -431,7 +457,7 @@ class DriveState:
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
         key = self.model.key(Role.STOP_MODE)
-        if self._registers.reaches(key):
+        if self.registers.reaches(key):
             return await self.read_label(key, Priority.STOP) == self.model.profile.releases
         seen = self.seen
         told = seen is not None and Fact.STOP_MODE_BRAKE in seen.valid
@@ -440,7 +466,7 @@ class DriveState:
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""
         key = self.model.key(Role.START_DELAY)
-        if self._registers.reaches(key):
+        if self.registers.reaches(key):
             return await self.read_number(key)
         return _LONGEST_START_DELAY
 
@@ -448,11 +474,11 @@ class DriveState:
         self, key: str, priority: Priority = Priority.SERVICE, *, once: bool = False
     ) -> str:
         """Read a parameter that is an enumeration."""
-        return str(await self._registers.read(key, priority, once=once))
+        return str(await self.registers.read(key, priority, once=once))
 
     async def read_number(self, key: str) -> float:
         """Read a parameter that is a number."""
-        return await self._registers.read_number(key, Priority.SERVICE)
+        return await self.registers.read_number(key, Priority.SERVICE)
 
     @property
     def kind(self) -> Kind:
@@ -481,7 +507,7 @@ class DriveState:
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
-        if not self._registers.reaches(key) or (self._older and not self.model[key].older):
+        if not self.registers.reaches(key) or (self._older and not self.model[key].older):
             return False
         since = self.model[key].since
         firmware = self.identity.firmware if self.identity else math.nan
@@ -492,6 +518,6 @@ class DriveState:
         report = what if isinstance(what, Report) else Report(what, **values)
         code = None if self.seen is None else self.seen.code
         try:
-            self._listener.on_event(Event(severity, report, code))
+            self.listener.on_event(Event(severity, report, code))
         except Exception:
             _log.exception('not told: %s', report)

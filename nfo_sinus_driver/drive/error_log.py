@@ -20,7 +20,6 @@ import logging
 import math
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import ErrorLogArea
@@ -31,10 +30,8 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
@@ -121,11 +118,9 @@ class ErrorLog:
     :raises DriveError: a method cannot do it, or the model's log is not documented.
     """
 
-    def __init__(
-        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
-    ) -> None:
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
@@ -265,11 +260,10 @@ class ErrorLogMonitor:
     polls, or while the drive was not reached, has left an entry too. Nothing is acknowledged by it.
     """
 
-    def __init__(self, bus: Bus, inverter: DriveState, log: ErrorLog, listener: Listener) -> None:
-        self._bus = bus
+    def __init__(self, inverter: DriveState, log: ErrorLog) -> None:
+        self._bus = inverter.bus
         self._inverter = inverter
         self._error_log = log
-        self._listener = listener
         self._task: Task | None = None
         #: The newest entry, as it was read; ``None`` if there is none.
         self.newest: LogEntry | None = None
@@ -373,6 +367,6 @@ class ErrorLogMonitor:
             else:
                 self._inverter.tell(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
             try:
-                self._listener.on_log_entry(entry)
+                self._inverter.listener.on_log_entry(entry)
             except Exception:
                 _log.exception('an entry of the error log could not be told')

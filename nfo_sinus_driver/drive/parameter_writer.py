@@ -37,7 +37,6 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -112,11 +111,9 @@ def not_changed(key: str, why: Report) -> ParameterError:
 class ParameterWriter:
     """Changes parameters of one drive, on the bus; if not, a ParameterError says why."""
 
-    def __init__(
-        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
-    ) -> None:
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._access = WriteAccess(inverter, procedures)
 
     async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:

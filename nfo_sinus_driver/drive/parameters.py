@@ -38,7 +38,6 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
@@ -83,24 +82,22 @@ class Parameters:
 
     def __init__(
         self,
-        bus: Bus,
         inverter: DriveState,
-        registers: ParameterAccess,
         procedures: Procedures,
         run: Run,
         told: Callable[[Collection[str]], None],
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, registers, procedures)
+        self._writer = ParameterWriter(inverter, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
         self._wanted = DesiredConfig(self, inverter)
-        self._turn = Lock(bus)
+        self._turn = Lock(inverter.bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()
         self._rounds = 0

@@ -25,7 +25,6 @@ import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Role
@@ -38,12 +37,10 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.picture import take_snapshot
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
@@ -100,20 +97,17 @@ class Poller:
 
     def __init__(
         self,
-        bus: Bus,
         inverter: DriveState,
-        registers: ParameterAccess,
         setpoint: Setpoint,
         controller: Controller | None,
-        listener: Listener,
         connect: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
+        self._unit = inverter.settings.address
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._setpoint = setpoint
         self._controller = controller
-        self._listener = listener
         self._connect = connect
         self._task: Task | None = None
         #: Poll at full rate.
@@ -151,7 +145,7 @@ class Poller:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
-        self._bus.recorder.cycle(self._inverter.settings.address, math.nan)
+        self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
     def told(self, reply: Reply) -> None:
@@ -164,7 +158,7 @@ class Poller:
         if self._task is None or not inverter.connected or not reply.data:
             return
         place = registers.address(inverter.word_key)
-        if self._bus.answer(self._task, inverter.settings.address, place, reply):
+        if self._bus.answer(self._task, self._unit, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
         if not registers.can_be(inverter.word_key, reply.data):
@@ -190,7 +184,7 @@ class Poller:
 
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
-        self._bus.recorder.connected(self._inverter.settings.address)
+        self._bus.recorder.connected(self._unit)
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = None
@@ -217,7 +211,7 @@ class Poller:
                 self._failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
                 if self._inverter.connected and self.active and polled_at > 0:
-                    self._bus.recorder.cycle(self._inverter.settings.address, started - polled_at)
+                    self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
             await self._bus.sleep(self._pause(polled_at))
 
@@ -265,12 +259,12 @@ class Poller:
     @property
     def _heard_at(self) -> float:
         """When the drive said anything, s."""
-        return self._bus.silences.heard_at(self._inverter.settings.address)
+        return self._bus.silences.heard_at(self._unit)
 
     @property
     def _silent_for_long(self) -> bool:
         """It has answered nobody for so long that it is lost."""
-        silent = self._bus.silences.lasts(self._inverter.settings.address, time.monotonic())
+        silent = self._bus.silences.lasts(self._unit, time.monotonic())
         return silent >= self._inverter.settings.lost_after
 
     @property
@@ -396,7 +390,7 @@ class Poller:
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
                 if self._silent_for_long or in_vain:
                     raise
-                self._bus.recorder.retry(self._inverter.settings.address)
+                self._bus.recorder.retry(self._unit)
             else:
                 self._inverter.answering = True
                 self._setpoint.answered()
@@ -422,7 +416,7 @@ class Poller:
         inverter = self._inverter
         inverter.connected = False
         why = self._explain(error)
-        self._bus.recorder.cycle(inverter.settings.address, math.nan)
+        self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost()
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
         inverter.tell(Severity.ERROR, cause, why=why)
@@ -443,9 +437,9 @@ class Poller:
         frequency, speed = (inverter.last_polled(role) for role in _BASIC)
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
-        self._listener.on_snapshot(self.snapshot)
+        inverter.listener.on_snapshot(self.snapshot)
 
     def _explain(self, error: LinkError | DriveError) -> Report:
         if isinstance(error, DriveError):
             return error.report
-        return explain(error, self._inverter.settings.address, known=True)
+        return explain(error, self._unit, known=True)

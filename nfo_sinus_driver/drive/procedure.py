@@ -22,13 +22,12 @@ from collections.abc import Iterator
 import contextlib
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
@@ -60,8 +59,8 @@ class Procedures:
     :raises DriveError: the drive cannot be had, has no such procedure, or does not confirm.
     """
 
-    def __init__(self, bus: Bus, inverter: DriveState, controller: Controller | None) -> None:
-        self._bus = bus
+    def __init__(self, inverter: DriveState, controller: Controller | None) -> None:
+        self._bus = inverter.bus
         self._inverter = inverter
         self._controller = controller
 
@@ -161,7 +160,7 @@ class Procedures:
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
-        deadline = time.monotonic() + confirmation.TIMEOUT
+        deadline = time.monotonic() + drive_state.TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
@@ -169,7 +168,7 @@ class Procedures:
                 raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
-            await self._bus.sleep(confirmation.LOOK_PERIOD)
+            await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 
     async def _give_back(self, found: Holder) -> None:

@@ -24,7 +24,6 @@ import math
 import time
 from typing import NamedTuple
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
@@ -34,7 +33,6 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
@@ -93,17 +91,11 @@ class Setpoint:
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        unit: int,
-        registers: ParameterAccess,
-        inverter: DriveState,
-        refused: Callable[[Report], None],
-        told: Callable[[Reply], None] = lambda reply: None,
+        self, inverter: DriveState, refused: Callable[[Report], None], told: Callable[[Reply], None]
     ) -> None:
-        self._bus = bus
-        self._unit = unit
-        self._registers = registers
+        self._bus = inverter.bus
+        self._unit = inverter.settings.address
+        self._registers = inverter.registers
         self._inverter = inverter
         self._refused = refused
         self._slot = LatestValue(self._make, self._done, told)

@@ -20,14 +20,12 @@ from collections.abc import Callable
 import contextlib
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
@@ -39,11 +37,9 @@ from nfo_sinus_driver.link import Refused
 class StartSequence:
     """Starts the motor of one drive; used on the bus alone."""
 
-    def __init__(self, bus: Bus, inverter: DriveState, method: Commands) -> None:
-        self._bus = bus
+    def __init__(self, inverter: DriveState, method: Commands) -> None:
         self._inverter = inverter
         self._method = method
-        self._confirmation = Confirmation(bus, inverter)
 
     async def check(self) -> str:
         """
@@ -73,7 +69,7 @@ class StartSequence:
         :raises DriveError: it does not run, and why; a run command may stand all the same.
         """
         await self.take_control(control_mode)
-        await self._confirmation.wait_for_step(lambda now: now.from_bus)
+        await self._inverter.wait_until(lambda now: now.from_bus)
         if self._inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
@@ -86,7 +82,7 @@ class StartSequence:
 
         :raises DriveError: it does not.
         """
-        deadline = time.monotonic() + confirmation.TIMEOUT
+        deadline = time.monotonic() + drive_state.TIMEOUT
         delayed = False
         while True:
             seen = await self._inverter.look(Priority.SERVICE)
@@ -104,7 +100,7 @@ class StartSequence:
             if time.monotonic() > deadline:
                 cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
                 raise DriveError(self._inverter.report(cause))
-            await self._bus.sleep(confirmation.LOOK_PERIOD)
+            await self._inverter.bus.sleep(drive_state.LOOK_PERIOD)
 
     async def take_control(self, control_mode: str) -> None:
         """
@@ -118,4 +114,4 @@ class StartSequence:
         if not self._inverter.settings_need_control:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control(self._confirmation.wait_for_step)
+        await self._method.take_control(self._inverter.wait_until)

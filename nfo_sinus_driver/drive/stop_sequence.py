@@ -23,11 +23,10 @@ import enum
 import math
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
@@ -75,13 +74,9 @@ class StopSequence:
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        inverter: DriveState,
-        method: Commands,
-        report: Callable[[ControlEvent], None],
+        self, inverter: DriveState, method: Commands, report: Callable[[ControlEvent], None]
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
         self._inverter = inverter
         self._method = method
         self._report = report
@@ -140,7 +135,7 @@ class StopSequence:
             self._outcome = None
             self._unconfirmed = _NO_ANSWER_YET
             self._told_at = math.inf
-            self._due = time.monotonic() + confirmation.TIMEOUT
+            self._due = time.monotonic() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
@@ -163,8 +158,8 @@ class StopSequence:
         :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
-        deadline = time.monotonic() + (confirmation.TIMEOUT if patience is None else patience)
-        while task is not None and not await self._bus.join(task, confirmation.LOOK_PERIOD):
+        deadline = time.monotonic() + (drive_state.TIMEOUT if patience is None else patience)
+        while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
@@ -180,7 +175,7 @@ class StopSequence:
         while await self._attempt() is not _Outcome.CONFIRMED:
             if self.blocked_by_fault:
                 await self._fault_gone()
-                self._due = complain_at = time.monotonic() + confirmation.TIMEOUT
+                self._due = complain_at = time.monotonic() + drive_state.TIMEOUT
                 continue
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
@@ -214,7 +209,7 @@ class StopSequence:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif self._outcome is _Outcome.BUSY:
-            await self._bus.sleep(confirmation.LOOK_PERIOD)
+            await self._bus.sleep(drive_state.LOOK_PERIOD)
         elif self._outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 

@@ -19,12 +19,10 @@ from __future__ import annotations
 from collections import deque
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Telemetry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
@@ -56,7 +54,7 @@ _DENIALS = 3
 _OFF_PERIOD = 0.5
 
 
-async def watch_telemetry(bus: Bus, inverter: DriveState, listener: Listener) -> None:
+async def watch_telemetry(inverter: DriveState) -> None:
     """
     Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
 
@@ -95,10 +93,10 @@ async def watch_telemetry(bus: Bus, inverter: DriveState, listener: Listener) ->
                     Role.ACTUAL_FREQUENCY: inverter.frequency,
                     Role.ACTUAL_SPEED: inverter.speed,
                 }
-                listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
+                inverter.listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost
                 inverter.missed()
                 values.update(dict.fromkeys(FAST, NAN))
         period = 1 / rate if rate else _OFF_PERIOD
-        await bus.sleep(period - (time.monotonic() - started))
+        await inverter.bus.sleep(period - (time.monotonic() - started))

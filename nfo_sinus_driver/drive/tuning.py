@@ -21,19 +21,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
@@ -85,16 +83,9 @@ class Tuning:
     """Has one drive tune; used on the bus alone."""
 
     def __init__(
-        self,
-        bus: Bus,
-        inverter: DriveState,
-        registers: ParameterAccess,
-        parameters: Parameters,
-        procedures: Procedures,
+        self, inverter: DriveState, parameters: Parameters, procedures: Procedures
     ) -> None:
-        self._bus = bus
         self._inverter = inverter
-        self._registers = registers
         self._parameters = parameters
         self._procedures = procedures
 
@@ -125,7 +116,7 @@ class Tuning:
     async def _require_motor_plate(self, what: str) -> None:
         for role in _PLATE:
             key = self._inverter.model.key(role)
-            if not await self._registers.read_number(key, Priority.SERVICE) > 0:
+            if not await self._inverter.registers.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
     async def _outcome(self, what: str, access: ExclusiveAccess, progress: Progress) -> Report:
@@ -150,8 +141,8 @@ class Tuning:
                 return inverter.report(Cause.TUNING_STOPPED, what=what)
             elif begun:
                 return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
-            elif elapsed > confirmation.TIMEOUT:
+            elif elapsed > drive_state.TIMEOUT:
                 return inverter.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
             if elapsed > _LONGEST:
                 raise DriveError(inverter.report(Cause.TUNING_ENDLESS, what=what))
-            await self._bus.sleep(_LOOK_PERIOD)
+            await self._inverter.bus.sleep(_LOOK_PERIOD)
