@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.family import load_profile
 from nfo_sinus_driver.catalog.family import usual_family
+from nfo_sinus_driver.catalog.inverter_status import InverterStatus
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -56,6 +57,7 @@ __all__ = [
     'Fact',
     'Family',
     'Holder',
+    'InverterStatus',
     'Kind',
     'Meaning',
     'NotPossible',

@@ -28,6 +28,7 @@ from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import NotPossible
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Refusal
@@ -40,7 +41,6 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -190,12 +190,7 @@ class Commands:
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
     async def acknowledge(self, code: int, control_mode: str) -> str:
-        """
-        Acknowledge a fault, run command and set-point first where the bus has control.
-
-        :param code: the inverter status code that is shown.
-        :returns: what more the drive said of it; ``''`` if nothing.
-        """
+        """Acknowledge the fault shown, run command and set-point first; return its details."""
         shown = self._registers.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
@@ -205,9 +200,8 @@ class Commands:
         """
         Have the drive begin a procedure; once, for nobody knows what happened before a second time.
 
-        It waits for its turn with the stops, so that one which comes later does not overtake it.
-
-        :param require_wanted: called when its turn has come; if it raises, nothing is written.
+        It waits for its turn with the stops, so that one which comes later does not overtake it; if
+        ``require_wanted`` raises then, nothing is written.
         """
         write = self._method.procedures[procedure]
         await self._registers.write(write, Priority.STOP, require_wanted)

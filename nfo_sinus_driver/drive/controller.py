@@ -30,6 +30,7 @@ import time
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import control_state
@@ -46,20 +47,15 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.sequences import StartSequence
+from nfo_sinus_driver.drive.sequences import StopSequence
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.start_sequence import StartSequence
-from nfo_sinus_driver.drive.stop_sequence import StopSequence
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 
 class ExclusiveAccess:
-    """
-    The drive in the hands of a procedure, such as a tuning.
-
-    :param what: its name.
-    """
+    """The drive in the hands of a procedure, such as a tuning, whose name is ``what``."""
 
     def __init__(self, what: str) -> None:
         self.what = what
@@ -75,17 +71,18 @@ class ExclusiveAccess:
         self._aborted = True
 
     def require_wanted(self) -> None:
-        """
-        See to it that nobody has stopped the procedure meanwhile.
-
-        :raises DriveError: somebody has.
-        """
+        """Raise a :class:`DriveError` if somebody has stopped the procedure meanwhile."""
         if self._aborted:
             raise DriveError(Cause.PROCEDURE_NOT_BEGUN, what=self.what)
 
 
 class Controller:
-    """Enables, stops and judges one drive."""
+    """
+    Enables, stops and judges one drive.
+
+    What a person asks for says in a :class:`DriveError` why it was not done. A stop that the drive
+    does not confirm is such an error, too; it is retried until it does.
+    """
 
     def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
         self._bus = inverter.bus
@@ -185,11 +182,7 @@ class Controller:
             self._happened(ControlEvent.LOST)
 
     def _stop(self, *, anew: bool = False) -> None:
-        """
-        End whatever drives the motor, and remove the run command until that is confirmed.
-
-        :param anew: what attempts show that have begun counts no more.
-        """
+        """End what drives the motor; ``anew``: what attempts show that have begun counts no more."""
         self._happened(ControlEvent.STOP)
         if anew:
             self._sequence.request_anew()
@@ -205,12 +198,7 @@ class Controller:
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for a procedure: whoever stops it ends the procedure, and its preparations.
-
-        :param what: its name.
-        :raises DriveError: somebody has the drive.
-        """
+        """Have the drive for a procedure: whoever stops it ends that, and its preparations."""
         self.require_idle(what)
         self._access = access = ExclusiveAccess(what)
         self._happened(ControlEvent.BEGIN)
@@ -221,11 +209,7 @@ class Controller:
             self._happened(ControlEvent.END)
 
     def require_idle(self, what: str) -> None:
-        """
-        See to it that a procedure may begin.
-
-        :raises DriveError: it may not, and why.
-        """
+        """See to it that a procedure may begin."""
         if (self._state, ControlEvent.BEGIN) in control_state.TRANSITIONS:
             return
         if self._access is not None:
@@ -243,8 +227,7 @@ class Controller:
         """
         See to it that an enable may begin.
 
-        :raises DriveError: it may not, and why; a stop that nobody has confirmed is one that who
-            enables may not know of.
+        A stop that nobody has confirmed forbids it: who enables may not know of that.
         """
         if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
             return
@@ -267,8 +250,6 @@ class Controller:
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
         :param prepare: does what has to be done before a run command, once the bus has control.
-        :returns: what was done.
-        :raises DriveError: it was not done, and why; the run command is removed then.
         """
         if self.enabled:
             return Report(Cause.ENABLED_ALREADY)
@@ -288,11 +269,7 @@ class Controller:
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
     async def _check(self) -> str:
-        """
-        See to it that nothing keeps the motor from being started; return the control mode.
-
-        :raises DriveError: something does; nothing was written.
-        """
+        """See to it that nothing keeps the motor from being started; return the control mode."""
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
@@ -302,11 +279,7 @@ class Controller:
             raise DriveError(report_of(error)) from error
 
     async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
-        """
-        Start the motor, and follow set-points from then on.
-
-        :raises DriveError: it does not run, and why; the run command is removed then.
-        """
+        """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._happened(ControlEvent.RUNNING)
@@ -321,11 +294,9 @@ class Controller:
 
     async def stop(self, patience: float | None = None) -> Report:
         """
-        Stop as the drive's StMode says; control is kept.
+        Stop as the drive's StMode says; control is kept. Tells whether it ramps or coasts [C97].
 
         :param patience: how long the drive may take to confirm it, s.
-        :returns: whether it ramps or coasts [C97].
-        :raises DriveError: the drive does not confirm the stop; it is retried until it does.
         """
         self._stop()
         await self._sequence.wait_confirmed(patience or None)
@@ -346,19 +317,11 @@ class Controller:
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
-        """
-        Put the drive under bus control for a procedure, with no run command standing.
-
-        :raises DriveError: it lets nobody take control.
-        """
+        """Put the drive under bus control for a procedure, with no run command standing."""
         await self._starting.take_control(control_mode)
 
     async def withdraw_run_command(self) -> None:
-        """
-        Remove what a procedure has commanded; control is kept.
-
-        :raises DriveError: the drive does not confirm that it stops; it is retried until it does.
-        """
+        """Remove what a procedure has commanded; control is kept."""
         self._sequence.request()
         await self._sequence.wait_confirmed()
 
@@ -367,8 +330,6 @@ class Controller:
         Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
         Where the drive has no way to do that, stop as usual [C96].
-
-        :raises DriveError: the drive does not confirm it; the stop is retried until it does.
         """
         if not self._method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
@@ -399,12 +360,7 @@ class Controller:
             return Report(Cause.QUICK_STOPPED)
 
     async def acknowledge(self) -> Report:
-        """
-        Acknowledge a fault; run command and set-point are removed before, where the drive lets us.
-
-        :returns: what was acknowledged.
-        :raises DriveError: the fault is still active.
-        """
+        """Acknowledge a fault, run command and set-point first, where the drive lets us."""
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         fault = seen.listed

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 import math
 
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
@@ -27,7 +28,6 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer

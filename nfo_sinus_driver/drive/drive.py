@@ -33,6 +33,7 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
@@ -52,12 +53,11 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.picture import take_snapshot
 from nfo_sinus_driver.drive.poller import Poller
+from nfo_sinus_driver.drive.poller import take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.drive.snapshot import Snapshot

@@ -29,11 +29,14 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog.inverter_status import NEVER
+from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
@@ -41,10 +44,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import NEVER
-from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.link import Refused
@@ -290,11 +290,8 @@ class DriveState:
 
     async def measure(self, role: Role, priority: Priority, *, once: bool = True) -> float:
         """
-        Read a measured value; NaN if its family has none such.
+        Read a measured value; NaN if its family has none such, or if it cannot be, and that again.
 
-        NaN, too, if the drive says what cannot be, and that again.
-
-        :param once: do not repeat a request when there is no response.
         :raises LinkError: it does not answer, or refuses.
         """
         key = self.model.key(role)
@@ -352,7 +349,6 @@ class DriveState:
         Find out whether somebody answers, and with which firmware.
 
         :param patient: ask again if nobody does; a silent drive costs its neighbours time-outs.
-        :raises LinkError: nobody does.
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
@@ -417,13 +413,7 @@ class DriveState:
         return self._older
 
     async def introduce(self) -> Identity:
-        """
-        Ask the drive who it is, beyond what :meth:`identify` has found.
-
-        Nothing depends on it: many drives do not tell [C57].
-
-        :raises PortError: the port is not open.
-        """
+        """Ask for more of who it is; nothing depends on that, for many do not tell [C57]."""
         assert self.identity is not None
         told = await self.registers.identify(Priority.SERVICE)
         self.identity = replace(

@@ -23,6 +23,7 @@ import time
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -31,7 +32,6 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError

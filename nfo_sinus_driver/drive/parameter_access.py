@@ -26,7 +26,6 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -198,7 +197,7 @@ class ParameterAccess:
     def can_be(self, key: str, data: bytes) -> bool:
         """Tell whether bytes mean a value that the manual knows of this parameter."""
         try:
-            return can_be(self.model, key, self.value(key, data))
+            return self.model.can_be(key, self.value(key, data))
         except ValueError:
             return False
 

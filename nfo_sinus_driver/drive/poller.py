@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """The watch over one drive: polls it, judges what it sees, notices when it is lost."""
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions
@@ -37,11 +37,11 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.picture import take_snapshot
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Measured
+from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -443,3 +443,44 @@ class Poller:
         if isinstance(error, DriveError):
             return error.report
         return explain(error, self._unit, known=True)
+
+
+def take_snapshot(
+    inverter: DriveState,
+    setpoint: Setpoint,
+    seen: InverterStatus | None,
+    frequency: Measured = NOT_MEASURED,
+    speed: Measured = NOT_MEASURED,
+    actual: float = NAN,
+) -> Snapshot:
+    """Return the snapshot of a poll; without a status while the drive is not connected."""
+    if seen is None:
+        return Snapshot(
+            at=time.monotonic(),
+            connected=inverter.connected,
+            enabled=setpoint.armed,
+            control_method=inverter.settings.control_method,
+        )
+    code = seen.listed
+    return Snapshot(
+        at=seen.at,
+        connected=inverter.connected,
+        enabled=setpoint.armed,
+        control_method=inverter.settings.control_method,
+        status=seen,
+        control_mode=inverter.control_mode,
+        unit=inverter.unit,
+        setpoint=setpoint.commanded,
+        setpoint_age=setpoint.age,
+        setpoint_clamped=setpoint.clamped,
+        text=inverter.text_of(seen.code),
+        description=code.description,
+        remedy=code.remedy,
+        kind=seen.kind,
+        requires_ack=code.requires_ack,
+        frequency=frequency.value,
+        frequency_at=frequency.at,
+        speed=speed.value,
+        speed_at=speed.at,
+        actual=actual,
+    )

@@ -126,11 +126,7 @@ class Setpoint:
         self.clamped = False
 
     def request(self, value: float) -> None:
-        """
-        Ask for a set-point, from any thread; it counts only if the drive is armed.
-
-        :raises ValueError: not finite.
-        """
+        """Ask for a set-point, from any thread; it must be finite, and counts only while armed."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
         self._own = Request(value, time.monotonic())
@@ -214,11 +210,7 @@ class Setpoint:
     # --- together with the other drives of the line, on the bus -------------------------------
 
     def why_not_shared(self, name: str) -> Report | None:
-        """
-        Return why it cannot follow a set-point that is told to all drives; ``None`` if it can.
-
-        :param name: of the drive.
-        """
+        """Return why the drive, of this name, cannot follow a set-point told to all, if so."""
         settings = self._inverter.settings
         if settings.control_method == 'monitor':
             return Report(Cause.MEMBER_MONITORED, name=name)

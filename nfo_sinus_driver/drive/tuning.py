@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import time
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
@@ -35,7 +36,6 @@ from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
