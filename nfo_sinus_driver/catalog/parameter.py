@@ -75,11 +75,7 @@ class Address:
 
     @property
     def number(self) -> Number:
-        """
-        The codec of what is no text.
-
-        :raises ValueError: it is a text.
-        """
+        """The codec of what is no text (ValueError: it is a text)."""
         if isinstance(self.codec, Text):
             raise ValueError(f'{self.codec.name} is no number')
         return self.codec

@@ -203,11 +203,7 @@ class SetpointTarget:
             yield Write(write.key, write.value, at=write.at, once=once)
 
     def set_to_zero(self) -> Steps[None]:
-        """
-        Write set-point 0, and read it back.
-
-        :raises NotPossible: the drive keeps another value.
-        """
+        """Write set-point 0, and read it back (NotPossible: the drive keeps another value)."""
         yield from self.zero(once=False)
         values: dict[str, Value] = {}
         for key in dict.fromkeys(write.key for write in self.writes(0.0)):

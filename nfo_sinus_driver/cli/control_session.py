@@ -220,11 +220,7 @@ _EMERGENCY = 'use the RUN input or the emergency stop if the motor turns'
 
 
 class Stopping:
-    """
-    Stops one motor, whatever signals come.
-
-    :param show: called again and again meanwhile.
-    """
+    """Stops one motor, whatever signals come (show: called again and again meanwhile)."""
 
     def __init__(self, control: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
         self._session = control

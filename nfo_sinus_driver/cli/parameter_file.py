@@ -82,11 +82,7 @@ def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: F
 
 
 def write_file(name: str, text: str) -> None:
-    """
-    Write a parameter file; ``-`` is the standard output.
-
-    :raises CliError: it cannot be written.
-    """
+    """Write a parameter file; ``-`` is the standard output (CliError: it cannot be written)."""
     if name == STANDARD:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -120,11 +116,7 @@ def read_file(name: str) -> ParameterFile:
 
 
 def parse_file(text: str, name: str) -> ParameterFile:
-    """
-    Return what a parameter file says.
-
-    :raises CliError: it is none, or not clear.
-    """
+    """Return what a parameter file says (CliError: it is none, or not clear)."""
     try:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:

@@ -148,11 +148,7 @@ class _Ride:
             self._ends_at = time.monotonic() + self._options.seconds
 
     def _follow(self) -> None:
-        """
-        Keep the set-point fresh until something ends it.
-
-        :raises Ended: always; with what ended it.
-        """
+        """Keep the set-point fresh until something ends it (Ended: always; with what ended it)."""
         options, drive = self._options, self._drive
         while True:
             if options.setpoint is not None:

@@ -152,11 +152,7 @@ def _who_answers(
 
 
 def _ask(drive: Remote) -> dict[str, str] | None:
-    """
-    Return who answers at an address.
-
-    :raises DriveError: the port cannot be used.
-    """
+    """Return who answers at an address (DriveError: the port cannot be used)."""
     try:
         status = drive.model.key_of_status
         drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))

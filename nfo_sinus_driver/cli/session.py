@@ -81,11 +81,7 @@ class Remote:
         return self._drive.run(command).result()
 
     def identify(self, *, thoroughly: bool = True) -> Identity:
-        """
-        Find out who answers.
-
-        :param thoroughly: also ask for model and serial number.
-        """
+        """Find out who answers (thoroughly: also ask for model and serial number)."""
         try:
             return self._drive.identify(thoroughly=thoroughly).result()
         except DriveError as error:

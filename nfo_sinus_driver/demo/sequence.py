@@ -96,11 +96,7 @@ class DemoSequence(Node):
             )
 
     def run(self, bench: Bench) -> None:
-        """
-        Go through it.
-
-        :raises StepError: a step did not happen.
-        """
+        """Go through it (StepError: a step did not happen)."""
 
         def near(hertz: float) -> Callable[[], bool]:
             return lambda: abs(self._actual - hertz) < _NEAR
@@ -141,11 +137,7 @@ class DemoSequence(Node):
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
     def _wait_for(self, what: str, condition: Callable[[], object]) -> None:
-        """
-        Print what is seen until a condition holds.
-
-        :raises StepError: it does not.
-        """
+        """Print what is seen until a condition holds (StepError: it does not)."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if time.monotonic() > deadline:

@@ -182,7 +182,7 @@ class Controller:
             self._happened(ControlEvent.LOST)
 
     def _stop(self, *, anew: bool = False) -> None:
-        """End what drives the motor; ``anew``: what attempts show that have begun counts no more."""
+        """End what drives the motor; ``anew``: what attempts show that have begun counts not."""
         self._happened(ControlEvent.STOP)
         if anew:
             self._sequence.request_anew()

@@ -158,11 +158,7 @@ class Link(Protocol):
     protocol: LineProtocol
 
     def open(self) -> None:
-        """
-        Open the port.
-
-        :raises PortError: it cannot be opened; the message says what to do.
-        """
+        """Open the port (PortError: it cannot be opened; the message says what to do)."""
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -178,11 +174,7 @@ class Link(Protocol):
         """
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """
-        Write one parameter.
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Write one parameter (LinkError: as its subclasses say)."""
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address

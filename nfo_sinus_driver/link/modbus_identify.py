@@ -185,11 +185,7 @@ class ModbusInquiry:
         return Identification(**self._told)
 
     def ask(self) -> Reply:
-        """
-        Ask the next question: one transaction.
-
-        :raises LinkError: as its subclasses say.
-        """
+        """Ask the next question: one transaction (LinkError: as its subclasses say)."""
         question = self._questions.pop(0)
         try:
             answer, arrived = self._ask(question)

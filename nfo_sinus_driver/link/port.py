@@ -45,11 +45,7 @@ class Port(Protocol):
         """Close it; harmless when it is closed already."""
 
     def write(self, data: bytes) -> None:
-        """
-        Hand all bytes over.
-
-        :raises PortError: it is gone.
-        """
+        """Hand all bytes over (PortError: it is gone)."""
 
     def read(self, until: float) -> bytes:
         """
@@ -101,11 +97,7 @@ class UrlPort:
         self._serial: serial.SerialBase | None = None
 
     def open(self) -> None:
-        """
-        Connect.
-
-        :raises PortError: nobody there.
-        """
+        """Connect (PortError: nobody there)."""
         try:
             self._serial = serial.serial_for_url(
                 self._url,
@@ -126,11 +118,7 @@ class UrlPort:
             port.close()
 
     def write(self, data: bytes) -> None:
-        """
-        Hand all bytes to the far end.
-
-        :raises PortError: the connection is gone.
-        """
+        """Hand all bytes to the far end (PortError: the connection is gone)."""
         try:
             self._port().write(data)
         except OSError as error:

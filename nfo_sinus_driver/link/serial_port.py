@@ -82,11 +82,7 @@ class SerialPort:
             os.close(fd)
 
     def write(self, data: bytes) -> None:
-        """
-        Hand all bytes to the port.
-
-        :raises PortError: the port is gone.
-        """
+        """Hand all bytes to the port (PortError: the port is gone)."""
         fd = self._descriptor()
         deadline = time.monotonic() + 1.0
         try:

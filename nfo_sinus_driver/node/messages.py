@@ -98,11 +98,7 @@ def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
 
 
 def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
-    """
-    Return the InvSt of a poll.
-
-    :raises ValueError: the drive was not connected.
-    """
+    """Return the InvSt of a poll (ValueError: the drive was not connected)."""
     if snapshot.status is None:
         raise ValueError('no inverter status without a connection')
     return InvSt(
@@ -124,11 +120,7 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
 
 
 def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
-    """
-    Return the ErrorLogEntry of an entry.
-
-    :param stamp: when it happened; 0 if nobody knows.
-    """
+    """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if nobody knows)."""
     return ErrorLogEntry(
         code=entry.code,
         text=entry.text,

@@ -56,19 +56,11 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def enquiry(self, id_: int) -> int:
-        """
-        Return the word that stands at an id.
-
-        :raises Wrong: it cannot be read.
-        """
+        """Return the word that stands at an id (Wrong: it cannot be read)."""
 
     @abc.abstractmethod
     def select(self, id_: int, word: int, *, to_all: bool) -> None:
-        """
-        Set what stands at an id.
-
-        :raises Wrong: it cannot be set, or not now.
-        """
+        """Set what stands at an id (Wrong: it cannot be set, or not now)."""
 
     @abc.abstractmethod
     def refused(self, flag: LineError) -> bool:

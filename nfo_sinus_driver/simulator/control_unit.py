@@ -90,11 +90,7 @@ class ControlUnit(abc.ABC):
         return key
 
     def admit(self, key: str) -> None:
-        """
-        Look whether a parameter may be written now.
-
-        :raises Refused: STATE.
-        """
+        """Look whether a parameter may be written now (Refused: STATE)."""
 
     def stored(self, key: str) -> None:
         """Take note that a parameter has a new value in the memory."""
@@ -127,11 +123,7 @@ class ControlUnit(abc.ABC):
         self.initialised = True
 
     def trip(self, code: int, *, cause_present: bool = False) -> None:
-        """
-        Let a fault happen.
-
-        :raises ValueError: the family has no such fault.
-        """
+        """Let a fault happen (ValueError: the family has no such fault)."""
         self.faults.trip(code, self.counters.operating_time, cause_present=cause_present)
 
     def nameplate(self) -> Nameplate:

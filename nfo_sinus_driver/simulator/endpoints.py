@@ -96,19 +96,11 @@ class Endpoint:
         return PROTOCOLS[self.protocol].make(gateway_timeout)
 
     def open(self) -> Port:
-        """
-        Return its port.
-
-        :raises PortError: it cannot be had.
-        """
+        """Return its port (PortError: it cannot be had)."""
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
 
     def check(self, address: int) -> None:
-        """
-        Look whether an address is one of the protocol.
-
-        :raises ValueError: it is not.
-        """
+        """Look whether an address is one of the protocol (ValueError: it is not)."""
         possible = PROTOCOLS[self.protocol].addresses
         if address not in possible:
             span = f'{possible.start} to {possible.stop - 1}'

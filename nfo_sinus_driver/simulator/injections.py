@@ -77,11 +77,7 @@ class Argument:
         return self.default is _REQUIRED
 
     def convert(self, value: Any) -> Any:
-        """
-        Return the value in its right type.
-
-        :raises ValueError: it cannot be that.
-        """
+        """Return the value in its right type (ValueError: it cannot be that)."""
         if value is None and not self.required:
             return None
         try:

@@ -137,11 +137,7 @@ class Memory:
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
-        """
-        Refuse a raw number that the manual does not allow.
-
-        :raises Refused: VALUE.
-        """
+        """Refuse a raw number that the manual does not allow (Refused: VALUE)."""
         if parameter.labels:
             if raw not in parameter.labels:
                 raise Refused(Reason.VALUE, f'{parameter.key} has no code {raw}')

@@ -117,11 +117,7 @@ class Server:
         return to_words(parameter.at('modbus').number.encode(raw))
 
     def write(self, register: int, words: Sequence[int]) -> None:
-        """
-        Write the parameter at a register.
-
-        :raises Refused: as the reason says.
-        """
+        """Write the parameter at a register (Refused: as the reason says)."""
         parameter = self._find(register, len(words))
         raw = parameter.at('modbus').number.decode(to_bytes(words))
         self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))

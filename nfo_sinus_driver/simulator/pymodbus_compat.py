@@ -125,22 +125,14 @@ def decode_read(data: bytes) -> tuple[int, int]:
 
 
 def decode_write_single(data: bytes) -> tuple[int, int]:
-    """
-    Decode what follows function 06: register and word.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 06: register and word (ValueError: malformed)."""
     request = _decoded(_WriteSingleRequest(), data)
     word = request.value if hasattr(request, 'value') else request.registers[0]
     return request.address, word
 
 
 def decode_write_multiple(data: bytes) -> tuple[int, int, tuple[int, ...]]:
-    """
-    Decode what follows function 16: register, count, words.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 16: register, count, words (ValueError: malformed)."""
     request = _decoded(_WriteMultipleRequest(), data)
     words = request.values if hasattr(request, 'values') else request.registers
     return request.address, request.count, tuple(words)

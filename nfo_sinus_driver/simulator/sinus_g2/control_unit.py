@@ -185,11 +185,7 @@ class G2ControlUnit(SinusControlUnit):
         self.self_restart.tripped(code)
 
     def fail_tuning(self, code: int) -> None:
-        """
-        Let the next tuning end with a fault.
-
-        :raises ValueError: none that a tuning ends with.
-        """
+        """Let the next tuning end with a fault (ValueError: none that a tuning ends with)."""
         if code not in FAILURES:
             raise ValueError(f'a tuning fails with {sorted(FAILURES)}, not with {code}')
         self._next_failure = code

@@ -54,11 +54,7 @@ _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
 
 class OptimalControlUnit(SinusControlUnit):
-    """
-    Runs the motor of an Optimal.
-
-    :param options: those of every Sinus.
-    """
+    """Runs the motor of an Optimal (options: those of every Sinus)."""
 
     setpoint_of: ClassVar[Mapping[int, str]] = {
         _FREQUENCY: 'fieldbus.input_freq_setpoint',
