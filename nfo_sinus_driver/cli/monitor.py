@@ -82,9 +82,7 @@ def monitor(options: argparse.Namespace) -> int:
     return int(not answered)
 
 
-def _show(
-    drive: Remote, session: Session, options: argparse.Namespace, *, live: bool
-) -> bool:
+def _show(drive: Remote, session: Session, options: argparse.Namespace, *, live: bool) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
@@ -132,9 +130,7 @@ async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[Role, float]]
     return seen, values
 
 
-def _facts(
-    drive: Remote, seen: InverterStatus, values: Mapping[Role, float]
-) -> dict[str, object]:
+def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) -> dict[str, object]:
     measured = {
         name: None if math.isnan(values[role]) else values[role]
         for role, (name, _, _) in _VALUES.items()

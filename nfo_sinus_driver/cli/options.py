@@ -120,8 +120,7 @@ def _common() -> argparse.ArgumentParser:
     add(
         '--char-format',
         metavar='FORMAT',
-        help='such as 8E1, 8O1, 8N2 '
-        f'(default: the one of the factory: {", ".join(formats)})',
+        help=f'such as 8E1, 8O1, 8N2 (default: the one of the factory: {", ".join(formats)})',
     )
     add(
         '--response-timeout',
@@ -165,9 +164,7 @@ def _parser() -> argparse.ArgumentParser:
         help='such as 1-10,20 (default: 1-247; classic: 1-94)',
     )
     scan.add_argument(
-        '--all-settings',
-        action='store_true',
-        help='try every baud rate and parity; takes long',
+        '--all-settings', action='store_true', help='try every baud rate and parity; takes long'
     )
     scan.add_argument(
         '--params',
@@ -232,9 +229,7 @@ def _parser() -> argparse.ArgumentParser:
     verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
     _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))
     stop = verb('stop', 'stop a motor that the bus runs, and give control back', json=True)
-    stop.add_argument(
-        '--quick', action='store_true', help='release the motor at once: it coasts'
-    )
+    stop.add_argument('--quick', action='store_true', help='release the motor at once: it coasts')
     tune = verb('tune', 'have the drive measure or calculate its motor', json=True)
     tune.add_argument(
         'procedure',

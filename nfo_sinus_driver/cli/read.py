@@ -216,9 +216,7 @@ def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
     keys = {role: drive.model.key(role) for role in roles}
     found = _measure(drive, filter(drive.registers.reaches, keys.values()))
     return {
-        role: shown(found[key], drive.model[key].unit)
-        for role, key in keys.items()
-        if key in found
+        role: shown(found[key], drive.model[key].unit) for role, key in keys.items() if key in found
     }
 
 

@@ -41,12 +41,7 @@ _PERIOD = 0.1
 #: How long the word may take why it was stopped, s.
 _LONGEST_WORD = 1.0
 #: Why a motor follows set-points no more.
-_ENDS = (
-    Cause.STOPPED_BECAUSE,
-    Cause.STOPPED_BECAUSE_OF_FAULT,
-    Cause.LOST,
-    Cause.LOST_IN_USE,
-)
+_ENDS = (Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, Cause.LOST, Cause.LOST_IN_USE)
 _FAILED = 1
 _INTERRUPTED = 130
 

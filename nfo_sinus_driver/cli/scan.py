@@ -49,13 +49,7 @@ from nfo_sinus_driver.link.settings import BAUD_RATES
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
-_COLUMNS = (
-    ('address', 7),
-    ('line', 10),
-    ('product', 20),
-    ('firmware', 11),
-    ('serial number', 0),
-)
+_COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
 _ADVICE = (
     'no response: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
     'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
@@ -134,9 +128,7 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
     if options.all_settings:
         formats = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
         return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in formats]
-    return [
-        (options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)
-    ]
+    return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
 
 
 def _who_answers(

@@ -135,9 +135,7 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
     return notes
 
 
-def _differing(
-    file: ParameterFile, drive: Remote, options: argparse.Namespace
-) -> dict[str, bytes]:
+def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) -> dict[str, bytes]:
     """
     Return what has to be written.
 
@@ -230,9 +228,7 @@ class Loading:
             stained = list(dict.fromkeys((*self._written, *doubtful)))
             raise CliError(self._clean_up(stained)) from error
 
-    def _write(
-        self, what: str, data: Mapping[str, bytes], written: dict[str, Change]
-    ) -> None:
+    def _write(self, what: str, data: Mapping[str, bytes], written: dict[str, Change]) -> None:
         """
         Write, and keep account of it.
 

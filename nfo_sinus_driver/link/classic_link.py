@@ -181,16 +181,12 @@ class ClassicLink:
         (word,) = _WORD.unpack(data)
         return Reply(b'', self._select(Select(unit, address.index, word)))
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter, then read another; in as many transactions as that takes."""
         self.write(unit, address, data)
         return self.read(unit, source)
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 

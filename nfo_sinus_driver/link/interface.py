@@ -129,9 +129,7 @@ class LineProtocol:
         """
         if address not in self.units:
             name = self.addressing.title()
-            raise ValueError(
-                f'address {address}: {name} has {self.units[0]} to {self.units[-1]}'
-            )
+            raise ValueError(f'address {address}: {name} has {self.units[0]} to {self.units[-1]}')
 
     def require_char_format(self, char_format: str) -> None:
         """
@@ -176,9 +174,7 @@ class Link(Protocol):
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter (LinkError: as its subclasses say)."""
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """
         Write one parameter and read another, in one transaction.
 
@@ -187,9 +183,7 @@ class Link(Protocol):
         :raises LinkError: as its subclasses say.
         """
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 

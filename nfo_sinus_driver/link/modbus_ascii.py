@@ -114,7 +114,6 @@ class AsciiReader(AnswerReader[_T]):
 _SWITCHING = 2
 
 
-
 class AsciiLink(SerialLink):
     """
     A Modbus ASCII master.

@@ -53,15 +53,11 @@ class ModbusLink(ABC):
         """Write one parameter (function 06 for one register, 16 for several)."""
         return Reply(*self._ask(Write(unit, address.index, data)))
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter and read another, in one transaction (function 23)."""
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 

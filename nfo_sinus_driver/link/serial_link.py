@@ -114,9 +114,7 @@ class SerialLink(ModbusLink):
         """Name parameters of different sizes that are safe to read at any time."""
         self._resync_addresses[unit] = tuple(addresses)
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """
         Write one parameter and read another (function 23), or only write it.
 

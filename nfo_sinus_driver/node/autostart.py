@@ -39,9 +39,7 @@ class Autostart:
     def __init__(self, name: str, attempt: Callable[[], bool]) -> None:
         self._attempt = attempt
         self._over = threading.Event()
-        self._thread = threading.Thread(
-            target=self._work, name=f'autostart of {name}', daemon=True
-        )
+        self._thread = threading.Thread(target=self._work, name=f'autostart of {name}', daemon=True)
 
     def start(self) -> None:
         """Begin to try."""

@@ -76,22 +76,16 @@ class Commands:
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(
-        self, name: str, command: Callable[[Drive], Future[Report]], timeout: float
-    ) -> None:
+    def offer(self, name: str, command: Callable[[Drive], Future[Report]], timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             return self._answer(response, lambda: command(self._managed.drive), timeout)
 
         group = MutuallyExclusiveCallbackGroup()
-        self._node.create_service(
-            Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
-        )
+        self._node.create_service(Trigger, name, answer, qos_profile=COMMANDS, callback_group=group)
 
-    def _answer(
-        self, response: Any, command: Callable[[], Future[Report]], timeout: float
-    ) -> Any:
+    def _answer(self, response: Any, command: Callable[[], Future[Report]], timeout: float) -> Any:
         return self.answer(response, command, timeout, self._managed.wording.say)
 
     def answer(
@@ -120,9 +114,7 @@ class Commands:
             response.message = f'error in the driver: {error}'
         return response
 
-    def _on_enable(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if not request.data:
             return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
         return self._answer(
@@ -172,11 +164,7 @@ class ErrorLogServices:
     """
 
     def __init__(
-        self,
-        node: Node,
-        managed: ManagedDrive,
-        commands: Commands,
-        stamp: Callable[[float], Time],
+        self, node: Node, managed: ManagedDrive, commands: Commands, stamp: Callable[[float], Time]
     ) -> None:
         self._managed = managed
         self._commands = commands
@@ -200,10 +188,7 @@ class ErrorLogServices:
             return self._summary(entries)
 
         return self._commands.answer(
-            response,
-            lambda: self._managed.drive.error_log(request.max_entries),
-            _LONGEST,
-            fill_in,
+            response, lambda: self._managed.drive.error_log(request.max_entries), _LONGEST, fill_in
         )
 
     def _summary(self, entries: Sequence[LogEntry]) -> str:

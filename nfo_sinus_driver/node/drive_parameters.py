@@ -243,9 +243,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
         span = IntegerRange(from_value=int(low), to_value=int(high), step=step)
         shown.integer_range = [span]
     else:
-        shown.floating_point_range = [
-            FloatingPointRange(from_value=low, to_value=high, step=step)
-        ]
+        shown.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=step)]
     return shown
 
 

@@ -130,9 +130,7 @@ def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
     )
 
 
-def bus_statistics(
-    statistics: Statistics, silent_drives: list[str], stamp: Time
-) -> BusStatistics:
+def bus_statistics(statistics: Statistics, silent_drives: list[str], stamp: Time) -> BusStatistics:
     """Return the BusStatistics message of a line, or of one drive."""
     return BusStatistics(
         header=Header(stamp=stamp),

@@ -127,7 +127,5 @@ class Schedule:
             return None
         moment, number, period, function = self._entries[0]
         late = (now - moment) // period
-        heapq.heapreplace(
-            self._entries, (moment + (late + 1) * period, number, period, function)
-        )
+        heapq.heapreplace(self._entries, (moment + (late + 1) * period, number, period, function))
         return function

@@ -140,9 +140,7 @@ class SetpointsForAll:
             lambda: {managed.name: managed.drive.setpoint for managed in context.drives},
             self._on_told,
         )
-        context.setpoint_subscriber.subscribe(
-            node, Float32, '~/setpoint_all', self._on_setpoint
-        )
+        context.setpoint_subscriber.subscribe(node, Float32, '~/setpoint_all', self._on_setpoint)
 
     def _on_setpoint(self, message: Float32) -> None:
         if math.isfinite(message.data):

@@ -232,8 +232,7 @@ DRIVE_SETTINGS = (
     Setting(
         'setpoint_max',
         0.0,
-        'Set-points are clamped to this, in the unit of the control mode; '
-        "0: the drive's own limit",
+        "Set-points are clamped to this, in the unit of the control mode; 0: the drive's own limit",
         0,
         32767,
         unit='in the unit of the control mode',

@@ -65,18 +65,14 @@ class TuningServices:
     :param stamp: gives the node's time of a moment of ``time.monotonic``.
     """
 
-    def __init__(
-        self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]
-    ) -> None:
+    def __init__(self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]) -> None:
         self._node = node
         self._managed = managed
         self._stamp = stamp
         # reentrant, so that a second one is refused at once and a cancel need not wait
         group = ReentrantCallbackGroup()
         for name, procedure in _SERVICES.items():
-            node.create_service(
-                Trigger, name, self._service_of(procedure), callback_group=group
-            )
+            node.create_service(Trigger, name, self._service_of(procedure), callback_group=group)
         self._server = ActionServer(
             node,
             Tune,

@@ -176,9 +176,7 @@ def _answers(what: str, help_text: str, *more: Argument) -> Verb:
 
 
 def _noise_rate(target: Target, given: dict[str, Any]) -> None:
-    target.line.faults.set_rate(
-        given['what'], given['share'], given['seed'], given['seconds']
-    )
+    target.line.faults.set_rate(given['what'], given['share'], given['seed'], given['seconds'])
 
 
 def _burst(target: Target, given: dict[str, Any]) -> None:

@@ -140,16 +140,12 @@ class LineFaults:
         replies = [Reply(frame)]
         for fault in list(self._pending):
             if fault.address in (None, address):
-                replies = [
-                    new for reply in replies for new in self._spoiled(fault, reply, instead)
-                ]
+                replies = [new for reply in replies for new in self._spoiled(fault, reply, instead)]
                 fault.left -= 1
         self._pending = [fault for fault in self._pending if fault.left > 0]
         for rate in self._rates.values():
             if rate.chance.random() < rate.share:
-                replies = [
-                    new for reply in replies for new in self._spoiled(rate, reply, instead)
-                ]
+                replies = [new for reply in replies for new in self._spoiled(rate, reply, instead)]
         return replies
 
     def _spoiled(self, fault: _Pending | _Rate, reply: Reply, instead: Reply | None) -> list[Reply]:
@@ -169,9 +165,7 @@ class LineFaults:
             data = bytes(byte & mask for byte in noise) + reply.data
             return [replace(reply, data=data, note=_noted(reply, 'noise'))]
         damaged = bytearray(reply.data)
-        damaged[self._random.randrange(len(damaged))] ^= (
-            1 << self._random.randrange(self._bits)
-        )
+        damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(self._bits)
         return [replace(reply, data=bytes(damaged), note=_noted(reply, 'damaged'))]
 
 

@@ -85,9 +85,7 @@ def _serve(simulator: Simulator) -> int:
         for line in simulator.lines
     )
     also = ''.join(f'; also {other}' for other in others)
-    print(
-        f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True
-    )
+    print(f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True)
     # the line has a thread of its own: this one waits for a signal, or for a failure there
     simulator.finished.wait()
     print(f'simulator: the line broke down: {simulator.failure!r}', file=sys.stderr)

@@ -55,7 +55,6 @@ _MOST_WRITTEN = 123
 _MOST_WRITTEN_WITH_READ = 121
 
 
-
 class Server:
     """
     What one drive does with Modbus requests.

@@ -33,9 +33,7 @@ BUS_TYPES: Mapping[str, int] = {'classic': 1, 'modbus_ascii': 2, 'modbus_rtu': 3
 BAUD_CODES = {1200: 16, 2400: 32, 4800: 64, 9600: 128, 19200: 256, 38400: 512, 57600: 768}
 FORMAT_CODES = {'7E1': 0, '7O1': 1, '7N2': 2, '8E1': 4, '8O1': 5, '8N2': 6}
 #: By these it hears the line.
-LINE_SETTINGS = frozenset(
-    {'serial.bus_type', 'serial.address', 'serial.si_baud', 'serial.si_prot'}
-)
+LINE_SETTINGS = frozenset({'serial.bus_type', 'serial.address', 'serial.si_baud', 'serial.si_prot'})
 
 
 @dataclass(frozen=True)
