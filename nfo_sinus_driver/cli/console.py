@@ -31,6 +31,11 @@ import unicodedata
 
 from tqdm import tqdm
 
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.wording import Calls
+from nfo_sinus_driver.wording import sentence
+
 #: What takes less needs no bar, s.
 _DELAY = 0.3
 _FORMAT = '{desc} {bar} {n_fmt}/{total_fmt}, {remaining} left'
@@ -130,3 +135,23 @@ def _width(text: str) -> int:
 def _pad(text: str, width: int, *, to_right: bool) -> str:
     blank = ' ' * (width - _width(text))
     return blank + text if to_right else text + blank
+
+
+_CALLS = Calls(
+    acknowledge='type nfo-sinus ack',
+    enable='run it again',
+    program='command',
+    drive_timeout='--drive-timeout',
+    set_drive_timeout='give --drive-timeout',
+    set_control_mode='give another --control-mode',
+    set_model='give the right --model',
+)
+
+
+def say(what: Report | Exception | None) -> str:
+    """Return what there is to say; an error that is no drive's speaks for itself."""
+    if what is None:
+        return ''
+    if isinstance(what, DriveError):
+        what = what.report
+    return sentence(what, _CALLS) if isinstance(what, Report) else str(what)

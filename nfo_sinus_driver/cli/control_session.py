@@ -28,10 +28,10 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError

@@ -31,9 +31,9 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import PortError

@@ -29,7 +29,7 @@ from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
 DEFAULTS = {

@@ -31,19 +31,19 @@ from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.cli.console import progress
 from nfo_sinus_driver.cli.console import put
 from nfo_sinus_driver.cli.console import remark
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.options import DEFAULTS
 from nfo_sinus_driver.cli.parameter_file import STANDARD
 from nfo_sinus_driver.cli.parameter_file import write_file
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')

@@ -34,7 +34,7 @@ from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import progress
 from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError

@@ -23,6 +23,7 @@ from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.read import as_json
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.cli.values import BARRED
@@ -31,7 +32,6 @@ from nfo_sinus_driver.cli.values import parse_value
 from nfo_sinus_driver.cli.values import require_names
 from nfo_sinus_driver.cli.values import same
 from nfo_sinus_driver.cli.values import shown
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 
 

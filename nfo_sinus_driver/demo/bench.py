@@ -11,14 +11,17 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """Starts a simulated drive and the driver for it: what ``make run`` and ``make demo`` share."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import contextlib
+import os
 from pathlib import Path
+import random
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -101,3 +104,31 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+#: All that DDS has ports for on every system; 0 is everybody's.
+_DOMAINS = range(1, 102)
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """
+    Have a ROS domain that nobody else who asks here has at the time.
+
+    It is not the one that is set: that is where the user's own robots are.
+
+    :raises RuntimeError: there is none left.
+    """
+    users = os.environ.get('ROS_DOMAIN_ID', '')
+    for number in random.sample(_DOMAINS, len(_DOMAINS)):
+        if str(number) == users:
+            continue
+        with socket.socket(socket.AF_UNIX) as claim:
+            # a name that only one on this machine can have, and that goes with its process
+            try:
+                claim.bind(f'\0nfo_sinus_driver/domain/{number}')
+            except OSError:
+                continue
+            yield number
+            return
+    raise RuntimeError('no ROS domain is free')

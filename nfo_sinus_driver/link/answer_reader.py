@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from typing import Generic
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import understand
 

@@ -26,8 +26,8 @@ from functools import lru_cache
 from functools import reduce
 from operator import xor
 
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import Refused
 
 #: The address at which a drive answers whatever its own is; for a drive alone on the line.
 POINT_TO_POINT = 0

@@ -36,19 +36,19 @@ from nfo_sinus_driver.link.classic import Request
 from nfo_sinus_driver.link.classic import Select
 from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.settings import LineSettings
 
 #: What a message carries.
 _WORD = struct.Struct('>H')

@@ -25,8 +25,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import re
 
-from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_pdu import Request
 

@@ -20,9 +20,9 @@ from abc import ABC
 from abc import abstractmethod
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import Request

@@ -27,8 +27,8 @@ import struct
 from typing import Protocol
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Refused
 
 READ_HOLDING_REGISTERS = 3
 WRITE_SINGLE_REGISTER = 6

@@ -23,9 +23,9 @@ from urllib.parse import urlsplit
 
 import serial
 
-from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.serial_port import SerialPort
-from nfo_sinus_driver.link.settings import LineSettings
 
 #: An address on a network without the kind of URL that says what is there.
 _HOST_AND_PORT = re.compile(r'[^/]+:\d+')

@@ -20,11 +20,11 @@ from collections.abc import Mapping
 
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
 from nfo_sinus_driver.link.rtu import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
 
 #: A new protocol is a file of this folder, and its link stands here.
 _LINKS = {link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink)}

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import logging
 
-from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.interface import PortError
 
 _log = logging.getLogger(__name__)
 

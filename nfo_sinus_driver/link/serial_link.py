@@ -24,13 +24,14 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link.answer_reader import AnswerReader
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NeverSilent
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import Doubt
 from nfo_sinus_driver.link.late_replies import LateReplies
@@ -46,7 +47,6 @@ from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.settings import LineSettings
 
 _T = TypeVar('_T')
 

@@ -25,8 +25,8 @@ import struct
 import termios
 import time
 
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import PortError
 
 # Linux ioctls that Python's termios module does not name
 _TIOCGSERIAL = 0x541E

@@ -40,18 +40,18 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
 from nfo_sinus_driver.node.commands import ErrorLogServices
+from nfo_sinus_driver.node.commands import TuningServices
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
-from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import coerce
 from nfo_sinus_driver.node.settings import declare
-from nfo_sinus_driver.node.tuning import TuningServices
 from nfo_sinus_driver.node.wording import NodeError
 from nfo_sinus_driver.node.wording import Wording
 

@@ -32,8 +32,8 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.setpoint_all import SetpointAll
 from nfo_sinus_driver.drive.setpoint_all import Told
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import Joint
 
 _UNITS = {
     'Freque': Setpoint.HZ,

@@ -27,8 +27,8 @@ from typing import Any
 from typing import ClassVar
 
 from nfo_sinus_driver.simulator.faults import Faults
-from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.motor import Counters
 from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.timing import Timing

@@ -30,11 +30,11 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
+from nfo_sinus_driver.simulator.motor import measure
 
 #: The characters of a serial number [M0 §6.2.4].
 SERIAL_LENGTH = 16

@@ -46,9 +46,9 @@ from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import modbus_tcp
 from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.link.answer_reader import AnswerReader
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import Refused
 
 #: Most bytes that a reader of a whole connection keeps, beside those just handed over.
 _MOST_KEPT = 600

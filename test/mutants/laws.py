@@ -342,7 +342,7 @@ LAWS = (
     Mutant(
         8,
         'frames follow each other without a gap',
-        'nfo_sinus_driver/link/settings.py',
+        'nfo_sinus_driver/link/interface.py',
         '        return 0.00175 if self.baud_rate > 19200 else 3.5 * 11 / self.baud_rate',
         '        return 0.0',
         (RTU_LINK,),

@@ -35,11 +35,11 @@ from nfo_sinus_driver.simulator import classic
 from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import carried
 from nfo_sinus_driver.simulator.memory import kept
+from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 #: Counters of 24 bits [C26].

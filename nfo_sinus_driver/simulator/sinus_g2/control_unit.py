@@ -34,13 +34,13 @@ from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.sinus import control_unit
+from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.sinus.control_unit import Variant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
-from nfo_sinus_driver.simulator.sinus.variant import REFUSED
-from nfo_sinus_driver.simulator.sinus.variant import Variant
 from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import RELEASED

@@ -34,18 +34,18 @@ from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.families.sinus_optimal.words import Status
 from nfo_sinus_driver.families.sinus_optimal.words import state_of
-from nfo_sinus_driver.simulator.measured import nearest
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Regulation
+from nfo_sinus_driver.simulator.motor import nearest
+from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.sinus.control_unit import Variant
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
-from nfo_sinus_driver.simulator.sinus.variant import KEEPS
-from nfo_sinus_driver.simulator.sinus.variant import Variant
 
 #: Codes of the setting control.mode.
 _FREQUENCY, _SPEED = 0, 3

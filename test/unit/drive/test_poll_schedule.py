@@ -29,7 +29,7 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 STATUS, INV_ST, FREQUENCY, SPEED, TORQUE = 0x258, 0x2A5, 0x400, 0x264, 0x40C
 OVERLOAD = 5

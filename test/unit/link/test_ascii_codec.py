@@ -26,7 +26,7 @@ import pytest
 from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT
 from nfo_sinus_driver.link.modbus_ascii import AsciiReader
 from nfo_sinus_driver.link.modbus_ascii import encode

@@ -34,7 +34,7 @@ import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_identify import BASIC
 from nfo_sinus_driver.link.modbus_identify import REGULAR
 from nfo_sinus_driver.link.modbus_identify import SPECIFIC

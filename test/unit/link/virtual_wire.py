@@ -30,7 +30,7 @@ import pymodbus_opinion as opinion
 
 from nfo_sinus_driver.link import classic_link
 from nfo_sinus_driver.link import serial_link
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
 
 #: More looks at the clock than any honest transaction takes: the link hangs.
 _PATIENCE = 100_000

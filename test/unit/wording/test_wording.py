@@ -28,7 +28,7 @@ import pytest
 from support.said import CALLS
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli import wording as cli
+from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.parameter_writer import Change
