@@ -51,6 +51,13 @@ def explain(error: LinkError, address: int, *, known: bool) -> Report:
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
+def explain_failure(error: LinkError | DriveError, inverter: DriveState) -> Report:
+    """Return what went wrong with a drive that has answered before."""
+    if isinstance(error, DriveError):
+        return error.report
+    return explain(error, inverter.settings.address, known=True)
+
+
 def report_of(error: Exception) -> Report:
     """Return what an error says, as far as that is known."""
     if isinstance(error, DriveError):

@@ -21,11 +21,8 @@ from collections.abc import Collection
 from collections.abc import Coroutine
 from collections.abc import Sequence
 from concurrent.futures import Future
-import functools
 import math
 from typing import Any
-from typing import Concatenate
-from typing import ParamSpec
 from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
@@ -53,6 +50,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.parameters import on_bus
 from nfo_sinus_driver.drive.poller import Poller
 from nfo_sinus_driver.drive.poller import take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
@@ -68,24 +66,11 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
-_P = ParamSpec('_P')
 
 #: How long an exit waits for the first answer of a drive that has never answered yet, s.
 _FIRST_ANSWER = 1.0
 #: What the unit of set-points follows from.
 _MODE_ROLES = (Role.CONTROL_MODE, Role.PROCESS_UNIT)
-
-
-def _on_bus(
-    method: Callable[Concatenate[Drive, _P], Coroutine[Any, Any, _T]],
-) -> Callable[Concatenate[Drive, _P], Future[_T]]:
-    """Have a method run on the bus: who calls it, from any thread, is given a future."""
-
-    @functools.wraps(method)
-    def run(drive: Drive, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-        return drive.run(lambda: method(drive, *args, **kwargs))
-
-    return run
 
 
 class Drive:
@@ -228,7 +213,7 @@ class Drive:
 
     # --- any thread, carried out on the bus ---------------------------------------------------
 
-    @_on_bus
+    @on_bus
     async def connect(self, *, patient: bool = True, parameters: bool = False) -> Identity:
         """
         Identify the drive, make sure that nothing runs unasked, and watch it from then on.
@@ -252,7 +237,7 @@ class Drive:
         assert self.inverter.identity is not None
         return self.inverter.identity
 
-    @_on_bus
+    @on_bus
     async def require_standing(self) -> None:
         """
         Make sure that no motor runs by this control method any more, so that another may follow.
@@ -266,7 +251,7 @@ class Drive:
             method = self.settings.control_method
             raise DriveError(self.inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
-    @_on_bus
+    @on_bus
     async def disconnect(self, timeout: float) -> Report:
         """Stop the motor, wait so long, s, until it stands, and give control back."""
         # nobody may enable it while it is awaited that the motor stands
@@ -281,12 +266,12 @@ class Drive:
             self._error_log_monitor.end()
             self._watch.end()
 
-    @_on_bus
+    @on_bus
     async def deactivate(self) -> Report | None:
         """Stop the motor, if it may run, and only keep watch until it is active again."""
         return await self._deactivate()
 
-    @_on_bus
+    @on_bus
     async def stop_for_good(self, patience: float) -> Report | None:
         """Stop the motor within so many s; it can never be enabled again."""
         if self._controller is not None:
@@ -296,70 +281,74 @@ class Drive:
             patience = min(patience, _FIRST_ANSWER)
         return await self._deactivate(patience)
 
-    @_on_bus
+    @on_bus
     async def enable(self) -> Report:
         """Take control and run at set-point 0, then follow set-points that come in."""
         self._require_active()
-        answer = await self._connected_controller.enable(self._watchdog.require_set)
+        controller = self._procedures.controller
+        self._require_connected()
+        answer = await controller.enable(self._watchdog.require_set)
         self._watch.wake()
         return answer
 
-    @_on_bus
+    @on_bus
     async def stop(self) -> Report:
         """Stop as the drive's StMode says; control is kept."""
-        return await self._commanding.stop()
+        return await self._procedures.controller.stop()
 
-    @_on_bus
+    @on_bus
     async def quick_stop(self) -> Report:
         """Release the motor at once: it coasts."""
-        return await self._commanding.quick_stop()
+        return await self._procedures.controller.quick_stop()
 
-    @_on_bus
+    @on_bus
     async def acknowledge(self) -> Report:
         """Acknowledge a fault."""
-        return await self._connected_controller.acknowledge()
+        controller = self._procedures.controller
+        self._require_connected()
+        return await controller.acknowledge()
 
-    @_on_bus
+    @on_bus
     async def identify(self, *, thoroughly: bool = True) -> Identity:
         """Find out who answers, thoroughly with model and serial number; what runs runs on."""
         identity = await self.inverter.identify()
         return await self.inverter.introduce() if thoroughly else identity
 
-    @_on_bus
+    @on_bus
     async def read_status(self) -> InverterStatus:
         """Read the status, connected or not, without acknowledging anything."""
         return await self.inverter.look(Priority.SERVICE)
 
-    @_on_bus
+    @on_bus
     async def measure(self, key: str) -> Value:
         """Read one parameter, connected or not."""
         return await self.registers.read(key, Priority.SERVICE)
 
-    @_on_bus
+    @on_bus
     async def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
         steps = self.model.profile.in_charge(self.inverter.seen)
         return await carry_out(steps, self.registers, Priority.SERVICE)
 
-    @_on_bus
+    @on_bus
     async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
         self._require_connected()
         return await self.log.read_now(most)
 
-    @_on_bus
+    @on_bus
     async def erase_error_log(self) -> Report:
         """Erase the error log; the motor must stand."""
         self._require_open()
         return await self.log.erase_now()
 
-    @_on_bus
+    @on_bus
     async def reset_energy(self) -> Report:
         """Reset the kWh counter; the motor must stand."""
         self._require_open()
         return await self.log.reset_energy_now()
 
-    @_on_bus
+    @on_bus
     async def tune(
         self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
     ) -> Tuned:
@@ -378,29 +367,17 @@ class Drive:
 
         return await self._tuning.tune_now(procedure, tell)
 
-    @_on_bus
+    @on_bus
     async def cancel_tuning(self) -> Report | None:
         """Stop a tuning; does nothing else, and nothing if there is none."""
         return await self._procedures.abort()
 
-    @_on_bus
+    @on_bus
     async def set_drive_timeout(self, seconds: float) -> Sequence[Change]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
         return await self._watchdog.set_now(seconds)
 
     # --- on the bus ---------------------------------------------------------------------------
-
-    @property
-    def _commanding(self) -> Controller:
-        if self._controller is None:
-            raise DriveError(Cause.MONITOR_ONLY)
-        return self._controller
-
-    @property
-    def _connected_controller(self) -> Controller:
-        controller = self._commanding
-        self._require_connected()
-        return controller
 
     def _require_connected(self) -> None:
         if not self.inverter.connected:

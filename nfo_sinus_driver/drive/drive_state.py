@@ -163,7 +163,7 @@ class DriveState:
             return await self._look_at_code(priority, once)
         before = self.seen
         if told is None:
-            word, at = await self._read_word(priority, once)
+            word, at = await self._read_int(self.word_key, priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
         code_of = self.model.profile.status_word.code
@@ -179,7 +179,7 @@ class DriveState:
         seen = InverterStatus(at, word, NO_CODE, self.model)
         alarmed = before is not None and word != before.word and alarming(seen)
         priority = Priority.STOP if alarmed else priority
-        code, code_at = await self._read_code(priority, once)
+        code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
         seen = replace(seen, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
@@ -194,7 +194,7 @@ class DriveState:
         if news and alarming(replace(seen, word=None)):
             differs, priority = True, Priority.STOP
         if differs:
-            word, at = await self._read_word(priority, once)
+            word, at = await self._read_int(self.word_key, priority, once)
             seen = replace(seen, word=word, at=at)
         return await self._with_frequency(seen, priority, once)
 
@@ -234,9 +234,9 @@ class DriveState:
             fell = before.fell
         return self._saw(replace(seen, frequency=frequency, fell=fell))
 
-    async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self.registers.read_reply(self.word_key, priority, once=once)
-        return self.status_word(reply.data), reply.arrived
+    async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
+        reply = await self.registers.read_reply(key, priority, once=once)
+        return int(self.registers.number(key, reply.data)), reply.arrived
 
     @property
     def word_key(self) -> str:
@@ -247,15 +247,9 @@ class DriveState:
         """Return the status word that bytes mean."""
         return int(self.registers.number(self.word_key, data))
 
-    async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
-        key = self.model.key(Role.STATUS_CODE)
-        code, at = await self.registers.read_at(key, priority, once=once)
-        assert isinstance(code, int)
-        return code, at
-
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
-        code, at = await self._read_code(priority, once)
+        code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
         seen = InverterStatus(at, None, code, self.model, code_at=at)
         if seen.means(Meaning.ANONYMOUS):
             key = self.model.key(Role.CONTROL_SOURCE)
@@ -434,12 +428,13 @@ class DriveState:
         """
         key = self.model.key(Role.CONTROL_MODE)
         if self.registers.reaches(key):
-            mode = await self.read_label(key, priority, once=once)
+            mode = str(await self.registers.read(key, priority, once=once))
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
-            unit = await self.read_label(self.model.key(Role.PROCESS_UNIT), priority, once=once)
+            key = self.model.key(Role.PROCESS_UNIT)
+            unit = str(await self.registers.read(key, priority, once=once))
         # both at once: nobody is told of the one without the other
         self.control_mode, self.unit = mode, unit
         return mode
@@ -448,7 +443,7 @@ class DriveState:
         """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
         key = self.model.key(Role.STOP_MODE)
         if self.registers.reaches(key):
-            return await self.read_label(key, Priority.STOP) == self.model.profile.releases
+            return await self.registers.read(key, Priority.STOP) == self.model.profile.releases
         seen = self.seen
         told = seen is not None and Fact.STOP_MODE_BRAKE in seen.valid
         return told and seen is not None and Fact.STOP_MODE_BRAKE not in seen.facts
@@ -457,18 +452,8 @@ class DriveState:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""
         key = self.model.key(Role.START_DELAY)
         if self.registers.reaches(key):
-            return await self.read_number(key)
+            return await self.registers.read_number(key, Priority.SERVICE)
         return _LONGEST_START_DELAY
-
-    async def read_label(
-        self, key: str, priority: Priority = Priority.SERVICE, *, once: bool = False
-    ) -> str:
-        """Read a parameter that is an enumeration."""
-        return str(await self.registers.read(key, priority, once=once))
-
-    async def read_number(self, key: str) -> float:
-        """Read a parameter that is a number."""
-        return await self.registers.read_number(key, Priority.SERVICE)
 
     @property
     def kind(self) -> Kind:

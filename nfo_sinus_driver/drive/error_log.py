@@ -149,10 +149,10 @@ class ErrorLog:
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, and have the clock follow it."""
         key = self._inverter.model.key(Role.OPERATING_TIME)
-        hours, at = await self._registers.read_at(key, priority, once=priority > Priority.POLL)
-        assert not isinstance(hours, str)
-        self.clock.note(float(hours), at)
-        return float(hours)
+        reply = await self._registers.read_reply(key, priority, once=priority > Priority.POLL)
+        hours = self._registers.number(key, reply.data)
+        self.clock.note(hours, reply.arrived)
+        return hours
 
     def note_sighting(self, entry: int, at: float) -> None:
         """Remember when an entry came, s of ``time.monotonic``."""

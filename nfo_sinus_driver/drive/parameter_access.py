@@ -132,14 +132,7 @@ class ParameterAccess:
 
     async def read(self, key: str, priority: Priority, *, once: bool = False) -> Value:
         """Read a parameter."""
-        return (await self.read_at(key, priority, once=once))[0]
-
-    async def read_at(
-        self, key: str, priority: Priority, *, once: bool = False
-    ) -> tuple[Value, float]:
-        """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        reply = await self.read_reply(key, priority, once=once)
-        return self.value(key, reply.data), reply.arrived
+        return self.value(key, await self.read_data(key, priority, once=once))
 
     async def read_data(self, key: str, priority: Priority, *, once: bool = False) -> bytes:
         """Read a parameter as it stands in the drive."""
@@ -147,9 +140,7 @@ class ParameterAccess:
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
-        value = await self.read(key, priority, once=once)
-        assert not isinstance(value, str), key
-        return float(value)
+        return self.number(key, await self.read_data(key, priority, once=once))
 
     async def identify(self, priority: Priority) -> Identification:
         """Ask the drive who it is; what it does not tell stays empty."""

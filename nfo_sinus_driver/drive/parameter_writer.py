@@ -30,7 +30,7 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
@@ -169,7 +169,7 @@ class ParameterWriter:
         try:
             seen = await self._inverter.look(_SERVICE)
         except LinkError as error:
-            raise not_changed(stopped, self.explain(error)) from error
+            raise not_changed(stopped, explain_failure(error, self._inverter)) from error
         if seen.driven:
             raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
 
@@ -190,15 +190,13 @@ class ParameterWriter:
             # between any two parameters, everybody who polls has a turn
             before = await self._registers.read_data(key, Priority.POLL)
         except LinkError as error:
-            raise not_changed(key, self.explain(error)) from error
+            raise not_changed(key, explain_failure(error, self._inverter)) from error
         if before == data:
             return ()
         try:
             await allow()
-        except LinkError as error:
-            raise not_changed(key, self.explain(error)) from error
-        except DriveError as error:
-            raise not_changed(key, error.report) from error
+        except (LinkError, DriveError) as error:
+            raise not_changed(key, explain_failure(error, self._inverter)) from error
         failure = await self._send(key, data)
         kept: bytes | None = None
         try:
@@ -247,7 +245,7 @@ class ParameterWriter:
             if kept == before:
                 return None
             keeps = Report(Cause.DRIVE_KEEPS, value=self._show(key, kept))
-            trouble = self.explain(error) if error else keeps
+            trouble = explain_failure(error, self._inverter) if error else keeps
         return trouble
 
     async def _put_back(
@@ -263,7 +261,7 @@ class ParameterWriter:
                     trouble = await self._restore(entry.key, entry.before, allow)
                 except LinkError as error:
                     # two time-outs are enough for the others on the line
-                    trouble = self.explain(error)
+                    trouble = explain_failure(error, self._inverter)
                     silence = Report(Cause.NOT_TRIED_ANY_MORE)
             if trouble is not None:
                 stuck[entry.key] = Report(
@@ -287,10 +285,6 @@ class ParameterWriter:
         unit = self._registers.model[key].unit
         return f'{show(self.value(key, data))} {unit}'.rstrip()
 
-    def explain(self, error: LinkError) -> Report:
-        """Return what a failed transaction means."""
-        return explain(error, self._inverter.settings.address, known=True)
-
     async def _why(
         self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
     ) -> Report:
@@ -298,7 +292,7 @@ class ParameterWriter:
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)
         if error is not None:
-            return self.explain(error)
+            return explain_failure(error, self._inverter)
         assert kept is not None
         value, written = self._show(key, kept), self._show(key, data)
         return Report(Cause.DRIVE_KEEPS_OTHER, value=value, written=written)
@@ -350,14 +344,14 @@ class WriteAccess:
                 nonlocal access
                 if not self._inverter.settings_need_control:
                     return
-                if await self._procedures.in_control(Priority.SERVICE):
+                if await self._procedures.controller.method.in_control(Priority.SERVICE):
                     return
                 # what was had was lost: to somebody who stopped it, or by a serial fault that a
                 # refused write has caused
                 if access.aborted:
                     raise DriveError(Cause.PROCEDURE_STOPPED, what=_WHAT)
                 await stack.aclose()
-                access = stack.enter_context(self._procedures.exclusive(_WHAT))
+                access = stack.enter_context(self._procedures.controller.exclusive(_WHAT))
                 await stack.enter_async_context(self._procedures.in_standby(access))
 
             yield allow

@@ -25,10 +25,14 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
+import functools
 import logging
 import time
 from typing import Any
+from typing import Concatenate
+from typing import ParamSpec
 from typing import Protocol
+from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
@@ -64,7 +68,30 @@ _PROGRESS = 5.0
 #: After how many rounds that brought nothing a parameter is not there.
 _REFUSALS = 2
 
-Run = Callable[[Callable[[], Coroutine[Any, Any, Any]]], 'Future[Any]']
+_T = TypeVar('_T')
+_P = ParamSpec('_P')
+
+
+class OnBus(Protocol):
+    """Something of a drive that any thread may have to do with."""
+
+    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
+        """Run a coroutine on the bus; what goes wrong on the line is explained."""
+
+
+_Self = TypeVar('_Self', bound=OnBus)
+
+
+def on_bus(
+    method: Callable[Concatenate[_Self, _P], Coroutine[Any, Any, _T]],
+) -> Callable[Concatenate[_Self, _P], Future[_T]]:
+    """Have a method run on the bus: who calls it, from any thread, is given a future."""
+
+    @functools.wraps(method)
+    def run(me: _Self, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
+        return me.run(lambda: method(me, *args, **kwargs))
+
+    return run
 
 
 class Parameters:
@@ -84,13 +111,13 @@ class Parameters:
         self,
         inverter: DriveState,
         procedures: Procedures,
-        run: Run,
+        run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
         told: Callable[[Collection[str]], None],
     ) -> None:
         self._bus = inverter.bus
         self._inverter = inverter
         self._registers = inverter.registers
-        self._run = run
+        self.run = run
         self._told = told
         self._writer = ParameterWriter(inverter, procedures)
         self._keys: tuple[str, ...] = ()
@@ -171,28 +198,6 @@ class Parameters:
         if reason is not None and self._values.get(key) != exact:
             raise not_changed(key, reason)
         return exact
-
-    def read(self, only: Collection[str] | None = None) -> Future[None]:
-        """Read every setting that the drive has, or only some."""
-        return self._run(lambda: self.read_now(only))
-
-    def change(self, wanted: Mapping[str, Value]) -> Future[tuple[Change, ...]]:
-        """Do as :meth:`change_now`."""
-        return self._run(lambda: self.change_now(wanted))
-
-    def write_each(
-        self, wanted: Mapping[str, bytes], wrote: Callable[[Change], None]
-    ) -> Future[None]:
-        """Do as :meth:`write_each_now`."""
-        return self._run(lambda: self.write_each_now(wanted, wrote))
-
-    def refresh(self) -> Future[Report]:
-        """Read every parameter again; the answer says which have changed."""
-        return self._run(self._refresh)
-
-    def apply(self, wanted: Mapping[str, Value], *, write: bool) -> Future[None]:
-        """Take a state as the wanted one, and report what drifts later; write it only if told."""
-        return self._run(lambda: self._wanted.apply_now(wanted, write=write))
 
     # --- on the bus ---------------------------------------------------------------------------
 
@@ -367,6 +372,11 @@ class Parameters:
             finally:
                 self._inverter.tuning = False
 
+    #: The same for any thread.
+    read = on_bus(read_now)
+    change = on_bus(change_now)
+    write_each = on_bus(write_each_now)
+
     @contextlib.asynccontextmanager
     async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:
         """Change parameters while nobody else does; they are no news before it is done."""
@@ -386,7 +396,14 @@ class Parameters:
         new = [key for key, wanted in data.items() if self._data.get(key) != wanted]
         await self._writer.require_standstill(new)
 
-    async def _refresh(self) -> Report:
+    @on_bus
+    async def apply(self, wanted: Mapping[str, Value], *, write: bool) -> None:
+        """Take a state as the wanted one, and report what drifts later; write it only if told."""
+        await self._wanted.apply_now(wanted, write=write)
+
+    @on_bus
+    async def refresh(self) -> Report:
+        """Read every parameter again; the answer says which have changed."""
         before = self._values
         keys = [key for key in self._keys if self._inverter.has(key)]
         for key in keys:

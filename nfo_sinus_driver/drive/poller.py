@@ -30,7 +30,7 @@ from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
@@ -415,7 +415,7 @@ class Poller:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
         inverter.connected = False
-        why = self._explain(error)
+        why = explain_failure(error, inverter)
         self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost()
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
@@ -438,11 +438,6 @@ class Poller:
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
         inverter.listener.on_snapshot(self.snapshot)
-
-    def _explain(self, error: LinkError | DriveError) -> Report:
-        if isinstance(error, DriveError):
-            return error.report
-        return explain(error, self._unit, known=True)
 
 
 def take_snapshot(

@@ -65,14 +65,15 @@ class Procedures:
         self._controller = controller
 
     @property
-    def _commands(self) -> Controller:
+    def controller(self) -> Controller:
+        """Who commands the drive else; a :class:`DriveError` if this driver only reads."""
         if self._controller is None:
             raise DriveError(Cause.MONITOR_ONLY)
         return self._controller
 
     def require(self, procedure: Procedure | Reset) -> None:
         """See to it that a procedure may begin."""
-        controller, inverter = self._commands, self._inverter
+        controller, inverter = self.controller, self._inverter
         if not inverter.connected:
             raise DriveError(Cause.NOT_CONNECTED, address=inverter.settings.address)
         require_known(procedure, inverter.model)
@@ -91,18 +92,8 @@ class Procedures:
     def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
         """Have the drive for a procedure, from its first preparations on."""
         self.require(procedure)
-        with self.exclusive(procedure.value) as access:
+        with self.controller.exclusive(procedure.value) as access:
             yield access
-
-    @contextlib.contextmanager
-    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """Have the drive for what every control method may do, also while connecting."""
-        with self._commands.exclusive(what) as access:
-            yield access
-
-    async def in_control(self, priority: Priority) -> bool:
-        """Tell whether the bus has control of the drive."""
-        return await self._commands.method.in_control(priority)
 
     @contextlib.asynccontextmanager
     async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
@@ -139,7 +130,7 @@ class Procedures:
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
             try:
-                await self._commands.method.begin(procedure, access.require_wanted)
+                await self.controller.method.begin(procedure, access.require_wanted)
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
@@ -147,7 +138,7 @@ class Procedures:
             await self._bus.sleep(_BUSY_PERIOD)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
-        controller, inverter, what = self._commands, self._inverter, access.what
+        controller, inverter, what = self.controller, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
         found = await controller.method.holder(Priority.SERVICE)
@@ -173,7 +164,7 @@ class Procedures:
 
     async def _give_back(self, found: Holder) -> None:
         """Remove the command, and give control back where nobody had it; not while faulted."""
-        controller = self._commands
+        controller = self.controller
         await controller.withdraw_run_command()
         if found is Holder.NOBODY and not controller.blocked_by_fault:
             await controller.method.release()

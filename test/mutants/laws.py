@@ -43,8 +43,8 @@ LAWS = (
         1,
         'polling acknowledges faults',
         'nfo_sinus_driver/drive/drive_state.py',
-        'read_at(key, priority, once=once',
-        "read_at('fieldbus.inv_st_with_ack', priority, once=once",
+        'read_reply(key, priority, once=once',
+        "read_reply('fieldbus.inv_st_with_ack', priority, once=once",
         (TRACE,),
     ),
     Mutant(
