@@ -234,7 +234,6 @@ class Scheduler:
         return _COMMAND if commands else transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:
-        """Tell whether this is a stop for a unit that did not answer the last one."""
         return transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain
 
 

@@ -325,7 +325,6 @@ class Bus:
         self._advance(task, None, None)
 
     def _rest(self, until: float) -> None:
-        """Sleep until something is asked for or a moment has come."""
         if not self._inbox and not self._stopping:
             self._awake.wait(None if until == math.inf else max(0.0, until - time.monotonic()))
 
@@ -350,7 +349,6 @@ class Bus:
             self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
-        """Send what is most urgent; false if there is nothing to send."""
         entry = self._scheduler.take(missing=time.monotonic() >= self.silences.missing_from)
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
@@ -436,7 +434,6 @@ class Bus:
             self.recorder.opened()
 
     def _fail_all(self, error: PortError) -> None:
-        """Tell everyone who waits that the port is not there."""
         for entry in self._scheduler.clear():
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)

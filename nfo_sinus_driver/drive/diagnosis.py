@@ -134,7 +134,6 @@ class Conditions:
         self._unnamed = seen.kind is Kind.ALARM and not seen.listed.remedy
 
     def _reports(self, seen: InverterStatus) -> Iterator[tuple[Severity, Report]]:
-        """Yield what is there."""
         by_code = seen.means(Meaning.CURRENT_LIMIT)
         limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
         if limited and not seen.faulted:

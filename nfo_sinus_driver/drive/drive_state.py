@@ -267,7 +267,6 @@ class DriveState:
         return seen
 
     def _note_fault(self, before: InverterStatus | None) -> None:
-        """Take note of a fault that comes or goes."""
         seen = self.seen
         assert seen is not None
         if not seen.faulted:
@@ -383,7 +382,6 @@ class DriveState:
 
     @property
     def _dialect(self) -> OlderDialect | None:
-        """The older dialect that a drive of this model may have on this line."""
         dialect = self.model.profile.older
         here = dialect is not None and dialect.protocol == self.registers.protocol
         return dialect if here else None

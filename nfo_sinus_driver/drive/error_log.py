@@ -290,7 +290,6 @@ class ErrorLogMonitor:
         self._bus.cancel(self._task)
 
     def _expect(self) -> None:
-        """Look for the entry of the fault that stands, if one does."""
         self._fault, self._tries = self._inverter.fault, _TRIES
         self._bus.wake(self._task)
 
@@ -321,7 +320,6 @@ class ErrorLogMonitor:
         return _PERIOD
 
     async def _look(self) -> None:
-        """Read what is new, and tell it."""
         log, known, began = self._error_log, self._known, time.monotonic()
         news = await log.newer_than(known, Priority.TELEMETRY)
         now = await log.read_time(Priority.TELEMETRY)
@@ -355,7 +353,6 @@ class ErrorLogMonitor:
         return began if began - self._looked_at < 2 * _PERIOD else math.nan
 
     def _tell(self, entries: Sequence[LogEntry]) -> None:
-        """Tell of new entries, the newest of which is the first."""
         self.newest = entries[0]
         codes = {entry.code for entry in entries}
         code = None

@@ -185,7 +185,6 @@ class ParameterWriter:
         return key in model.communication, not model[key].stopped
 
     async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
-        """Write one parameter if it differs; return what was written."""
         try:
             # between any two parameters, everybody who polls has a turn
             before = await self._registers.read_data(key, Priority.POLL)
@@ -288,7 +287,6 @@ class ParameterWriter:
     async def _why(
         self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
     ) -> Report:
-        """Return why a parameter was not changed."""
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)
         if error is not None:

@@ -414,7 +414,6 @@ class Parameters:
         return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
 
     async def _read(self, key: str, *, once: bool, priority: Priority = Priority.REFRESH) -> None:
-        """Read one parameter."""
         data = await self._registers.read_data(key, priority, once=once)
         if key not in self._changing or key not in self._data:
             self._learn(key, data)
@@ -441,38 +440,14 @@ class Parameters:
             _log.exception('a new value of %s could not be told', key)
 
     def _tell_news(self, change: Change) -> None:
-        """Say that somebody else changed a parameter."""
         if not self._wanted.tell_drift(change.key):
             self._inverter.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
-
-
-class Settings(Protocol):
-    """What is needed of the settings of a drive."""
-
-    @property
-    def values(self) -> Mapping[str, Value]:
-        """The settings that the drive has, by key."""
-
-    @property
-    def data(self) -> Mapping[str, bytes]:
-        """The same as they stand in the drive."""
-
-    def describe(self, key: str, before: Value, data: bytes) -> Change:
-        """Return the difference between a value and what data mean."""
-
-    def exact(self, key: str, value: Value) -> Value:
-        """Return a value as the drive would show it."""
-
-    async def change_now(
-        self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
-    ) -> tuple[Change, ...]:
-        """Write what differs, and read it back."""
 
 
 class DesiredConfig:
     """What the settings of one drive shall be; used on the bus, readable from anywhere."""
 
-    def __init__(self, parameters: Settings, inverter: DriveState) -> None:
+    def __init__(self, parameters: Parameters, inverter: DriveState) -> None:
         self._parameters = parameters
         self._inverter = inverter
         self._values: dict[str, Value] = {}
@@ -533,7 +508,6 @@ class DesiredConfig:
 
 
 def _not_as_wanted(drift: Change) -> Report:
-    """Return what to say of a parameter that differs from what was wanted."""
     has = f'{show(drift.new)} {drift.unit}'.rstrip()
     return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
 

@@ -234,7 +234,6 @@ class Poller:
 
     @property
     def _period(self) -> float:
-        """The time from one poll to the next, s."""
         settings = self._inverter.settings
         rate = settings.poll_rate
         if settings.idle_poll_rate and self._is_idle:
@@ -258,7 +257,6 @@ class Poller:
 
     @property
     def _heard_at(self) -> float:
-        """When the drive said anything, s."""
         return self._bus.silences.heard_at(self._unit)
 
     @property
@@ -292,7 +290,6 @@ class Poller:
         return self._slow_period
 
     async def _look(self) -> InverterStatus:
-        """Read the status and judge it."""
         inverter = self._inverter
         alarming = self._controller.alarmed_by if self._controller is not None else lambda _: False
 
@@ -397,7 +394,6 @@ class Poller:
                 return answer
 
     def _failed(self, error: LinkError | DriveError) -> None:
-        """Judge a poll that failed, or an attempt to connect."""
         inverter, now = self._inverter, time.monotonic()
         inverter.answering = False
         if not inverter.connected:

@@ -56,8 +56,6 @@ _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 
 class _Outcome(enum.Enum):
-    """What became of one attempt to stop."""
-
     CONFIRMED = enum.auto()
     #: Nobody knows whether the drive has heard it: it is repeated at once, for a while.
     UNHEARD = enum.auto()
@@ -249,7 +247,6 @@ class StopSequence:
             self._report(ControlEvent.STOPPED)
 
     async def _try_once(self) -> _Outcome:
-        """Write the stop, and look what the drive says."""
         control_mode = self._inverter.control_mode
         refusal: Refused | None = None
         try:

@@ -367,7 +367,6 @@ class Setpoint:
             self.was_missed(error)
 
     def _take_note(self, address: Address, data: bytes) -> None:
-        """Take note that these bytes stand in the drive now."""
         self._busy_since = math.inf
         self._written[address] = data, time.monotonic()
         if len(self._written) == len(self._keys):

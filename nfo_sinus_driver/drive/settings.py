@@ -162,7 +162,6 @@ class DriveSettings:
             )
 
     def _require_known_method(self) -> None:
-        """See to it that firmware of the chosen dialect has the control method."""
         for profile in _profiles(self.model):
             method = profile.methods.get(self.control_method)
             dialect = profile.older.name if profile.older is not None else ''

@@ -120,7 +120,6 @@ class Tuning:
                 raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
     async def _outcome(self, what: str, access: ExclusiveAccess, progress: Progress) -> Report:
-        """Wait until the drive says how it ended."""
         inverter = self._inverter
         started = time.monotonic()
         begun = False
