@@ -94,12 +94,7 @@ def listed(head: str, lines: Iterable[str]) -> str:
 
 
 def require_yes(options: argparse.Namespace, question: str) -> None:
-    """
-    See to it that a person wants it.
-
-    :raises CliError: the answer is no.
-    :raises UsageError: there is nobody to ask, and no ``--yes``.
-    """
+    """See to it that a person wants it, by asking or by ``--yes``; else an error."""
     if options.yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
@@ -113,11 +108,7 @@ def require_yes(options: argparse.Namespace, question: str) -> None:
 
 
 def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
-    """
-    Return rows as lines with aligned columns.
-
-    :param right: the columns that are aligned to the right.
-    """
+    """Return rows as lines with aligned columns, some of them to the ``right``."""
     widths = [max(_width(cell) for cell in column) for column in zip(*rows, strict=True)]
     return [
         '  '.join(

@@ -65,12 +65,7 @@ def spoken(name: str) -> str:
 
 
 class Ended(Exception):
-    """
-    Something ended it; the message says what.
-
-    :ivar status: the exit status, if all goes well from then on.
-    :ivar signal: the name of the signal that did it; ``''``: something else did.
-    """
+    """Something, such as a signal, ended it; with the exit status if all goes well from then on."""
 
     def __init__(self, why: str, status: int, signal: str = '') -> None:
         super().__init__(why)
@@ -79,11 +74,7 @@ class Ended(Exception):
 
 
 class EventLog:
-    """
-    Hears what a drive has to tell, on the worker of the bus.
-
-    :param mute: of what nothing is said here.
-    """
+    """Hears what a drive has to tell, on the worker of the bus; of some causes nothing is said."""
 
     def __init__(self, show: Callable[[str], None], mute: Collection[Cause]) -> None:
         self._show = show
@@ -131,12 +122,7 @@ class ControlSession:
         self.remote: Remote = session.drive()
 
     def drive(self, **settings: Any) -> Drive:
-        """
-        Return the drive to be commanded; nothing is sent yet.
-
-        :param settings: fields of ``DriveSettings`` that are not as usual.
-        :raises UsageError: they make no sense.
-        """
+        """Return the drive to be commanded, with some settings not as usual; nothing is sent."""
         return self._session.command(self.events, poll_rate=_POLL_RATE, **settings)
 
     def signal(self, timeout: float) -> str:
@@ -154,9 +140,8 @@ class ControlSession:
 
     def wait(self, future: Future[_T], show: Callable[[], object] = lambda: None) -> _T:
         """
-        Return the result of a future.
+        Return the result of a future; meanwhile ``show`` is called again and again.
 
-        :param show: called again and again meanwhile.
         :raises Ended: a signal came first.
         :raises DriveError: as the future does.
         """
@@ -170,11 +155,7 @@ class ControlSession:
     def finish(
         self, future: Future[_T], timeout: float, show: Callable[[], object] = lambda: None
     ) -> _T:
-        """
-        Return the result of a future, whatever signals come.
-
-        :raises DriveError: as the future does; or it takes longer than so many seconds.
-        """
+        """Return the result of a future, whatever signals come; or a DriveError after so many s."""
         deadline = time.monotonic() + timeout
         while not future.done():
             show()
@@ -188,12 +169,7 @@ class ControlSession:
 def control_session(
     options: argparse.Namespace, *, mute: Collection[Cause] = (), live: bool = False
 ) -> Iterator[ControlSession]:
-    """
-    Open the line to command a drive; signals are held while the ``with`` block lasts.
-
-    :param mute: of what nothing is said.
-    :param live: whether the status may be one line of a terminal.
-    """
+    """Open the line to command a drive; signals are held while the ``with`` block lasts."""
     live = live and sys.stdout is not None and sys.stdout.isatty()
     with (
         HeldSignals() as signals,
@@ -241,11 +217,7 @@ class Stopping:
         return True
 
     def give_back(self, patience: float = math.inf) -> bool:
-        """
-        Wait until the motor stands, and give control back; false when that failed.
-
-        :param patience: how long it may take, s; a signal ends the wait too.
-        """
+        """Wait until the motor stands, or for so many s, and give control back; false if not."""
         begun = time.monotonic()
         while self._may_turn(begun) and time.monotonic() < begun + patience:
             self._show()

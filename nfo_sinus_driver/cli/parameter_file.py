@@ -116,7 +116,7 @@ def read_file(name: str) -> ParameterFile:
 
 
 def parse_file(text: str, name: str) -> ParameterFile:
-    """Return what a parameter file says (CliError: it is none, or not clear)."""
+    """Return what a parameter file says, or a CliError."""
     try:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:
@@ -172,11 +172,7 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[tuple[str, Any]]:
 
 
 def _flatten(tree: Any, file: str) -> dict[str, Any]:
-    """
-    Return parameters by their full names.
-
-    :raises CliError: one stands twice, once with its group and once below it.
-    """
+    """Return parameters by their full names, each of which may stand only once."""
     found: dict[str, Any] = {}
     for key, value in tree.items() if isinstance(tree, dict) else ():
         below = _flatten(value, file) if isinstance(value, dict) else {'': value}
@@ -189,11 +185,7 @@ def _flatten(tree: Any, file: str) -> dict[str, Any]:
 
 
 def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Value], list[str]]:
-    """
-    Tell the parameters of the drive from those of the node; the latter have no group.
-
-    :raises CliError: some have no value that a parameter can have; all of those are listed.
-    """
+    """Tell the parameters of the drive, which have a group, from those of the node."""
     own = [name for name in parameters if '.' not in name or name.startswith(_ROS_OWN)]
     drive = {name: value for name, value in parameters.items() if name not in own}
     strange = [name for name, value in drive.items() if not isinstance(value, Value)]

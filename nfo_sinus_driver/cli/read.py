@@ -240,12 +240,7 @@ _LONGEST = 15.0
 
 
 def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
-    """
-    Erase the error log, and see that it is empty.
-
-    :param entries: what stands in it.
-    :param rows: the same for a script.
-    """
+    """Erase the error log, whose entries are ``rows`` for a script; see that it is empty."""
     count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
     if entries:
         require_yes(options, f'Erase the error log ({count}) of address {options.address}?')

@@ -149,7 +149,7 @@ class _Ride:
             self._ends_at = time.monotonic() + self._options.seconds
 
     def _follow(self) -> None:
-        """Keep the set-point fresh until something ends it (Ended: always; with what ended it)."""
+        """Keep the set-point fresh until something ends it, by :class:`Ended`."""
         options, drive = self._options, self._drive
         while True:
             if options.setpoint is not None:
@@ -329,12 +329,7 @@ def ack(options: argparse.Namespace) -> int:
 
 
 def _acknowledge(control: ControlSession, seen: InverterStatus) -> Report:
-    """
-    Acknowledge, and leave nothing behind that could start the motor.
-
-    :raises DriveError: the fault is still active.
-    :raises CliError: the motor runs.
-    """
+    """Acknowledge, while the motor stands, and leave nothing that could start it."""
     remote = control.remote
     if seen.driven:
         raise CliError(

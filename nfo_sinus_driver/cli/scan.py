@@ -97,11 +97,7 @@ def _write_params(
     found: Mapping[int, Mapping[str, str]],
     lines: Mapping[int, tuple[int, str]],
 ) -> None:
-    """
-    Write what the driver needs to start with the drives that were found.
-
-    :raises CliError: they do not speak alike, so that no line could have them all.
-    """
+    """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
         told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
         raise CliError(
@@ -204,11 +200,7 @@ _IF_OTHER = ('response_timeout', 'retries')
 
 
 def require_new(name: str, *, force: bool) -> None:
-    """
-    See to it that no file is replaced that somebody may have edited since.
-
-    :raises CliError: there is one.
-    """
+    """See to it that no file is replaced that somebody may have edited since."""
     if name != STANDARD and not force and Path(name).exists():
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
@@ -219,12 +211,7 @@ def driver_params(
     char_format: str,
     found: Mapping[int, Mapping[str, str]],
 ) -> str:
-    """
-    Return the text of a parameter file with which the driver starts as it is.
-
-    :param baud_rate: 0 behind a gateway, whose line is its own.
-    :param found: what each drive says of itself, by address.
-    """
+    """Return a parameter file with which the driver starts with what was found, by address."""
     names = {address: f'drive_{address}' for address in sorted(found)}
     line: dict[str, object] = {'port': options.port, 'protocol': options.protocol}
     if baud_rate:

@@ -142,12 +142,7 @@ _VALUES = {
 
 
 def as_line(seen: Snapshot, values: Mapping[Role, float], more: str = '') -> str:
-    """
-    Return what a drive does, in one line.
-
-    :param values: what was measured.
-    :param more: what stands behind the time.
-    """
+    """Return what a drive does, with what was measured and more, in one line."""
     when = f'{datetime.now().astimezone():%H:%M:%S}'
     cells = [when, more] if more else [when]
     if seen.status is None:

@@ -81,7 +81,7 @@ class Remote:
         return self._drive.run(command).result()
 
     def identify(self, *, thoroughly: bool = True) -> Identity:
-        """Find out who answers (thoroughly: also ask for model and serial number)."""
+        """Find out who answers, thoroughly with model and serial number."""
         try:
             return self._drive.identify(thoroughly=thoroughly).result()
         except DriveError as error:
@@ -193,12 +193,7 @@ class Session:
         return self._bus.run(ask()).result()
 
     def command(self, listener: Listener, **settings: Any) -> Drive:
-        """
-        Return the drive that the options name as the driver has it; nothing is sent.
-
-        :param settings: fields of ``DriveSettings`` that are not as usual.
-        :raises UsageError: they make no sense.
-        """
+        """Return the drive that the options name as the driver has it; nothing is sent."""
         try:
             return Drive(self._bus, self._settings(self._options.address, **settings), listener)
         except ValueError as error:

@@ -142,11 +142,7 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
 
 
 def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) -> dict[str, bytes]:
-    """
-    Return what has to be written.
-
-    :raises CliError: the drive cannot have some of it, or it may not be changed; all is listed.
-    """
+    """Return what has to be written; all that cannot be is listed in a CliError."""
     found: dict[str, bytes] = {}
     wrong, kept = [], []
     for key, value in file.values.items():
@@ -187,11 +183,7 @@ def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
 
 
 def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
-    """
-    See to it that what only a standing motor allows is not tried while it runs.
-
-    :raises CliError: it runs.
-    """
+    """See to it that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.look().driven:
         head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
@@ -202,12 +194,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Loading:
-    """
-    Writes into one drive, in an order that the drive takes.
-
-    :param data: what differs from what the drive has, as it shall stand there.
-    :param options: ``put_back`` and ``keep`` say what happens when it fails half-way.
-    """
+    """Writes what differs into one drive; the options say what to do when it fails half-way."""
 
     def __init__(
         self, drive: Remote, data: Mapping[str, bytes], options: argparse.Namespace
@@ -220,12 +207,7 @@ class Loading:
         self._written: dict[str, Change] = {}
 
     def run(self) -> None:
-        """
-        Write all of it.
-
-        :raises CliError: it failed; what was written, what not and why has been said, and it was
-            put back if that was wanted.
-        """
+        """Write all of it; if that fails, say what was written and what not, or put it back."""
         try:
             self._write('writing', self._data, self._written)
         except (DriveError, Interrupted) as error:

@@ -56,11 +56,7 @@ def is_barred(key: str, model: Family, options: argparse.Namespace) -> bool:
 
 
 def parse_value(parameter: Parameter, text: str) -> Value:
-    """
-    Turn what was typed for a parameter into its value.
-
-    :raises ValueError: it can be none; the message says what can.
-    """
+    """Turn what was typed for a parameter into its value; a ValueError says what can be."""
     if parameter.kind is bool and text.lower() in _SWITCH:
         return _SWITCH[text.lower()]
     if parameter.labels:
@@ -95,7 +91,7 @@ def readable(model: Family) -> Mapping[str, Parameter]:
 
 
 def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:
-    """See to it that all names are known (CliError: some are not; all of those are listed)."""
+    """See to it that all names are known; those that are not are listed."""
     known = list(known)
     strange = [name for name in dict.fromkeys(names) if name not in known]
     if strange:

@@ -48,12 +48,7 @@ class Bench(contextlib.ExitStack):
         self._processes: list[subprocess.Popen[bytes]] = []
 
     def start_simulator(self) -> str:
-        """
-        Start the simulated drive, and wait until it serves its port.
-
-        :returns: what it says of itself.
-        :raises RuntimeError: it does not start.
-        """
+        """Start the simulated drive, wait until it serves, and return what it says of itself."""
         arguments = ('--link', self.port, '--baud', str(BAUD_RATE), '--paced')
         process = self._start(*_SIMULATOR, *arguments, stdout=subprocess.PIPE)
         assert process.stdout is not None

@@ -96,7 +96,7 @@ class DemoSequence(Node):
             )
 
     def run(self, bench: Bench) -> None:
-        """Go through it (StepError: a step did not happen)."""
+        """Go through it, or a StepError."""
 
         def near(hertz: float) -> Callable[[], bool]:
             return lambda: abs(self._actual - hertz) < _NEAR

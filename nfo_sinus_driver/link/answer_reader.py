@@ -70,10 +70,8 @@ class AnswerReader(ABC, Generic[_T]):
 
     def feed(self, data: bytes) -> _T | None:
         """
-        Take bytes that came in.
+        Take bytes that came in; return what the request's ``decode`` makes of its answer, if any.
 
-        :returns: the bytes read, ``b''`` for a write done, or what else the request's ``decode``
-            makes of its answer; ``None`` while there is no answer yet.
         :raises Refused: the unit answered with an exception; feeding may go on after it.
         """
         self._buffer += data

@@ -116,11 +116,7 @@ def answers(message: Message, request: Request) -> bool:
 
 @lru_cache(PREPARED)
 def encode(message: Message) -> bytes:
-    """
-    Return the bytes of a message.
-
-    :raises ValueError: an address, a parameter or a value that the protocol cannot express.
-    """
+    """Return the bytes of a message; a ValueError if the protocol cannot express it."""
     if not 0 <= message.unit <= BROADCAST:
         raise ValueError(f'address {message.unit}: Classic has 0 to {BROADCAST}')
     address = bytes((_FIRST_ADDRESS + message.unit,))

@@ -63,11 +63,7 @@ def length(message_length: int) -> int:
 
 
 class AsciiReader(AnswerReader[_T]):
-    """
-    Finds an answer in ASCII frames.
-
-    :param inter_byte_timeout: how long a frame that has begun may pause, s.
-    """
+    """Finds an answer in ASCII frames; one that has begun may pause so long, s."""
 
     def __init__(
         self, request: Request[_T], inter_byte_timeout: float = INTER_BYTE_TIMEOUT

@@ -52,12 +52,7 @@ _TEXT = re.compile(rb'[ -~]+')
 
 @dataclass(frozen=True)
 class DeviceObjects:
-    """
-    An answer of function 43/14.
-
-    :ivar objects: number and content of each.
-    :ivar next_object: where to go on reading, ``None`` when this was all.
-    """
+    """An answer of function 43/14: contents by number, and where to go on, if there is more."""
 
     objects: tuple[tuple[int, bytes], ...]
     next_object: int | None = None
@@ -65,11 +60,7 @@ class DeviceObjects:
 
 @dataclass(frozen=True)
 class ReadDevice:
-    """
-    Read what a unit says about itself, from an object on (function 43/14).
-
-    :ivar code: :data:`BASIC`, :data:`REGULAR` or :data:`SPECIFIC`; the G2 has these three.
-    """
+    """Read what a unit says about itself, from an object on; the G2 has the three codes above."""
 
     unit: int
     code: int = REGULAR

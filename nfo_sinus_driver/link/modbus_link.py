@@ -80,8 +80,4 @@ class ModbusLink(ABC):
 
     @abstractmethod
     def _ask_unheard(self, request: Request[object]) -> None:
-        """
-        Send a request at once and wait for its answer, whatever that is and says.
-
-        :raises LinkError: it was not sent.
-        """
+        """Send a request at once and wait for its answer, whatever that is and says."""

@@ -213,10 +213,8 @@ def refusal_head(request: Request[object]) -> bytes:
 
 def understand(request: Request[_T], message: bytes) -> _T | None:
     """
-    Return what a whole message says as the answer to a request.
+    Return what a whole message says as the answer to a request; ``None``: to something else.
 
-    :returns: the bytes read, ``b''`` for a write done, or what else the request's ``decode`` makes
-        of it; ``None`` if it is the answer to something else.
     :raises Refused: the unit answered with an exception.
     """
     if len(message) == REFUSAL_LENGTH and message.startswith(refusal_head(request)):

@@ -60,11 +60,7 @@ def encode(request: Request[object], number: int) -> bytes:
 
 
 class FrameReader:
-    """
-    Cuts the bytes of one connection into frames.
-
-    :ivar out_of_step: something came that is no frame; nothing after it can be understood.
-    """
+    """Cuts a connection into frames; after what is none it is ``out_of_step`` for good."""
 
     def __init__(self) -> None:
         self.out_of_step = False
@@ -137,11 +133,7 @@ class TcpLink(ModbusLink):
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
-        """
-        Return the link to a gateway; of the settings only the ``response_timeout`` counts.
-
-        :raises ValueError: the port is no gateway; the message says what to write.
-        """
+        """Return the link to a gateway; of the settings only the ``response_timeout`` counts."""
         return cls(*_host_and_port(port), settings.response_timeout)
 
     def open(self) -> None:

@@ -56,12 +56,7 @@ class Port(Protocol):
 
 
 def port_of(name: str, settings: LineSettings) -> Port:
-    """
-    Return the port of a name; it is not open yet.
-
-    :param name: a device path, or a URL of pyserial (``socket://host:port``).
-    :raises ValueError: neither; the message says what to write.
-    """
+    """Return the port of a device path or of a URL of pyserial; it is not open yet."""
     if not name:
         raise ValueError('port is empty: name a device, such as /dev/ttyUSB0')
     if '://' in name:
@@ -84,11 +79,7 @@ _REMEDY = (
 
 
 class UrlPort:
-    """
-    A ``socket://host:port`` or ``rfc2217://host:port``, or another URL that pyserial knows.
-
-    :raises ValueError: a URL that can never lead anywhere; the message says how to write one.
-    """
+    """A ``socket://host:port`` or ``rfc2217://host:port``, or another URL that pyserial knows."""
 
     def __init__(self, url: str, settings: LineSettings) -> None:
         _check(url)
@@ -125,12 +116,7 @@ class UrlPort:
             raise self._lost(error) from error
 
     def read(self, until: float) -> bytes:
-        """
-        Return what has come; wait for the first byte until ``until`` (``time.monotonic``).
-
-        :returns: at least one byte, or none when the time is over.
-        :raises PortError: the connection is gone.
-        """
+        """Return what has come, or nothing; wait for the first byte until a moment."""
         port = self._port()
         try:
             port.timeout = max(0.0, until - time.monotonic())
@@ -152,11 +138,7 @@ class UrlPort:
 
 
 def _check(url: str) -> None:
-    """
-    Look at a URL without connecting.
-
-    :raises ValueError: an unknown kind, no host, no port, or an option that there is not.
-    """
+    """Look at a URL without connecting; a ValueError says what is wrong with it."""
     kind = url.split('://')[0].lower()
     try:
         port: Any = serial.serial_for_url(url, do_not_open=True)

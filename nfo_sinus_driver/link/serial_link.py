@@ -177,12 +177,7 @@ class SerialLink(ModbusLink):
             self._late.expect(request, time.monotonic())
 
     def _make_certain(self, request: Request[Any]) -> bool:
-        """
-        Have the unit answer something else, if its answer to this could be confused with another.
-
-        :returns: whether it was asked, and answered.
-        :raises NotReady: that cannot be told from others either.
-        """
+        """Have the unit answer something else first, if needed; tells whether it was asked."""
         unit, now = request.unit, time.monotonic()
         if request.answer_head not in self._late.quarantined(unit, now):
             return False
@@ -209,11 +204,7 @@ class SerialLink(ModbusLink):
             self._transact(read)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
-        """
-        Make sure that the answer is not the one before, told twice.
-
-        :param names_it: the answer says itself what it is about.
-        """
+        """Make sure that the answer, if it ``names_it`` not itself, is not the one before again."""
         if self._late.repeated is None:
             return
         now = time.monotonic()
@@ -227,12 +218,7 @@ class SerialLink(ModbusLink):
             self._resync(request)
 
     def _resync(self, request: Request[Any]) -> None:
-        """
-        Have a unit answer something else: had another answer to the request come, it would show.
-
-        :raises DamagedAnswer: it did, or nothing that tells could be asked.
-        :raises NoAnswer: the unit does not answer.
-        """
+        """Have a unit answer something else: had another answer come, it would show."""
         stray = self._stray
         self._confirming = True
         try:
@@ -252,11 +238,7 @@ class SerialLink(ModbusLink):
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _listen(self, request: Request[Any]) -> None:
-        """
-        Wait as long as the right answer may take, if this was the one before, told twice.
-
-        :raises DamagedAnswer: it came.
-        """
+        """Wait as long as the right answer may take, if this was the one before, told twice."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
         while (now := time.monotonic()) < until:

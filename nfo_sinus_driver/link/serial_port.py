@@ -95,12 +95,7 @@ class SerialPort:
             raise self._lost(error) from error
 
     def read(self, until: float) -> bytes:
-        """
-        Return what has come; wait for the first byte until ``until`` (``time.monotonic``).
-
-        :returns: at least one byte, or none when the time is over.
-        :raises PortError: the port is gone.
-        """
+        """Return what has come, or nothing; wait for the first byte until a moment."""
         fd = self._descriptor()
         wait = max(0.0, until - time.monotonic())
         try:
@@ -234,11 +229,7 @@ def _switch_transmitter_by_port(fd: int) -> None:
 
 
 def holders(path: str) -> list[str]:
-    """
-    Return the other processes that have a device open, as ``name (pid 123)``.
-
-    Those of other users can only be seen by root; what cannot be seen is left out.
-    """
+    """Return the other processes that have a device open, ``name (pid 123)``, as far as visible."""
     try:
         device = os.stat(path).st_rdev
     except OSError:

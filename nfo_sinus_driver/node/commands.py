@@ -107,12 +107,7 @@ class Commands:
         timeout: float,
         describe: Callable[[_T], str],
     ) -> Any:
-        """
-        Give a command, and fill in the answer to who asked for it.
-
-        :param timeout: how long the command may take, s.
-        :param describe: makes a message of its result.
-        """
+        """Give a command that may take so long, s, and describe its result to who asked for it."""
         try:
             response.message = describe(command().result(timeout))
             response.success = True
@@ -135,11 +130,7 @@ class Commands:
 
 
 class BoundedCallbackGroup(CallbackGroup):
-    """
-    Lets a number of callbacks run at once; what comes then waits in the queue of its entity.
-
-    :param most: how many.
-    """
+    """Lets a number of callbacks run at once; what comes then waits in its queue."""
 
     def __init__(self, most: int) -> None:
         super().__init__()

@@ -78,9 +78,8 @@ def _guarded(transition: _Transition) -> _Transition:
 
 class DriveNode(LifecycleNodeMixin, Node):
     """
-    A managed node for one drive.
+    A managed node for one drive, taken into a context.
 
-    :param context: the bus and the drives on it, which takes this one in.
     :raises rclpy.exceptions.ParameterException: an override of a setting is wrong.
     :raises ValueError: settings that contradict each other; the message says how.
     """
@@ -126,11 +125,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         context.add(self.managed)
 
     def stop_for_good(self, patience: float) -> Future[Report | None]:
-        """
-        Stop the motor, and see to it that nobody can start it again.
-
-        :param patience: how long the drive may take to confirm it, s.
-        """
+        """Stop the motor within so many s, and see to it that nobody can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
@@ -282,11 +277,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return SetParametersResult(successful=True)
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
-        """
-        Return the settings as they would be.
-
-        :raises ValueError: they make no sense, or cannot be changed now.
-        """
+        """Return the settings as they would be; a ValueError if they make no sense."""
         changed = {one.name: one.value for one in parameters if one.name in _NAMES}
         if not changed:
             # a drive has many of its own, and they come one by one
@@ -307,11 +298,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return self._drive_settings({**values, **changed})
 
     def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
-        """
-        Set the drive's own time-out if the drive is there; else configure does it.
-
-        :param changes: what is undone if the drive does not take it.
-        """
+        """Set the drive's own time-out if it is there, or undo changes; else configure does it."""
         managed = self.managed
         if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:
             try:

@@ -109,12 +109,7 @@ class DriveParameters:
     # --- to the drive -------------------------------------------------------------------------
 
     def admit(self, parameters: Iterable[Parameter]) -> list[Parameter]:
-        """
-        Return parameters to set as the drive will have them; nothing is asked of the drive.
-
-        :raises DriveError: the drive cannot have a value, or it may not be changed.
-        :raises ValueError: no such parameter, or a value of another type.
-        """
+        """Return parameters as the drive will have them, or raise why not; nothing is asked."""
         return [self._admit(parameter) for parameter in parameters]
 
     def _admit(self, parameter: Parameter) -> Parameter:
@@ -142,9 +137,8 @@ class DriveParameters:
 
     def write(self, parameters: Iterable[Parameter]) -> tuple[Change, ...]:
         """
-        Write parameters that somebody sets to the drive; all of them or none.
+        Write parameters to the drive that somebody sets, all or none; return what was changed.
 
-        :returns: what was changed.
         :raises DriveError: why not; the drive is as it was, or the error says what is not.
         :raises NodeError: the bus does not get to it.
         """
@@ -155,12 +149,7 @@ class DriveParameters:
         return self._change(drive, wanted) if wanted else ()
 
     def put_back(self, changes: Sequence[Change]) -> None:
-        """
-        Undo changes.
-
-        :raises DriveError: why not.
-        :raises NodeError: the bus does not get to it.
-        """
+        """Undo changes, or raise why not."""
         if changes and self._drive is not None:
             self._change(self._drive, {change.key: change.old for change in changes})
 
@@ -176,11 +165,7 @@ class DriveParameters:
 
 
 def coerce(parameter: CatalogParameter, given: object) -> Value:
-    """
-    Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for 'OFF'.
-
-    :raises ValueError: another type altogether.
-    """
+    """Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for OFF."""
     kind = parameter.kind
     if kind is str and isinstance(given, bool):
         switched = ('off', 'no') if not given else ('on', 'yes')

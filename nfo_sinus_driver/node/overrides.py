@@ -151,12 +151,7 @@ Drives NFO Sinus inverters on one serial line. For example:
 
 
 def refuse_other_arguments(arguments: list[str]) -> None:
-    """
-    Look for what is meant for nobody; ``--help`` prints how to call the driver.
-
-    :raises ValueError: an argument outside ``--ros-args``; the message says how to give it.
-    :raises SystemExit: after ``--help``.
-    """
+    """Refuse what is meant for nobody, saying how to give it; ``--help`` prints the usage."""
     others = remove_ros_args(arguments)[1:]
     if '-h' in others or '--help' in others:
         print(_HELP)

@@ -49,13 +49,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Setting:
-    """
-    One setting of a node.
-
-    :ivar low: the least value; ``None`` where there is no range.
-    :ivar unit: of the range.
-    :ivar fixed: it cannot be changed while the process runs.
-    """
+    """One setting of a node; its range, if it has one, has a unit. A fixed one stays as it is."""
 
     name: str
     default: SettingValue
@@ -323,12 +317,7 @@ def _reads_as(wanted: type, text: str) -> bool:
 
 
 def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue]:
-    """
-    Declare settings on a node and return their values.
-
-    :raises ValueError: an override has a wrong type or is out of range; the message says which
-        one, and what it can be.
-    """
+    """Declare settings on a node and return their values; a ValueError says which is wrong."""
     for setting in settings:
         # rclpy has no other way to see an override first, and its own complaints name no remedy
         given = node._parameter_overrides.get(setting.name)
@@ -338,11 +327,7 @@ def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue
 
 
 def coerce(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter:
-    """
-    Take what somebody sets for what is meant, if it is one of the settings.
-
-    :raises ValueError: another type altogether, or out of range; the message says what can be.
-    """
+    """Take what somebody sets for what is meant, if it is one of the settings."""
     for setting in settings:
         if setting.name == parameter.name and parameter.type_ is not Parameter.Type.NOT_SET:
             return Parameter(parameter.name, value=setting.coerce(parameter.value))

@@ -44,12 +44,7 @@ class Wrong(Exception):
 
 
 class Server(abc.ABC):
-    """
-    What one drive does with Classic messages; its family says.
-
-    :ivar own_address: a message to address 0 is answered with the drive's own [C86].
-    :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
-    """
+    """What one drive does with Classic messages; its family says, also what it answers as [C86]."""
 
     own_address: bool
     lower_case: bool

@@ -38,11 +38,7 @@ _REQUIRED: Any = object()
 
 
 def parse_setting(model: Family, key: str, text: Value) -> Value:
-    """
-    Turn what was typed for a parameter into its value.
-
-    :raises ValueError: an unknown key, with the names nearest to it; or no value for it.
-    """
+    """Turn what was typed for a parameter into its value; a ValueError names the nearest."""
     if key not in model:
         near = difflib.get_close_matches(key, list(model), n=3, cutoff=0.4)
         hint = f': did you mean {", ".join(near)}?' if near else ''

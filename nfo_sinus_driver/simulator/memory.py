@@ -118,11 +118,7 @@ class Memory:
         return default if raw is None else raw * self._factors[key]
 
     def set(self, key: str, value: Value) -> None:
-        """
-        Store a value in engineering units, as someone at the keypad would.
-
-        :raises ValueError: an unknown key, or a value that the drive would refuse.
-        """
+        """Store a value in engineering units, as someone at the keypad would, or a ValueError."""
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]

@@ -103,11 +103,7 @@ class Server:
     # ---- registers ----
 
     def read(self, register: int, count: int) -> tuple[int, ...]:
-        """
-        Read the parameter at a register, as words, the low one first.
-
-        :raises Refused: no such parameter, or not its length.
-        """
+        """Read the parameter at a register, as words, the low one first; else :class:`Refused`."""
         entry = self._log_entry(register, count)
         if entry is not None:
             return entry
@@ -125,11 +121,7 @@ class Server:
     def write_and_read(
         self, register: int, words: Sequence[int], source: int, count: int
     ) -> tuple[int, ...]:
-        """
-        Write the parameter at ``register``, then read the one at ``source``.
-
-        :raises Refused: as the reason says; nothing was written if there is none at ``source``.
-        """
+        """Write the parameter at ``register``, then read that at ``source``; or none of both."""
         self._find(source, count)
         self.write(register, words)
         return self.read(source, count)

@@ -215,11 +215,7 @@ class Simulator:
             raise RuntimeError('the simulated line broke down') from self.failure
 
     def state(self, address: int | None = None) -> dict[str, Any]:
-        """
-        Return the state of a drive as it is now; without an address, of the only one.
-
-        :raises ValueError: no such drive, or several to choose from.
-        """
+        """Return the state of a drive as it is now; without an address, of the only one."""
         with self.lock:
             drive = self._drive(address)
             drive.advance_to(time.monotonic())
@@ -232,11 +228,7 @@ class Simulator:
     def inject(
         self, what: str, *values: object, address: int | None = None, **arguments: object
     ) -> None:
-        """
-        Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`.
-
-        :raises ValueError: no such verb, drive or argument, or a value that is not possible.
-        """
+        """Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`."""
         if what not in self._verbs:
             raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(self._verbs)}')
         verb = self._verbs[what]

@@ -102,12 +102,7 @@ class SerialSide:
         self.bus_type = self._memory.raw('serial.bus_type')
 
     def set_to(self, lines: Sequence[tuple[str, Timing]]) -> None:
-        """
-        Set the drive to the first of some lines, but for what was set otherwise.
-
-        :raises ValueError: it does not know the speed or the format of one, or was given an address
-            as a setting.
-        """
+        """Set the drive to the first of some lines, but for what was set otherwise."""
         if 'serial.address' in self._memory.given:
             raise ValueError('serial.address: give the address with --address')
         for spoken, timing in lines:

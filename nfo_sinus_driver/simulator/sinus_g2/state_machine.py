@@ -72,13 +72,7 @@ class Conditions:
 
 
 class StateMachine:
-    """
-    The generic state machine.
-
-    :ivar phase: the state it is in.
-    :ivar word: the last control word.
-    :ivar direction: 1 forward, -1 reverse; kept while the motor brakes.
-    """
+    """The generic state machine; its direction, 1 or -1, is kept while the motor brakes."""
 
     def __init__(self) -> None:
         self.phase = Phase.NOT_READY_TO_SWITCH_ON
