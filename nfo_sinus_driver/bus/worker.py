@@ -213,20 +213,15 @@ class Bus:
         return Pause(time.monotonic() + seconds)
 
     @property
-    def current(self) -> Task:
-        """The task that is being stepped."""
-        assert self._current is not None, 'only for coroutines on the bus'
-        return self._current
-
-    @property
-    def current_or_none(self) -> Task | None:
+    def current(self) -> Task | None:
         """The task that is being stepped, or ``None`` between two."""
         return self._current
 
     async def join(self, task: Task, timeout: float) -> bool:
         """Wait for the end of another task (to be awaited); false when the time is over."""
         if not task.future.done():
-            me = self.current
+            me = self._current
+            assert me is not None, 'only for coroutines on the bus'
             task.joiners.append(me)
             try:
                 await self.sleep(timeout)

@@ -163,7 +163,7 @@ class Controller:
         if before is ControlState.ENABLED:
             self._setpoint.disarm()
         gone = before is ControlState.ENABLING and self._state is not ControlState.ENABLED
-        if gone and self._enabling not in (None, self._bus.current_or_none):
+        if gone and self._enabling not in (None, self._bus.current):
             self._bus.cancel(self._enabling)
         if self._access is not None and self._state is not ControlState.PROCEDURE:
             self._access.abort()

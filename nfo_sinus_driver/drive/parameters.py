@@ -522,7 +522,7 @@ class Lock:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
         #: Who is in, and behind it who waits.
-        self._tasks: deque[Task] = deque()
+        self._tasks: deque[Task | None] = deque()
 
     async def __aenter__(self) -> None:
         task = self._bus.current

@@ -11,13 +11,15 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The watch over one drive: polls it, judges what it sees, notices when it is lost."""
+"""The watch over one drive: polls and measures, judges what it sees, notices when it is lost."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
+from dataclasses import replace
 import logging
 import math
 import time
@@ -42,6 +44,7 @@ from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
+from nfo_sinus_driver.drive.snapshot import Telemetry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -221,7 +224,8 @@ class Poller:
         if not inverter.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
-            strikes_in = self._heard_at + inverter.sio_tot - time.monotonic()
+            heard_at = self._bus.silences.heard_at(self._unit)
+            strikes_in = heard_at + inverter.sio_tot - time.monotonic()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
@@ -254,10 +258,6 @@ class Poller:
             return False
         # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
         return not any(abs(value) > 0 for value in (self._inverter.frequency, self._inverter.speed))
-
-    @property
-    def _heard_at(self) -> float:
-        return self._bus.silences.heard_at(self._unit)
 
     @property
     def _silent_for_long(self) -> bool:
@@ -398,8 +398,10 @@ class Poller:
         inverter.answering = False
         if not inverter.connected:
             self._failures += 1
-            if isinstance(error, DriveError):
-                self._complain(error.report)
+            if isinstance(error, DriveError) and error.report != self._complaint:
+                # what keeps the drive from being used is said once
+                self._complaint = error.report
+                inverter.tell(Severity.ERROR, error.report)
             return
         self._failing_since = min(self._failing_since, now)
         # one that answers, but tells no status, cannot be watched either
@@ -422,12 +424,6 @@ class Poller:
             # a mistake of who listens must not end the watch
             _log.exception('the loss of the drive could not be told')
 
-    def _complain(self, report: Report) -> None:
-        """Say what keeps the drive from being used, once."""
-        if report != self._complaint:
-            self._complaint = report
-            self._inverter.tell(Severity.ERROR, report)
-
     def _publish(self, seen: InverterStatus | None) -> None:
         inverter = self._inverter
         frequency, speed = (inverter.last_polled(role) for role in _BASIC)
@@ -445,19 +441,14 @@ def take_snapshot(
     actual: float = NAN,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
+    method = inverter.settings.control_method
+    snapshot = Snapshot(time.monotonic(), inverter.connected, setpoint.armed, method)
     if seen is None:
-        return Snapshot(
-            at=time.monotonic(),
-            connected=inverter.connected,
-            enabled=setpoint.armed,
-            control_method=inverter.settings.control_method,
-        )
+        return snapshot
     code = seen.listed
-    return Snapshot(
+    return replace(
+        snapshot,
         at=seen.at,
-        connected=inverter.connected,
-        enabled=setpoint.armed,
-        control_method=inverter.settings.control_method,
         status=seen,
         control_mode=inverter.control_mode,
         unit=inverter.unit,
@@ -475,3 +466,78 @@ def take_snapshot(
         speed_at=speed.at,
         actual=actual,
     )
+
+
+#: Read every time.
+FAST = (
+    Role.OUTPUT_VOLTAGE,
+    Role.OUTPUT_CURRENT,
+    Role.OUTPUT_POWER,
+    Role.POWER_FACTOR,
+    Role.DC_LINK_VOLTAGE,
+    Role.ACTUAL_TORQUE,
+)
+#: Read one after the other, one each time, for they change slowly.
+SLOW = (
+    Role.MOTOR_TEMPERATURE,
+    Role.PT1000_TEMPERATURE,
+    Role.OPERATING_TIME,
+    Role.RUNNING_TIME,
+    Role.BRAKE_TIME,
+    Role.ENERGY,
+    Role.TOTAL_ENERGY,
+)
+
+#: What a drive answers that does not have a parameter, and how often until it is believed.
+_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
+_DENIALS = 3
+#: How often the settings are looked at while telemetry is turned off, s.
+_OFF_PERIOD = 0.5
+
+
+async def watch_telemetry(inverter: DriveState) -> None:
+    """
+    Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
+
+    One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
+    """
+    values = dict.fromkeys((*FAST, *SLOW), NAN)
+    #: How often in a row the drive said that it has none of them.
+    denied = dict.fromkeys(values, 0)
+    # the first time all are read, so that the first message is whole
+    due = deque(SLOW)
+    first = True
+
+    async def measure(role: Role) -> None:
+        # which firmware it has may be known only later
+        if denied[role] >= _DENIALS or not inverter.has(inverter.model.key(role)):
+            return
+        try:
+            values[role] = await inverter.measure(role, Priority.TELEMETRY)
+            denied[role] = 0
+        except Refused as error:
+            values[role] = NAN
+            # over Classic it says so of everything while it tunes
+            denied[role] += error.code in _NONE_SUCH and not inverter.tuning
+
+    while True:
+        started = time.monotonic()
+        rate = inverter.settings.telemetry_rate
+        if rate and inverter.connected and inverter.answering:
+            try:
+                for role in (*FAST, *due) if first else (*FAST, due[0]):
+                    await measure(role)
+                due.rotate(-1)
+                first = False
+                # these two are polled anyway
+                polled = {
+                    Role.ACTUAL_FREQUENCY: inverter.frequency,
+                    Role.ACTUAL_SPEED: inverter.speed,
+                }
+                inverter.listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
+            except LinkError:
+                # the poll says so if the drive is lost
+                inverter.missed()
+                values.update(dict.fromkeys(FAST, NAN))
+        period = 1 / rate if rate else _OFF_PERIOD
+        await inverter.bus.sleep(period - (time.monotonic() - started))

@@ -82,7 +82,7 @@ def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
     bus: Bus, link: FakeLink
 ) -> None:
     link.answer = raiser(PortError('gone'))
-    tasks: list[Task] = []
+    tasks: list[Task | None] = []
 
     async def end_the_other() -> None:
         try:
