@@ -127,9 +127,9 @@ class Family(Mapping[str, Parameter]):
         """Tell whether a drive can have a value, as far as the manual says: else it was spoiled."""
         parameter, role = self[key], self.role_of.get(key)
         if role is Role.STATUS_CODE:
-            return int(value) in self.status_codes
+            return value in self.status_codes
         if role is Role.CONTROL_SOURCE:
-            return int(value) in self.profile.holders
+            return value in self.profile.holders
         if role is Role.STATUS_WORD:
             word, status_word = int(value), self.profile.status_word
             told = status_word.code is None or status_word.code(word) in self.status_codes
@@ -164,9 +164,13 @@ def load_profile(name: str) -> Profile:
     Load the profile of one drive family, without its tables.
 
     :raises ValueError: there is no such family; the message lists those there are.
+    :raises CatalogError: its folder is no package.
     """
-    if name not in families():
+    folders = _folders()
+    if name not in folders:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
+    if not (folders[name] / '__init__.py').exists():
+        raise table.CatalogError(f'{name}: no __init__.py, without which it would not be installed')
     profile = importlib.import_module(f'{_FAMILIES}.{name}.profile').PROFILE
     assert isinstance(profile, Profile)
     return profile
@@ -256,6 +260,11 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
     labels = {int(code, 0): label for code, label in pairs}
     if len(labels) != len(pairs) or len(set(labels.values())) != len(pairs):
         raise ValueError('a code or a label stands twice')
+    steps = tuple(_steps(row.get('steps', ''), minimum))
+    counts = [number for pair in steps for number in pair] + [Fraction(code) for code in labels]
+    for address in addresses.values():
+        if any((number / address.factor).denominator != 1 for number in counts):
+            raise ValueError(f'not all steps are counts on {address.protocol}')
     return Parameter(
         key=row['parameter'],
         name=row['name'],
@@ -265,15 +274,29 @@ def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:
         unit=row['unit'],
         minimum=minimum,
         maximum=maximum,
+        steps=steps,
         decimals=int(row['decimals']),
         labels=labels,
         access=Access(row['access']),
         stopped={'init': True, 'run': False, '': False}[row['when']],
         since=table.fraction(row['since']),
         older={'yes': True, '': False}[row['older']],
+        option=row.get('option', ''),
         description=row['description'],
         source=row['source'],
     )
+
+
+def _steps(text: str, minimum: Fraction | None) -> Iterator[tuple[Fraction, Fraction]]:
+    """Return what ``0.05|10:0.5`` says: by 0.05 from the minimum, by 0.5 from 10 on."""
+    start = minimum
+    for part in text.split('|') if text else ():
+        *begins, step = part.split(':')
+        if begins:
+            start = Fraction(begins[0])
+        if start is None:
+            raise ValueError('steps begin at the minimum, and there is none')
+        yield start, Fraction(step)
 
 
 def _status_code(row: table.Row) -> StatusCode:

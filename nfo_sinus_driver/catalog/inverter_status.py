@@ -50,8 +50,9 @@ class InverterStatus:
     :ivar code: the inverter status code, read without acknowledging.
     :ivar code_at: when that arrived, likewise.
     :ivar model: whose words these are.
-    :ivar by_mode: where there is no status word and the code does not say who controls: MODE says
-        that the bus does.
+    :ivar by_mode: where neither word nor code says who controls: the control source, such as MODE,
+        says that the bus does.
+    :ivar by_mode_at: when it said so, likewise.
     :ivar frequency: Hz, read with it where the family's status word tells no stop; NaN elsewhere,
         and where the drive refuses to tell it.
     :ivar fell: when the last two statuses in a row were between which the frequency fell; minus
@@ -63,6 +64,7 @@ class InverterStatus:
     code: int
     model: Family
     by_mode: bool = False
+    by_mode_at: float = -math.inf
     code_at: float = -math.inf
     frequency: float = math.nan
     fell: tuple[float, float] = NEVER
@@ -166,6 +168,12 @@ class InverterStatus:
         """Its word goes on saying that the motor runs while that ramps to a stop."""
         return self.model.profile.status_word.by_frequency
 
+    def signed(self, size: float) -> float:
+        """Return a measured frequency or speed with its sign, where the word has to tell that."""
+        tells_sign = self.model.profile.status_word.tells_sign
+        # standstill has no direction
+        return 0.0 - size if tells_sign and Fact.REVERSE in self.facts else size
+
     @property
     def tuning(self) -> bool:
         """It measures the motor, which is energised then, whatever else the status says."""
@@ -197,7 +205,7 @@ class InverterStatus:
         if self.state is State.UNKNOWN or self.tuning:
             return self.tuning or self._driven_by_code
         stands = self.by_frequency and self.frequency == 0
-        return self.state in _DRIVEN and not (self.runs and stands)
+        return self.state in _DRIVEN and not stands
 
     @property
     def _from_bus_by_code(self) -> bool:

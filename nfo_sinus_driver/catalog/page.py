@@ -25,11 +25,15 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 from fractions import Fraction
+import functools
+import re
 
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.family import usual_family
+from nfo_sinus_driver.catalog.parameter import NO_SETTINGS
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Parameter
 
@@ -64,9 +68,11 @@ How to read the tables:
 - **Step** is the difference between two values that the drive can hold. Two steps: the one over
   Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of
   the process regulator are the factory's; the drive's scale factors change them.
+- **Option**: the option cards of which the drive needs one for it.
 - **Stopped**: it can only be written while the motor stands.
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
   low word first), **PROFIBUS** its parameter number, **CANopen** its index.
+- A **type** with bits behind it, such as `[0:23]`: only these bits count, on one of the buses.
 - **From** is the first firmware that has it; empty: all have it.
 
 Numbers like 0220h are hexadecimal. A column that would be empty is left out.
@@ -86,7 +92,8 @@ inverter status above it. Code 0 ends the log.
 | bus | first entry | next entry | entries |
 |---|---|---|---|
 """
-#: How each numbering is printed: the title of its column, and a number in it.
+#: How each numbering is printed: the title of its column, a number in it, and how far it is to the
+#: next entry of an error log. Any other is printed by its name and in decimal numbers.
 _SPACES = {
     'register': ('Modbus', '{:04X}h', '{} registers on'),
     'id': ('Classic', 'E{:04X}', '{} ids on'),
@@ -94,21 +101,35 @@ _SPACES = {
     'object': ('CANopen', '{:04X}h', 'the next index'),
 }
 
+
+def _printed(space: str) -> tuple[str, str, str]:
+    return _SPACES.get(space, (space.capitalize(), '{}', '{} numbers on'))
+
+
 _Column = tuple[str, Callable[[Parameter], str]]
 
 
 def page() -> str:
     """Return the whole page in Markdown."""
-    parts = [part for name in families() for part in _family(load_family(name))]
+    # the usual one first, so that who looks for it finds it there
+    names = sorted(families(), key=lambda name: name != usual_family())
+    taken: list[str] = []
+    parts = [part for name in names for part in _family(load_family(name), taken)]
     return '\n'.join([_INTRODUCTION, *parts])
 
 
-def _family(family: Family) -> Iterator[str]:
+def _family(family: Family, taken: list[str]) -> Iterator[str]:
+    """
+    Return the parts of a family.
+
+    :param taken: the titles of groups that stand on the page already: their links have a number.
+    """
     yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
     if groups:
-        names = ', '.join(f'[{group}](#{_anchor(group)})' for group in groups)
+        names = ', '.join(f'[{group}](#{_anchor(group, taken)})' for group in groups)
+        taken += groups
         yield _SETTINGS.format(count=len(family.settings), groups=names)
     else:
         yield _NO_SETTINGS
@@ -117,23 +138,30 @@ def _family(family: Family) -> Iterator[str]:
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
+    only_read = [row for row in family.values() if row.access is Access.READ]
+    only_read = [row for row in only_read if row.group not in NO_SETTINGS]
+    if only_read:
+        yield '### Only read\n'
+        yield _table(_OTHER_COLUMNS, only_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
-        yield f'### {title}\n'
-        yield _table(_OTHER_COLUMNS, rows)
+        if rows:
+            yield f'### {title}\n'
+            yield _table(_OTHER_COLUMNS, rows)
     if family.error_logs:
         yield '### Error log\n'
         yield _ERROR_LOG + ''.join(map(_log_row, family.error_logs.values()))
 
 
 def _log_row(area: ErrorLogArea) -> str:
-    bus, first, following = _SPACES[area.space]
+    bus, first, following = _printed(area.space)
     entries = f'{area.entries}' + (f' to {area.limit}' if area.limit > area.entries else '')
     return f'| {bus} | {first.format(area.first)} | {following.format(area.stride)} | {entries} |\n'
 
 
 def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
     """Return a table without the columns that would be empty."""
+    columns = (*columns, *_addresses())
     cells = {title: [show(row) for row in rows] for title, show in columns}
     full = {title: column for title, column in cells.items() if any(column)}
     lines = [list(full), ['---'] * len(full), *zip(*full.values(), strict=True)]
@@ -141,9 +169,13 @@ def _table(columns: Sequence[_Column], rows: Sequence[Parameter]) -> str:
 
 
 def _long_lists(rows: Sequence[Parameter]) -> Iterator[str]:
+    lists: dict[str, list[str]] = {}
     for parameter in rows:
         if parameter.kind is str and len(parameter.labels) > _MOST_LABELS:
-            yield f'`{parameter.key}` is one of {_labels(parameter)}.\n'
+            lists.setdefault(_labels(parameter), []).append(f'`{parameter.key}`')
+    for labels, keys in lists.items():
+        are = 'is' if len(keys) == 1 else 'are each'
+        yield f'{", ".join(keys)} {are} one of {labels}.\n'
 
 
 def _labels(parameter: Parameter) -> str:
@@ -167,13 +199,15 @@ def _values(parameter: Parameter) -> str:
 def _step(parameter: Parameter) -> str:
     if parameter.labels:
         return ''
+    if parameter.steps:
+        return parameter.shown_steps
     steps = [_number(address.factor) for address in parameter.addresses.values()]
     return ', '.join(dict.fromkeys(steps))
 
 
 def _column(space: str) -> _Column:
     """Return the column of a numbering."""
-    title, shown, _ = _SPACES[space]
+    title, shown, _ = _printed(space)
 
     def cell(parameter: Parameter) -> str:
         found = [a for a in parameter.addresses.values() if a.space == space]
@@ -186,21 +220,30 @@ def _column(space: str) -> _Column:
 
 def _types(parameter: Parameter) -> str:
     names = [address.codec.name for address in parameter.addresses.values()]
-    return ', '.join(dict.fromkeys(name.partition('_')[0].upper() for name in names))
+    # the order of bytes is left out, the bits that count are not
+    return ', '.join(dict.fromkeys(re.sub(r'_[a-z]+', '', name).upper() for name in names))
 
 
 def _number(number: Fraction) -> str:
     return f'{float(number):.6f}'.rstrip('0').rstrip('.')
 
 
-def _anchor(title: str) -> str:
-    return title.lower().replace(' ', '-')
+def _anchor(title: str, taken: Sequence[str]) -> str:
+    before = taken.count(title)
+    return title.lower().replace(' ', '-') + (f'-{before}' if before else '')
 
 
-_ADDRESSES: tuple[_Column, ...] = (
-    *map(_column, _SPACES),
-    ('From', lambda row: '' if row.since is None else _number(row.since)),
-)
+@functools.cache
+def _addresses() -> tuple[_Column, ...]:
+    """Return the columns of all numberings that any family has."""
+    parameters = [parameter for name in families() for parameter in load_family(name).values()]
+    spaces = [address.space for one in parameters for address in one.addresses.values()]
+    return (
+        *map(_column, dict.fromkeys((*_SPACES, *spaces))),
+        ('From', lambda row: '' if row.since is None else _number(row.since)),
+    )
+
+
 _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('ROS parameter', lambda row: f'`{row.key}`'),
     ('Display', lambda row: row.name),
@@ -210,7 +253,7 @@ _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('Unit', lambda row: row.unit),
     ('Step', _step),
     ('Stopped', lambda row: 'yes' if row.stopped else ''),
-    *_ADDRESSES,
+    ('Option', lambda row: row.option),
 )
 _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Name', lambda row: row.name),
@@ -219,8 +262,8 @@ _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Values', _values),
     ('Unit', lambda row: row.unit),
     ('Step', lambda row: _step(row) if row.unit or row.kind is float else ''),
+    ('Option', lambda row: row.option),
     ('Type', _types),
-    *_ADDRESSES,
 )
 
 

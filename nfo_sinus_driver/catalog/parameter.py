@@ -16,7 +16,8 @@
 One parameter of a drive: where it stands on each bus and how raw numbers become a value.
 
 ``value = raw * factor``, with one factor per bus ([C14], [C15]): the manuals write the same
-scaling in three opposite notations, so the tables hold plain factors.
+scaling in three opposite notations, so the tables hold plain factors. The value of an enumeration
+is its code.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ import enum
 from fractions import Fraction
 import functools
 import math
+import re
 import struct
 
 from nfo_sinus_driver.catalog.codec import Number
@@ -46,6 +48,9 @@ class Access(enum.Enum):
     #: Reading it acknowledges a fault: only ever read when a person asked for that [C43].
     ACKNOWLEDGE = 'ack'
 
+
+#: The labels that a switch has, in capitals, and what they say.
+_SWITCH = {'OFF': False, 'ON': True, 'NO': False, 'YES': True}
 
 #: The groups of the tables that hold no settings: what a drive measures, and what controls it.
 NO_SETTINGS = frozenset({'Status', 'Fieldbus'})
@@ -112,12 +117,15 @@ class Parameter:
     :ivar unit: the unit of its values.
     :ivar minimum: the least value the manual allows, in ``unit``; ``None`` where it says none.
     :ivar maximum: the greatest, likewise.
+    :ivar steps: where the drive takes fewer values than it can count: from which value on by which
+        step, in this order.
     :ivar decimals: the decimals that the drive's own display shows.
     :ivar labels: the manual's label of each code of an enumeration.
     :ivar stopped: the motor must stand for it to be written (type Init, not Init/Run).
     :ivar since: the first firmware that has it, or ``None``.
     :ivar older: firmware of the family's older dialect has it, too; asking such a drive for others
         is a fault.
+    :ivar option: the option cards of which the drive needs one for it to do anything, or ``''``.
     :ivar source: where in the manuals it stands.
     """
 
@@ -129,12 +137,14 @@ class Parameter:
     unit: str
     minimum: Fraction | None
     maximum: Fraction | None
+    steps: Sequence[tuple[Fraction, Fraction]]
     decimals: int
     labels: Mapping[int, str]
     access: Access
     stopped: bool
     since: Fraction | None
     older: bool
+    option: str
     description: str
     source: str
 
@@ -142,9 +152,10 @@ class Parameter:
     def kind(self) -> type[bool] | type[int] | type[float] | type[str]:
         """The Python type of its values."""
         if self.labels:
-            labels = set(self.labels.values())
+            if self._is_switch:
+                return bool
             # RegAmp is one of two numbers, with nothing between them [C46]
-            return bool if labels == {'OFF', 'ON'} else int if labels == {'-1', '1'} else str
+            return int if all(map(_WHOLE.fullmatch, self.labels.values())) else str
         if any(isinstance(address.codec, Text) for address in self.addresses.values()):
             return str
         # a scale parameter may make it finer
@@ -155,6 +166,11 @@ class Parameter:
     def is_setting(self) -> bool:
         """Whether the drive keeps it for people to read and write: a ROS parameter."""
         return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS
+
+    @property
+    def _is_switch(self) -> bool:
+        switched = {code: _SWITCH.get(label.upper()) for code, label in self.labels.items()}
+        return switched == {0: False, 1: True}
 
     def at(self, protocol: str) -> Address:
         """
@@ -184,11 +200,11 @@ class Parameter:
         raw = address.codec.decode(data)
         if isinstance(raw, str):
             return raw
+        factor = address.factor
         if self.labels:
-            return self._meaning(raw)
+            return self._meaning(raw * factor)
         if self.kind is int:
             return raw
-        factor = address.factor
         return raw * factor.numerator / factor.denominator
 
     def encode(self, value: Value, protocol: str = 'modbus') -> bytes:
@@ -198,23 +214,43 @@ class Parameter:
         :raises ValueError: wrong type, out of range, unknown label, or a number between two steps
             of the drive; the message says what would be right.
         """
-        if self.labels:
-            return self.at(protocol).number.encode(self._code(value))
-        codec = self.at(protocol).codec
+        codec, factor = self.at(protocol).codec, self.factor(protocol)
         if isinstance(codec, Text):
             return codec.encode(str(value))
+        if self.labels:
+            return codec.encode(int(self._code(value) / factor))
         number = self._number(value)
-        factor = self.factor(protocol)
-        raw = round(number / factor)
-        if not _means(float(number), raw * factor, factor):
+        start, step = self._steps_at(number, factor)
+        nearest = _rounded(number, start, step)
+        if not _means(float(number), nearest, factor):
             self._check_range(number, protocol)
-            below = math.floor(number / factor)
+            below = start + math.floor((number - start) / step) * step
             raise ValueError(
                 f'{self.key}: {value} lies between two steps of the drive, '
-                f'{_show(below * factor)} and {_show((below + 1) * factor)}'
+                f'{_show(below)} and {_show(below + step)}'
             )
-        self._check_range(raw * factor, protocol)
-        return codec.encode(raw)
+        self._check_range(nearest, protocol)
+        return codec.encode(int(nearest / factor))
+
+    def on_step(self, number: float) -> bool:
+        """Tell whether :attr:`steps` have a number; any is on one where there are none."""
+        if not self.steps:
+            return True
+        start, step = self._steps_at(Fraction(number), Fraction(1))
+        nearest = _rounded(Fraction(number), start, step)
+        return nearest >= start and _means(number, nearest, step)
+
+    @property
+    def shown_steps(self) -> str:
+        """What :attr:`steps` say, for a person."""
+        return ', '.join(
+            f'{_show(step)} from {_show(start)}' if index else _show(step)
+            for index, (start, step) in enumerate(self.steps)
+        )
+
+    def step(self, protocol: str = 'modbus') -> Fraction:
+        """Return the least difference between two values that the drive takes."""
+        return min((step for _, step in self.steps), default=self.factor(protocol))
 
     def span(self, protocol: str = 'modbus') -> tuple[Fraction, Fraction]:
         """
@@ -243,27 +279,44 @@ class Parameter:
         number = self._number(value)
         factor = self.factor(protocol)
         self._check_range(number, protocol)
-        return self.at(protocol).number.encode(round(number / factor))
+        nearest = _rounded(number, *self._steps_at(number, factor))
+        return self.at(protocol).number.encode(int(nearest / factor))
 
-    def _meaning(self, raw: int) -> Value:
-        """Return what a code of an enumeration means."""
-        if self.kind is str:
-            return self.labels.get(raw, str(raw))
-        if raw not in self.labels:
+    def _steps_at(self, number: Fraction, count: Fraction) -> tuple[Fraction, Fraction]:
+        """
+        Return where the steps that a number lies between begin, and how great they are.
+
+        :param count: the value of one raw count, which is the step where the table has none.
+        """
+        found = self.steps[0] if self.steps else (Fraction(0), count)
+        for steps in self.steps:
+            if steps[0] <= number:
+                found = steps
+        return found
+
+    def _meaning(self, code: Fraction) -> Value:
+        """
+        Return what a code of an enumeration means.
+
+        :raises ValueError: it means nothing of the type, or is none.
+        """
+        label = self.labels.get(int(code)) if code.denominator == 1 else None
+        if self.kind is str and code.denominator == 1:
+            return str(code) if label is None else label
+        if label is None:
             raise ValueError(
-                f'{self.key}: the drive has code {raw}, which is none of '
+                f'{self.key}: the drive has code {_show(code)}, which is none of '
                 f'{", ".join(self.labels.values())}'
             )
-        label = self.labels[raw]
-        return int(label) if self.kind is int else label == 'ON'
+        return int(label) if self.kind is int else _SWITCH[label.upper()]
 
     def _code(self, value: Value) -> int:
-        if self.kind is bool and isinstance(value, bool):
-            value = 'ON' if value else 'OFF'
-        elif self.kind is int and not isinstance(value, (bool, str)) and value in (-1, 1):
-            value = f'{value:g}'
         for code, label in self.labels.items():
             if label == value:
+                return code
+            if self.kind is bool and isinstance(value, bool) and _SWITCH[label.upper()] == value:
+                return code
+            if self.kind is int and type(value) in (int, float) and float(label) == value:
                 return code
         raise ValueError(f'{self.key}: {value!r} is none of {", ".join(self.labels.values())}')
 
@@ -290,6 +343,13 @@ class Parameter:
             raise ValueError(
                 f'{self.key}: {_show(number)} is out of range, {allowed} {self.unit}'.rstrip()
             )
+
+
+_WHOLE = re.compile(r'-?\d+')
+
+
+def _rounded(number: Fraction, start: Fraction, step: Fraction) -> Fraction:
+    return start + round((number - start) / step) * step
 
 
 def _show(number: Fraction) -> str:

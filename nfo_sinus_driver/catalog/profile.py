@@ -379,7 +379,7 @@ class Profile:
 
     :ivar title: what its maker calls it.
     :ivar status_word: what its status word means.
-    :ivar holders: who has control, by the code of the control source.
+    :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
     :ivar setpoints: where set-points go, by control mode.
     :ivar in_charge: finds out by which control method the bus has control of a drive, from whom was
@@ -396,7 +396,7 @@ class Profile:
 
     title: str
     status_word: StatusWord
-    holders: Mapping[int, Holder]
+    holders: Mapping[Value, Holder]
     methods: Mapping[str, type[ControlMethod]]
     setpoints: Mapping[str, SetpointTarget]
     in_charge: Callable[[Status | None], Steps[str]]

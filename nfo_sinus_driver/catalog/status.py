@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import field
 import enum
 from fractions import Fraction
 import functools
@@ -141,21 +142,25 @@ class StatusWord:
     :ivar state: gives the state that a status word shows.
     :ivar by_bit: which facts each bit tells.
     :ivar by_state: which facts only the state tells.
+    :ivar by_clear_bit: which facts each bit tells when it is 0.
     :ivar stateless: a status word may show none; where not, such a word is none of this drive.
     :ivar code: gives the status code that a word tells, whatever the word; ``None``: the code is a
         parameter of its own.
     :ivar shown: which bits of it are published.
     :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
         the frequency has to tell; it is read with every status.
+    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE tells it.
     """
 
     state: Callable[[int], State]
     by_bit: Mapping[int, Fact]
     by_state: Mapping[State, Fact]
+    by_clear_bit: Mapping[int, Fact] = field(default_factory=dict)
     stateless: bool = False
     code: Callable[[int], int] | None = None
     shown: int = 0xFFFFFFFF
     by_frequency: bool = False
+    tells_sign: bool = False
 
     def may_say(self, word: int) -> bool:
         """Tell whether a status word is one of those that the manual knows."""
@@ -165,8 +170,9 @@ class StatusWord:
     def valid(self) -> Fact:
         """The facts that this family tells at all; of the others nothing is known."""
         valid = Fact.ALARM  # where no bit tells it, the inverter status does
-        for fact in (*self.by_bit.values(), *self.by_state.values()):
-            valid |= fact
+        for told in (self.by_bit, self.by_state, self.by_clear_bit):
+            for fact in told.values():
+                valid |= fact
         return valid
 
     def facts(self, word: int, listed: Kind) -> Fact:
@@ -197,13 +203,16 @@ class StatusWord:
         return Fact.ALARM in self.by_bit.values()
 
     @functools.cached_property
-    def _pairs(self) -> tuple[tuple[int, int], ...]:
+    def _told(self) -> tuple[tuple[int, bool, int], ...]:
         # plain numbers: this is done with every poll, and flags take their time
-        return tuple((int(bit), int(fact)) for bit, fact in self.by_bit.items())
+        told = ((True, self.by_bit), (False, self.by_clear_bit))
+        return tuple(
+            (int(bit), is_set, int(fact)) for is_set, bits in told for bit, fact in bits.items()
+        )
 
     def _bits(self, word: int) -> Fact:
         facts = 0
-        for bit, fact in self._pairs:
-            if word & bit:
+        for bit, is_set, fact in self._told:
+            if bool(word & bit) is is_set:
                 facts |= fact
         return Fact(facts)

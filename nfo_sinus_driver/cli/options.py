@@ -64,7 +64,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
             setattr(options, name, default)
     protocol = PROTOCOLS[options.protocol]
     if options.verb == 'scan' and not options.addresses:
-        options.addresses = tuple(filter(None, protocol.units))
+        alone = protocol.point_to_point
+        options.addresses = tuple(unit for unit in protocol.units if unit != alone)
     against = getattr(options, 'against', None)
     named = (options.address, *getattr(options, 'addresses', ()))
     try:
@@ -106,7 +107,8 @@ def _common() -> argparse.ArgumentParser:
         '--address',
         type=_address,
         metavar='N',
-        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone (default: 1)',
+        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone; movitrac: 0 to 63 '
+        '(default: 1)',
     )
     add('--model', choices=families(), help=f'default: {usual_family()}')
     add(
@@ -161,7 +163,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_addresses,
         default=(),
         metavar='LIST',
-        help='such as 1-10,20 (default: 1-247; classic: 1-94)',
+        help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63)',
     )
     scan.add_argument(
         '--all-settings', action='store_true', help='try every baud rate and parity; takes long'

@@ -120,13 +120,14 @@ class _Ride:
                 'then type nfo-sinus ack'
             )
         mode = remote.do(remote.inverter.read_control_mode)
-        if not remote.registers.reaches(remote.model.key(Role.CONTROL_MODE)):
+        key = remote.model.key(Role.CONTROL_MODE)
+        if not remote.registers.reaches(key):
             # nothing tells it, so it is what was typed
             mode = options.control_mode or mode
         if options.control_mode not in ('', mode):
             raise CliError(
                 f'the drive is in control mode {mode}, not {options.control_mode}: set '
-                'control.mode, or give another --control-mode'
+                f'{key}, or give another --control-mode'
             )
         if options.setpoint is None:
             return
@@ -341,4 +342,6 @@ def _acknowledge(control: ControlSession, seen: InverterStatus) -> Report:
     answer = control.finish(drive.acknowledge(), _LONGEST)
     # nobody is here afterwards to keep the drive from timing out
     released = control.finish(drive.disconnect(1.0), _LONGEST)
-    return Report(Cause.CONTROL_RELEASED, stop=answer) if released.cause in RELEASED else answer
+    if released.cause not in RELEASED:
+        return answer
+    return Report(released.cause, **{**released.values, 'stop': answer})

@@ -86,7 +86,11 @@ def scan(options: argparse.Namespace) -> int:
         drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
         show(json.dumps(drives, ensure_ascii=False, indent=2))
     if not found:
-        raise CliError(_ADVICE)
+        check = PROTOCOLS[options.protocol].check
+        raise CliError(
+            f'no response: check in this order: {check} (--all-settings tries all that the '
+            'protocol can have), A and B of the wires'
+        )
     if options.params:
         _write_params(options, found, lines_of)
     return 0
@@ -122,9 +126,13 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
         # the line is that of the gateway
         return [(0, '')]
     if options.all_settings:
-        formats = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
-        return [(baud_rate, format_) for baud_rate in _LIKELIEST for format_ in formats]
-    return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
+        usual = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
+        rates = [rate for rate in _LIKELIEST if rate in protocol.baud_rates]
+        formats = usual or protocol.char_formats
+        return [(baud_rate, format_) for baud_rate in rates for format_ in formats]
+    return [
+        (options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)
+    ]
 
 
 def _who_answers(

@@ -54,7 +54,7 @@ async def detect_model(bus: Bus, unit: int) -> str:
     except Cancelled:
         raise DriveError(Cause.ENDING) from None
     except LinkError as error:
-        raise DriveError(explain(error, unit, known=False)) from error
+        raise DriveError(explain(error, unit, check=bus.protocol.check)) from error
     if len(models) == 1:
         return models[0].name
     names = ' or '.join(model.name for model in models)

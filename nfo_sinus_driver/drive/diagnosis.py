@@ -36,18 +36,19 @@ from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
 
-def explain(error: LinkError, address: int, *, known: bool) -> Report:
+def explain(error: LinkError, address: int, *, check: str | None = None) -> Report:
     """
     Return what a failed transaction means.
 
-    :param known: the drive has answered before, so that its settings are right [C93].
+    :param check: what to look at while the drive has never answered; ``None``: it has, so that its
+        settings are right [C93].
     """
     if isinstance(error, (PortError, Refused, GatewaySilent, NoPath)):
         return Report(Cause.LINE_FAILED, error=str(error))
-    if known:
+    if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))
     if isinstance(error, NoAnswer):
-        return Report(Cause.NO_RESPONSE, address=address)
+        return Report(Cause.NO_RESPONSE, address=address, check=check)
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
@@ -55,7 +56,7 @@ def explain_failure(error: LinkError | DriveError, inverter: DriveState) -> Repo
     """Return what went wrong with a drive that has answered before."""
     if isinstance(error, DriveError):
         return error.report
-    return explain(error, inverter.settings.address, known=True)
+    return explain(error, inverter.settings.address)
 
 
 def report_of(error: Exception) -> Report:

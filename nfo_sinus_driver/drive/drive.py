@@ -189,8 +189,8 @@ class Drive:
             try:
                 return await command()
             except LinkError as error:
-                known = self.inverter.identity is not None
-                raise DriveError(explain(error, self._unit, known=known)) from error
+                check = None if self.inverter.identity else self._bus.protocol.check
+                raise DriveError(explain(error, self._unit, check=check)) from error
             except Cancelled:
                 raise DriveError(Cause.ENDING) from None
 

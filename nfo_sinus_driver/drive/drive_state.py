@@ -60,6 +60,8 @@ LOOK_PERIOD = 0.02
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
 _SOON = 2.0
+#: How long it counts that the bus had control, s, where that has to be asked for by itself.
+_BY_MODE_FOR = 1.0
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -169,8 +171,11 @@ class DriveState:
         code_of = self.model.profile.status_word.code
         if code_of is not None:
             seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+            seen = self._with_control_as_before(seen)
             alarmed = before is not None and word != before.word and alarming(seen)
-            return await self._with_frequency(seen, Priority.STOP if alarmed else priority, once)
+            priority = Priority.STOP if alarmed else priority
+            seen = await self._with_control(seen, priority, once)
+            return await self._with_frequency(seen, priority, once)
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
@@ -223,7 +228,7 @@ class DriveState:
         if not seen.by_frequency:
             return self._saw(seen)
         try:
-            frequency = await self.measure(Role.ACTUAL_FREQUENCY, priority, once=once)
+            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
         except Refused:
             frequency = math.nan
         self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
@@ -251,12 +256,33 @@ class DriveState:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
         seen = InverterStatus(at, None, code, self.model, code_at=at)
-        if seen.means(Meaning.ANONYMOUS):
-            key = self.model.key(Role.CONTROL_SOURCE)
-            source = await self.registers.read(key, priority, once=once)
-            holder = self.model.profile.holders.get(int(source), Holder.UNKNOWN)
-            seen = replace(seen, by_mode=holder is Holder.BUS)
-        return self._saw(seen)
+        return self._saw(await self._with_control(seen, priority, once))
+
+    def _with_control_as_before(self, seen: InverterStatus) -> InverterStatus:
+        before = self.seen
+        if before is None:
+            return seen
+        return replace(seen, by_mode=before.by_mode, by_mode_at=before.by_mode_at)
+
+    async def _with_control(
+        self, seen: InverterStatus, priority: Priority, once: bool
+    ) -> InverterStatus:
+        """
+        Complete a status by who has control, where neither its word nor its code tells it.
+
+        That the bus has it counts for a while, as long as the code stays what it was.
+        """
+        word_tells = seen.word is not None and Fact.NETWORK_CONTROL in seen.valid
+        if word_tells or not seen.means(Meaning.ANONYMOUS):
+            return seen
+        before = self.seen
+        same = before is not None and before.code == seen.code
+        if same and seen.by_mode and seen.at - seen.by_mode_at < _BY_MODE_FOR:
+            return seen
+        source = self.model.key(Role.CONTROL_SOURCE)
+        reply = await self.registers.read_reply(source, priority, once=once)
+        holder = self.model.profile.holders.get(self.registers.value(source, reply.data))
+        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=reply.arrived)
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -281,19 +307,26 @@ class DriveState:
         self.answering = False
         self.on_missed()
 
-    async def measure(self, role: Role, priority: Priority, *, once: bool = True) -> float:
+    async def measure(self, role: Role, priority: Priority) -> float:
         """
-        Read a measured value; NaN if its family has none such, or if it cannot be, and that again.
+        Read a measured value once; NaN if there is none such, or if it cannot be, and that again.
 
         :raises LinkError: it does not answer, or refuses.
         """
+        return await self._measure(role, priority, True, self.seen)
+
+    async def _measure(
+        self, role: Role, priority: Priority, once: bool, seen: InverterStatus | None
+    ) -> float:
+        """Measure; a status tells the direction of what turns, where the value does not."""
         key = self.model.key(role)
         if not key:
             return math.nan
         data = await self.registers.read_data(key, priority, once=once)
         value = self.registers.number(key, data)
         if not self.registers.is_odd(key):
-            return value
+            turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+            return seen.signed(value) if turns and seen is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit
@@ -397,7 +430,7 @@ class DriveState:
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
         source = await self.registers.read(key, Priority.SERVICE)
-        return self.model.profile.holders.get(int(source)) in dialect.harmless
+        return self.model.profile.holders.get(source) in dialect.harmless
 
     @property
     def settings_need_control(self) -> bool:

@@ -38,9 +38,6 @@ _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
 #: How often at most what cannot be is read, until it is believed that the drive has it.
 _READINGS = 3
-#: Counters whose second word has 8 bits that count over Classic; of the others nobody says [C26].
-_SHORT = frozenset((Role.OPERATING_TIME, Role.RUNNING_TIME, Role.BRAKE_TIME))
-
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
 #: one word, its counters two.
 _RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
@@ -100,9 +97,6 @@ class ParameterAccess:
 
     def value(self, key: str, data: bytes) -> Value:
         """Return what the drive means by bytes."""
-        if self.model.role_of.get(key) in _SHORT and self.protocol == 'classic':
-            # the low word, then the high one without its high byte
-            data = data[:2] + b'\0' + data[3:]
         return self.model[key].decode(data, self.protocol)
 
     def reaches(self, key: str) -> bool:
@@ -115,7 +109,7 @@ class ParameterAccess:
         low, high = parameter.span(self.protocol)
         low = max(low, Fraction(0)) if parameter.never_negative else low
         high = self._highest(key) or high
-        return float(low), float(high), float(parameter.factor(self.protocol))
+        return float(low), float(high), float(parameter.step(self.protocol))
 
     def _highest(self, key: str) -> Fraction | None:
         """Return the end that the line sets: beyond it a drive could not be asked again [C10]."""

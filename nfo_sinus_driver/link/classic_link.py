@@ -38,11 +38,11 @@ from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NothingToAsk
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
@@ -386,14 +386,3 @@ class ClassicLink:
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
-
-
-class NothingToAsk:
-    """An inquiry without questions."""
-
-    done = True
-    found = Identification()
-
-    def ask(self) -> Reply:
-        """Ask nothing: there is no question."""
-        raise IndexError('there is no question left')

@@ -22,6 +22,14 @@ import re
 from typing import NamedTuple
 from typing import Protocol
 
+BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
+_FORMAT = re.compile(r'([78])([EON])([12])')
+#: Most protocols are for drives that leave the factory set to another one [C93].
+_CHECK = (
+    'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc for '
+    'Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
+)
+
 
 class Address(NamedTuple):
     """
@@ -93,6 +101,17 @@ class Inquiry(Protocol):
         """
 
 
+class NothingToAsk:
+    """The inquiry of a protocol that knows nothing but parameters: it has no questions."""
+
+    done = True
+    found = Identification()
+
+    def ask(self) -> Reply:
+        """Ask nothing: there is no question."""
+        raise IndexError('there is no question left')
+
+
 @dataclass(frozen=True)
 class LineProtocol:
     """
@@ -103,12 +122,14 @@ class LineProtocol:
     :ivar units: the addresses that a drive may have.
     :ivar baud_rate: of the factory, bit/s.
     :ivar char_format: of the factory, such as ``8E1``.
+    :ivar baud_rates: those that the protocol can have.
     :ivar char_formats: those that the protocol can have, the likeliest first; none where the line
         is a gateway's.
     :ivar broadcast: the address that every drive obeys and none answers; ``None``: there is none.
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
+    :ivar check: what to look at, in this order, where no drive answers.
     """
 
     name: str
@@ -116,11 +137,13 @@ class LineProtocol:
     units: range
     baud_rate: int
     char_format: str
+    baud_rates: Sequence[int] = BAUD_RATES
     char_formats: Sequence[str] = ()
     broadcast: int | None = None
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
+    check: str = _CHECK
 
     def require_unit(self, address: int) -> None:
         """
@@ -132,6 +155,16 @@ class LineProtocol:
             name = self.addressing.title()
             raise ValueError(f'address {address}: {name} has {self.units[0]} to {self.units[-1]}')
 
+    def require_baud_rate(self, baud_rate: int) -> None:
+        """
+        Make sure that the protocol can have a baud rate.
+
+        :raises ValueError: it cannot; the message says which it can.
+        """
+        if baud_rate not in self.baud_rates:
+            has = ', '.join(map(str, self.baud_rates))
+            raise ValueError(f'baud_rate {baud_rate}: {self.name} has {has}')
+
     def require_char_format(self, char_format: str) -> None:
         """
         Make sure that the protocol can have a character format.
@@ -142,7 +175,7 @@ class LineProtocol:
             return
         has = ', '.join(self.char_formats)
         bits, *other_bits = {known[0] for known in self.char_formats}
-        if not other_bits:
+        if not other_bits and char_format[0] != bits and len(self.char_formats) > 1:
             has = f'{bits} data bits, write {bits}{char_format[1:]}'
         raise ValueError(f'char_format {char_format!r}: {self.name} has {has}')
 
@@ -297,11 +330,6 @@ class NotReady(LinkError):
     def __init__(self, until: float) -> None:
         self.until = until
         super().__init__('answers to earlier requests may still be on their way')
-
-
-BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
-
-_FORMAT = re.compile(r'([78])([EON])([12])')
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,11 @@ class LateReplies(Generic[_Request, _Kind]):
         """Return the kinds of replies that may still come from a unit."""
         return self._left(unit, now).keys()
 
+    def may_be_of_another(self, unit: int, kind: _Kind, now: float) -> bool:
+        """Tell whether a reply that names no unit may be a late one of another than that asked."""
+        others = [other for other in self._until if other != unit]
+        return any(kind in self._left(other, now) for other in others)
+
     def release(self, unit: int) -> None:
         """Expect nothing more from a unit: it has answered what was asked last."""
         self._until.pop(unit, None)

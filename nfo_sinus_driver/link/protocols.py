@@ -24,10 +24,14 @@ from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
+from nfo_sinus_driver.link.movitrac_link import MovitracLink
 from nfo_sinus_driver.link.rtu import RtuLink
 
 #: A new protocol is a file of this folder, and its link stands here.
-_LINKS = {link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink)}
+_LINKS = {
+    link.protocol.name: link
+    for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
+}
 #: What the driver's ``protocol`` parameter takes, and what each is.
 PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}
 
@@ -72,5 +76,7 @@ def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
     :raises ValueError: no such protocol or kind of URL, or a setting with which the protocol can
         never work; the message says what can.
     """
-    protocol_of(protocol).require_char_format(settings.char_format)
+    found = protocol_of(protocol)
+    found.require_baud_rate(settings.baud_rate)
+    found.require_char_format(settings.char_format)
     return _LINKS[protocol].on_port(port, settings)

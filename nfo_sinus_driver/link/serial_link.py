@@ -47,6 +47,8 @@ from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.silence import NEVER_SILENT
+from nfo_sinus_driver.link.silence import await_silence
 
 _T = TypeVar('_T')
 
@@ -258,22 +260,12 @@ class SerialLink(ModbusLink):
         """
         is_write = isinstance(request, (Write, WriteAndRead))
         wait = self._write_wait if is_write else self._settings.response_timeout
-        give_up = max(self._line_end + self._gap, time.monotonic()) + wait
-        came = False
-        while True:
-            data = self._port.read(self._line_end + self._gap)
-            now = time.monotonic()
-            if not data:
-                if now >= self._line_end + self._gap:
-                    return came
-                continue
-            came = True
-            self._late.heard_unasked(now)
-            self._line_end = max(self._line_end, now)
-            if now > give_up:
-                if is_write:
-                    return came
-                raise NeverSilent('the line is never silent: noise, or another master on it')
+        data, self._line_end, silent = await_silence(self._port, self._line_end, self._gap, wait)
+        if data:
+            self._late.heard_unasked(time.monotonic())
+        if not silent and not is_write:
+            raise NeverSilent(NEVER_SILENT)
+        return bool(data)
 
     @property
     def _write_wait(self) -> float:

@@ -221,6 +221,9 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     if isinstance(value, (bool, str)):
         return shown
     low, high, step = drive.parameters.limits(key)
+    if not parameter.on_step(value):
+        # rclpy refuses what is on none, and the drive is right
+        step = 0.0
     low, high = min(low, value), max(high, value)
     if isinstance(value, int):
         # RegAmp is -1 or 1, and nothing between
@@ -235,6 +238,10 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
 def _constraints(parameter: CatalogParameter, model: Family) -> Iterator[str]:
     if parameter.kind is str:
         yield f'one of {", ".join(parameter.labels.values())}'
+    if len(parameter.steps) > 1:
+        yield f'steps of {parameter.shown_steps}'
+    if parameter.option:
+        yield f'needs option {parameter.option}'
     if parameter.stopped:
         yield 'the motor must be stopped'
     if parameter.key in model.communication:

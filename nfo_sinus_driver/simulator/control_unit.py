@@ -74,7 +74,7 @@ class ControlUnit(abc.ABC):
 
     @abc.abstractmethod
     def show(self, key: str) -> int | None:
-        """Return the raw number of what is neither stored nor measured; else ``None``."""
+        """Return the raw number of what is not stored, or measured its own way; else ``None``."""
 
     @property
     @abc.abstractmethod
@@ -148,6 +148,11 @@ class ControlUnit(abc.ABC):
     def hears(self, protocol: str, timing: Timing) -> bool:
         """Whether it is set to this protocol, speed and format."""
         return True
+
+    @property
+    def response_time(self) -> float:
+        """How long it is set to wait before it answers (s)."""
+        return 0.0
 
     def heard(self) -> None:
         """Take note that a valid frame for this drive arrived."""

@@ -224,10 +224,10 @@ class SimulatedDrive:
 
     def _peek(self, key: str) -> int:
         """Read a parameter without side effects."""
-        parameter, role = self.memory.model[key], self.model.role_of.get(key)
-        shown = measure(role, parameter, home(parameter), self.motor, self.counters)
+        shown = self.control_unit.show(key)
         if shown is None:
-            shown = self.control_unit.show(key)
+            parameter, role = self.memory.model[key], self.model.role_of.get(key)
+            shown = measure(role, parameter, home(parameter), self.motor, self.counters)
         return self.memory.raw(key) if shown is None else shown
 
     def _store(self, key: str, raw: int) -> None:

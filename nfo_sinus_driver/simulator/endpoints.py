@@ -29,6 +29,8 @@ from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.movitrac import Movitrac
+from nfo_sinus_driver.simulator.movitrac_frames import ADDRESSES
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PtyPort
 from nfo_sinus_driver.simulator.ports import TcpPort
@@ -42,7 +44,7 @@ GATEWAY_TIMEOUT = 0.1
 @dataclass(frozen=True)
 class _Row:
     """
-    A protocol and its defaults ([M0 §6.1.2, §6.2.2]).
+    A protocol and its defaults ([M0 §6.1.2, §6.2.2], [M4 §2.2.2]).
 
     :ivar make: makes it; it gets the time that a gateway waits.
     :ivar tables: its name in the tables of the families, by which a drive has a server for it.
@@ -62,6 +64,7 @@ PROTOCOLS: Mapping[str, _Row] = {
     ModbusAscii.name: _Row(lambda _: ModbusAscii(), 'modbus', 19200, '7E1', '7'),
     ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
     Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
+    Movitrac.name: _Row(lambda _: Movitrac(), 'movitrac', 9600, '8N1', '8', ADDRESSES),
 }
 
 

@@ -118,7 +118,7 @@ def simulated_drive(
     """
     Return a drive of a family.
 
-    :param address: its address on the line, 1 to 247.
+    :param address: its address on the line.
     :param settings: parameters other than factory, in engineering units, by key.
     :param options: what can be chosen of this family.
     :raises ValueError: an unknown model, parameter or option, or a value that is not possible.
@@ -146,7 +146,11 @@ def verbs_of(name: str) -> Mapping[str, Verb]:
 
 def every_verb() -> Mapping[str, Verb]:
     """Return what can be made to happen to a drive of any family."""
-    return {verb: what for name in simulated() for verb, what in verbs_of(name).items()}
+    found: dict[str, Verb] = {}
+    for name in simulated():
+        for verb, what in verbs_of(name).items():
+            found[verb] = found[verb].joined(what) if verb in found else what
+    return found
 
 
 def every_option() -> Mapping[str, Option]:

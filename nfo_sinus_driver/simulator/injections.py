@@ -24,6 +24,7 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 import difflib
 from typing import Any
 
@@ -72,6 +73,11 @@ class Argument:
         """Whether it must be given."""
         return self.default is _REQUIRED
 
+    def joined(self, other: Argument) -> Argument:
+        """Return an argument that has the choices of both."""
+        both = dict.fromkeys([*(self.choices or ()), *(other.choices or ())])
+        return replace(self, choices=tuple(both) or None)
+
     def convert(self, value: Any) -> Any:
         """Return the value in its right type (ValueError: it cannot be that)."""
         if value is None and not self.required:
@@ -114,6 +120,14 @@ class Verb:
     arguments: tuple[Argument, ...] = ()
     #: Whether it happens to one drive; otherwise to the line, or to every drive on it.
     to_drive: bool = True
+
+    def joined(self, other: Verb) -> Verb:
+        """Return a verb that takes what two of the same name take, each in its own family."""
+        if other is self:
+            return self
+        pairs = zip(self.arguments, other.arguments, strict=True)
+        arguments = tuple(one.joined(two) for one, two in pairs)
+        return replace(self, help=f'{self.help}; or {other.help}', arguments=arguments)
 
     def bind(self, values: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
         """

@@ -170,8 +170,8 @@ class Line:
             drive.advance_to(arrived.last)
             if not self._hears(drive):
                 continue
-            # carrying it out may change it
-            address = drive.address
+            # carrying it out may change them
+            address, wait = drive.address, drive.control_unit.response_time
             if request.whole:
                 drive.heard()
             frame = self.protocol.answer(drive, request)
@@ -179,7 +179,7 @@ class Line:
                 answered = True
                 instead = self.protocol.instead(request, there)
                 replies = self.faults.alter(address, frame, instead)
-                self._send(address, replies, arrived)
+                self._send(address, replies, arrived, wait)
         if not answered:
             refusal = self.protocol.instead(request, there)
             self._send(request.address, [refusal] if refusal else [], arrived)
@@ -189,10 +189,12 @@ class Line:
             return False
         return self._always_heard or drive.control_unit.hears(self.protocol.spoken, self.timing)
 
-    def _send(self, address: int, replies: Sequence[Reply], asked: Arrived) -> None:
+    def _send(
+        self, address: int, replies: Sequence[Reply], asked: Arrived, wait: float = 0.0
+    ) -> None:
         for reply in replies:
             length = len(reply.data)
-            start = asked.last + self._pause + reply.delay
+            start = asked.last + max(self._pause, wait) + reply.delay
             if self._character_behind:
                 # both ways in RTU frames, which are shorter than those of TCP
                 both = len(asked.data) + length - 2 * _SHORTER

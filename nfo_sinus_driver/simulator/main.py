@@ -156,13 +156,6 @@ def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     return settings
 
 
-def _address(text: str) -> int:
-    address = int(text, 10)
-    if not 1 <= address <= 247:
-        raise argparse.ArgumentTypeError(f'{text} is not possible: 1 to 247')
-    return address
-
-
 def _tcp(text: str) -> int:
     port = int(text, 10)
     if not 0 <= port <= 65535:
@@ -188,10 +181,10 @@ def _parser() -> argparse.ArgumentParser:
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
         '--address',
-        type=_address,
+        type=int,
         action='append',
         metavar='N',
-        help='address of a drive, 1 to 247; once for each drive (default: 1)',
+        help='address of a drive, as its protocol has them; once for each drive (default: 1)',
     )
     add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
@@ -203,8 +196,12 @@ def _parser() -> argparse.ArgumentParser:
         help='serve the same drives by another protocol as well, at a link or TCP port; may be '
         'repeated',
     )
-    add('--baud', type=int, help='default: 19200, of classic 9600')
-    add('--char-format', metavar='FORMAT', help='default: 8E1, of classic and modbus_ascii 7E1')
+    add('--baud', type=int, help='default: 19200, of classic and movitrac 9600')
+    add(
+        '--char-format',
+        metavar='FORMAT',
+        help='default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1',
+    )
     add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
     add(
         '--gateway-timeout',

@@ -134,11 +134,11 @@ class Memory:
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
         """Refuse a raw number that the manual does not allow (Refused: VALUE)."""
-        if parameter.labels:
-            if raw not in parameter.labels:
-                raise Refused(Reason.VALUE, f'{parameter.key} has no code {raw}')
-            return
         value = raw * parameter.factor(home(parameter))
+        if parameter.labels:
+            if value not in parameter.labels:
+                raise Refused(Reason.VALUE, f'{parameter.key} has no code {float(value):g}')
+            return
         low = parameter.minimum is not None and value < parameter.minimum
         high = parameter.maximum is not None and value > parameter.maximum
         if low or high:
@@ -148,7 +148,8 @@ class Memory:
     def _least(parameter: Parameter) -> int:
         """The raw number to start with: 0, or what is allowed and nearest to it."""
         if parameter.labels:
-            return 0 if 0 in parameter.labels else min(parameter.labels)
+            code = 0 if 0 in parameter.labels else min(parameter.labels)
+            return int(code / parameter.factor(home(parameter)))
         low = parameter.minimum
         if low is None or low <= 0:
             return 0

@@ -27,10 +27,6 @@ from typing import Any
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 
-_CHECK_LINE = (
-    'check in this order: BusType in the drive (NFO, which is classic, is the factory setting; '
-    'MbusRtu or MbusAsc for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
-)
 _NO_TIMEOUT = (
     'the drive has no time-out of its own ({why}): if this {{call.program}} is killed or the cable '
     'is cut, the motor runs on; {remedy}'
@@ -45,7 +41,7 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.DRIVER_ERROR: 'error in the driver: {error}',
     Cause.LINE_FAILED: '{error}',
     Cause.NOT_REACHED: '{error}: check the cable and that the drive has power',
-    Cause.NO_RESPONSE: f'no response from address {{address}}: {_CHECK_LINE}',
+    Cause.NO_RESPONSE: 'no response from address {address}: check in this order: {check}',
     Cause.NO_VALID_ANSWER: 'what comes from address {address} is no answer ({error}): check baud '
     'rate and parity, that no other master is on the line, and the wiring',
     Cause.TOO_LATE: 'no answer within {timeout:g} s',

@@ -44,6 +44,7 @@ from nfo_sinus_driver.link import modbus_ascii
 from nfo_sinus_driver.link import modbus_identify
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import modbus_tcp
+from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.link.answer_reader import AnswerReader
 from nfo_sinus_driver.link.interface import LinkError
@@ -398,6 +399,101 @@ def _judge_answers(message: classic.Message, one: judges.Classic, random: Random
         assert classic.answers(message, request) == right, f'{message} answers {request}?'
 
 
+# --- the MOVITRAC's protocol ----------------------------------------------------------------------
+
+#: Bytes of a glitch, behind which an ACK or NACK still counts.
+_GLITCH = 2
+
+
+def movitrac_frame(random: Random, index: int) -> bytes:
+    """Return a frame without its sum, of any kind; most are about an index."""
+    number = struct.pack('>H', index if random.random() < 0.8 else random.getrandbits(16))
+    unit = bytes((random.choice((0, 1, 63, random.getrandbits(8))),))
+    digits = bytes(random.choice((0, 1, 9, 0x25, 0xD2)) for _ in range(8))
+    return random.choice(
+        (
+            b'\xb5' + unit + number,
+            b'\xc8' + number + digits[:4],
+            b'\xc8' + number + random.randbytes(4),
+            b'\xac' + number + digits,
+            b'\xa9' + unit + number + digits[:4],
+            b'\xad' + unit + number + digits,
+            b'\xd2',
+            b'\xf3' + random.randbytes(1),
+        )
+    )
+
+
+def _movitrac(random: Random, frames: int) -> None:
+    mutator = Mutator(random)
+    while frames > 0:
+        index = random.choice((4, 25, 0xC8D2, 0xF3F3))
+        request = random.choice(
+            (movitrac.Enquiry(1, index), movitrac.Select(1, index, bytes(4)))
+        )
+        count = 1 + int(random.random() * min(_FEW, frames))
+        frames -= count
+        stream = b''
+        others = [judges.seal_movitrac(movitrac_frame(random, index)) for _ in range(2)]
+        for _ in range(count):
+            way = random.random()
+            frame = movitrac_frame(random, index)
+            if way < 0.1:
+                stream += mutator.rubbish()
+            elif way < 0.6:
+                stream += mutator.frame(frame, others, judges.seal_movitrac)
+            else:
+                stream += judges.seal_movitrac(frame)
+        _judge_movitrac(request, stream, mutator)
+
+
+def _judge_movitrac(request: movitrac.Request, stream: bytes, mutator: Mutator) -> None:
+    """Feed a reader as the link does, and judge all that it says."""
+    reader = movitrac.Reader(request)
+    fed, taken = b'', 0
+    wanted = 'value' if isinstance(request, movitrac.Enquiry) else 'ack'
+    for piece in mutator.pieces(stream):
+        fed += piece
+        answer = reader.feed(piece)
+        while answer is not None:
+            begin = len(reader.passed_over)
+            taken = begin + len(reader.frame)
+            assert fed[begin:taken] == reader.frame, 'the frame is not among the bytes'
+            right = [one for one in judges.movitrac_frames(reader.frame) if one.begin == 0]
+            assert right, f'{answer} from a damaged frame'
+            (meant,) = right
+            assert meant.kind in (wanted, 'nack'), f'{answer} answers {request}?'
+            assert answer == _MOVITRAC_ANSWERS[meant.kind](meant), f'{answer} is not {meant}'
+            assert meant.kind != 'value' or meant.number == request.index, f'{answer}?'
+            if meant.kind != 'value':
+                _judge_glitch(fed[:begin])
+            answer = reader.feed(b'')
+        assert len(reader.other + reader.frame) == len(fed), 'bytes were lost or doubled'
+        readable = list(judges.movitrac_frames(fed))
+        for one in readable:
+            if (one.kind, one.number) != (wanted, request.index) or one.begin < taken:
+                continue
+            # two frames that can be read in the same bytes: the first one counts
+            overlapped = any(other.begin < one.begin < other.end for other in readable)
+            assert overlapped, f'the value at {one.begin} was not found'
+
+
+def _judge_glitch(before: bytes) -> None:
+    """Judge what came before an ACK or NACK: whole frames, then next to nothing."""
+    ends = [0, *(one.end for one in judges.movitrac_frames(before))]
+    junk = [before[end:] for end in ends]
+    assert any(
+        len(one) <= _GLITCH and judges.MOVITRAC_STARTS.isdisjoint(one) for one in junk
+    ), f'an ACK or NACK was believed behind {before.hex(" ")}'
+
+
+_MOVITRAC_ANSWERS: Mapping[str, Callable[[judges.Movitrac], movitrac.Message]] = {
+    'value': lambda one: movitrac.Data(one.number, one.value),
+    'ack': lambda one: movitrac.Ack(),
+    'nack': lambda one: movitrac.Nack(one.number),
+}
+
+
 #: Every decoder of bytes that the driver has.
 LINK_CASES: Mapping[str, Case] = {
     'rtu': _on_a_line(rtu.RtuReader, judges.seal_rtu, judges.rtu_message),
@@ -406,4 +502,5 @@ LINK_CASES: Mapping[str, Case] = {
     'pdu': _messages,
     'identify': _identify,
     'classic': _classic,
+    'movitrac': _movitrac,
 }

@@ -200,3 +200,49 @@ def seal_classic(message: bytes) -> bytes:
     """Return a Classic message with the check sum that it needs, if it needs one."""
     text = message.partition(b'\x02')[2]
     return message + bytes((bcc(text),)) if text else message
+
+
+class Movitrac(NamedTuple):
+    """
+    A frame of the MOVITRAC's protocol, and where in the bytes it stands.
+
+    :ivar kind: ``enquiry``, ``select``, ``value``, ``ack`` or ``nack``.
+    :ivar number: the index, or the return code.
+    """
+
+    begin: int
+    end: int
+    kind: str
+    number: int = 0
+    value: bytes = b''
+
+
+_ANY = rb'(.{2})(.{4})'
+_LONG = rb'(.{2})(.{8})'
+#: What stands before the sum, by kind [M4 §2.1.1]; only addresses that there are.
+_MOVITRAC = (
+    ('enquiry', re.compile(rb'(?s)\xb5[\x00-\x3f](.{2})()')),
+    ('value', re.compile(rb'(?s)\xc8' + _ANY)),
+    ('value', re.compile(rb'(?s)\xac' + _LONG)),
+    ('select', re.compile(rb'(?s)\xa9[\x00-\x3f]' + _ANY)),
+    ('select', re.compile(rb'(?s)\xad[\x00-\x3f]' + _LONG)),
+    ('ack', re.compile(rb'(?s)\xd2()()')),
+    ('nack', re.compile(rb'(?s)\xf3(.)()')),
+)
+#: The bytes with which a frame begins.
+MOVITRAC_STARTS = frozenset(b'\xb5\xc8\xac\xa9\xad\xd2\xf3')
+
+
+def movitrac_frames(stream: bytes) -> Iterator[Movitrac]:
+    """Yield every frame that can be read anywhere in the bytes, with its sum right [C85]."""
+    for begin in range(len(stream)):
+        for kind, shape in _MOVITRAC:
+            match = shape.match(stream, begin)
+            if match and seal_movitrac(match[0]) == stream[begin : match.end() + 1]:
+                number = int.from_bytes(match[1], 'big')
+                yield Movitrac(begin, match.end() + 1, kind, number, match[2])
+
+
+def seal_movitrac(message: bytes) -> bytes:
+    """Return a frame with the sum that it needs."""
+    return message + bytes((sum(message) % 256,))

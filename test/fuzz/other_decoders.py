@@ -32,6 +32,7 @@ from fuzz.mutations import Mutator
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.link import classic
@@ -41,6 +42,7 @@ from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.protocol import Protocol
 
 #: Most bytes that a receiver keeps without a word that something is due.
@@ -155,6 +157,28 @@ def _classic_body(frame: bytes) -> tuple[int, bytes] | None:
     return None
 
 
+#: The value that each kind of request carries to a MOVITRAC, by its start delimiter [M4 §2.1.1].
+_MOVITRAC_VALUES = {0xB5: 0, 0xA9: 4, 0xAD: 8}
+
+
+def _movitrac_request(random: Random) -> bytes:
+    """Return an ENQUIRY, a SELECT or a LONG_SELECT without its sum."""
+    start, size = random.choice(sorted(_MOVITRAC_VALUES.items()))
+    index = random.choice((0, 4, 25, 203, 205, 223, 281, 284, 1001, random.getrandbits(16)))
+    digits = bytes(random.choice((0, 0, 1, 2, 0x25, random.getrandbits(8))) for _ in range(size))
+    return struct.pack('>BBH', start, random.choice((_UNIT, 0, 63)), index) + digits
+
+
+def _movitrac_body(frame: bytes) -> tuple[int, bytes] | None:
+    size = _MOVITRAC_VALUES.get(frame[0])
+    whole = size is not None and len(frame) == 5 + size
+    return (frame[1], frame) if whole and frame == _summed(frame[:-1]) else None
+
+
+def _summed(message: bytes) -> bytes:
+    return message + bytes((sum(message) % 256,))
+
+
 def _seal_tcp(message: bytes) -> bytes:
     return judges.seal_tcp(0x1234, message)
 
@@ -164,13 +188,14 @@ def _receiving(
     request: Callable[[Random], bytes],
     seal: Callable[[bytes], bytes],
     body: Callable[[bytes], tuple[int, bytes] | None],
+    model: str = USUAL,
 ) -> Case:
     """Return the case of a simulated drive that receives: it takes what is whole, and lives on."""
 
     def case(random: Random, frames: int) -> None:
         mutator = Mutator(random)
         protocol = make()
-        drive = simulated_drive()
+        drive = simulated_drive(model)
         receiver = Receiver(protocol, 0.0, _SILENCE)
         now = 0.0
 
@@ -236,4 +261,7 @@ OTHER_CASES: Mapping[str, Case] = {
         lambda: ModbusTcp(0.1), _modbus_request, _seal_tcp, _tcp_body
     ),
     'simulator classic': _receiving(Classic, _classic_request, judges.seal_classic, _classic_body),
+    'simulator movitrac': _receiving(
+        Movitrac, _movitrac_request, _summed, _movitrac_body, 'movitrac31'
+    ),
 }

@@ -22,6 +22,7 @@ from collections.abc import Mapping
 import contextlib
 from dataclasses import dataclass
 import functools
+import itertools
 import json
 import re
 from typing import Any
@@ -52,6 +53,8 @@ Value: TypeAlias = float | int | str | bool
 ANY_BUS = 'control.any_bus'
 #: Little else is on the line, so that it is quick.
 QUIET = ('-p', 'poll_rate:=10', '-p', 'telemetry_rate:=0')
+#: Every write is counted: a drive that has to wait for the processor is not asked twice.
+COUNTED = (*QUIET, '-p', 'response_timeout:=2.0')
 
 #: There are very many calls, so each is looked after more often than usual, s.
 _PERIOD = 0.001
@@ -110,6 +113,10 @@ class Wire:
             for write in self.every_write()
             if (write.register, write.words) not in self._aside
         ]
+
+    def written(self) -> list[Write]:
+        """Return the same, once what a drive was told again that had not answered in time."""
+        return [write for write, _ in itertools.groupby(self.writes())]
 
     def every_write(self) -> list[Write]:
         """Return what arrived since the last call."""

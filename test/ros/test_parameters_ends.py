@@ -23,7 +23,7 @@ import re
 from bench import Bench
 from bench import Client
 from parameter_bench import ANY_BUS
-from parameter_bench import QUIET
+from parameter_bench import COUNTED
 from parameter_bench import Value
 from parameter_bench import Wire
 from parameter_bench import refused
@@ -65,7 +65,7 @@ class Rig:
     def __init__(self, bench: Bench) -> None:
         self.way = bench.way
         self.drive = bench.simulator(paced=False)
-        bench.driver(*QUIET, '-p', 'allow_communication_changes:=true')
+        bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
         self.client: Client = bench.client().connected()
         self.wire = Wire(bench)
         self.wire.writes()

@@ -24,7 +24,7 @@ from bench import Bench
 from bench import Client
 from bench import holds_for
 from bench import wait_until
-from parameter_bench import QUIET
+from parameter_bench import COUNTED
 from parameter_bench import Stubborn
 from parameter_bench import Wire
 from parameter_bench import refused
@@ -58,7 +58,7 @@ def _changes(client: Client, name: str) -> list[Any]:
 
 def test_a_change_at_the_keypad_shows_and_is_told_once(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
-    driver = bench.driver(*QUIET)
+    driver = bench.driver(*COUNTED)
     client = _listening(bench)
     wire = Wire(bench)
     drive.inject('set', 'control.retard', 7.5)
@@ -80,7 +80,7 @@ def test_a_change_at_the_keypad_shows_and_is_told_once(bench: Bench) -> None:
 
 def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
-    bench.driver(*QUIET)
+    bench.driver(*COUNTED)
     client = _listening(bench)
     wire = Wire(bench)
     unchanged = client.call('refresh_parameters')
@@ -115,7 +115,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     memory.put('freque.f_fix1', 2000)
     memory.put('control.accel', 0)
     memory.put('speed.op_mode', 193)
-    driver = bench.driver(*QUIET)
+    driver = bench.driver(*COUNTED)
     client = _listening(bench)
     wire = Wire(bench)
     shown = values(client, 'freque.f_fix1', 'control.accel', 'speed.op_mode')
@@ -150,7 +150,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
 def test_a_code_without_any_meaning_is_told_and_does_no_harm(bench: Bench) -> None:
     stubborn = bench.enter_context(Stubborn(bench))
     stubborn.drive.memory.put('control.auto_start', 7)
-    driver = bench.driver(*QUIET)
+    driver = bench.driver(*COUNTED)
     client = _listening(bench)
     has = client.parameter_names() & set(stubborn.names)
     assert has == set(stubborn.names) - {'control.auto_start'}

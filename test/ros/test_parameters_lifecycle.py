@@ -153,7 +153,7 @@ def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) 
     other = bench.client().connected()
     wire.writes()
     _load(other, dump)
-    assert wire.writes() == [written('control.accel', (6500, 0))]
+    assert wire.written() == [written('control.accel', (6500, 0))]
     assert _dump(other) == dump
 
 
@@ -169,7 +169,7 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
     driver = bench.driver(*QUIET, '--params-file', str(path))
     clients = bench.client('/left').connected(), bench.client('/right').connected()
     wire = Wire(bench)
-    assert sorted(wire.writes()) == sorted([
+    assert sorted(wire.written()) == sorted([
         written('control.retard', (7000, 0), unit=1),
         written('control.accel', (6000, 0), unit=1),
         written('control.retard', (7000, 0), unit=2),
@@ -179,7 +179,7 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
     assert 'there is none of that name' not in driver.text
     assert 'which has none such' not in driver.text
     assert set_one(clients[0], 'control.st_mode', 'Release').successful
-    assert wire.writes() == [written('control.st_mode', (0,), unit=1)]
+    assert wire.written() == [written('control.st_mode', (0,), unit=1)]
     left.inject('set', 'control.run_dly', 3, address=2)
     assert clients[1].call('refresh_parameters').success
     names = [

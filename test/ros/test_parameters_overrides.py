@@ -27,7 +27,7 @@ from bench import holds_for
 from bench import wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
-from parameter_bench import QUIET
+from parameter_bench import COUNTED
 from parameter_bench import Wire
 from parameter_bench import register
 from parameter_bench import says_once
@@ -80,7 +80,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
     drive = bench.simulator(paced=False)
     wire = Wire(bench)
     driver = bench.driver(
-        *QUIET,
+        *COUNTED,
         *_given(
             bench,
             # as people write it: groups, integers for doubles, ON
@@ -139,7 +139,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
 def test_apply_parameters_false_only_reports(bench: Bench) -> None:
     bench.simulator(paced=False)
     driver = bench.driver(
-        *QUIET, *_given(bench, 'apply_parameters: false', 'control.accel: 6', 'motor.u_nom: 400')
+        *COUNTED, *_given(bench, 'apply_parameters: false', 'control.accel: 6', 'motor.u_nom: 400')
     )
     client = bench.client().connected()
     _drifts(client, 'control.accel: 6 -> 5 s')
@@ -157,7 +157,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.auto_start=ON', paced=False)
     drive.wait_for(lambda state: state['turning'], 20.0)
     wire = Wire(bench)
-    driver = bench.driver(*QUIET, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
+    driver = bench.driver(*COUNTED, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
     client = bench.client().connected()
     text = 'not applied from the parameter file: motor.u_nom: only while the motor is stopped'
     if bench.way.dialect == '5.0':
@@ -175,7 +175,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
 
 
 def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -> None:
-    driver = bench.driver(*QUIET, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
+    driver = bench.driver(*COUNTED, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
     wait_until(lambda: bench.way.absent[0] in driver.text, 'there is nobody yet')
     bench.simulator(paced=False)
     client = bench.client().connected()
@@ -190,7 +190,7 @@ def test_communication_settings_need_permission_in_a_file_too(bench: Bench, allo
     bench.simulator(paced=False)
     wire = Wire(bench)
     driver = bench.driver(
-        *QUIET,
+        *COUNTED,
         *_given(
             bench,
             f'allow_communication_changes: {str(allowed).lower()}',

@@ -23,7 +23,7 @@ from typing import Any
 from bench import Bench
 from bench import Client
 from parameter_bench import ANY_BUS
-from parameter_bench import QUIET
+from parameter_bench import COUNTED
 from parameter_bench import Value
 from parameter_bench import Wire
 from parameter_bench import refused
@@ -52,7 +52,7 @@ class Rig:
     def __init__(self, bench: Bench) -> None:
         self.names = tuple(settings(bench.way))
         self.drive = bench.simulator(paced=False)
-        self.driver = bench.driver(*QUIET)
+        self.driver = bench.driver(*COUNTED)
         self.client: Client = bench.client().connected()
         self.wire = Wire(bench)
 
@@ -232,7 +232,7 @@ def test_who_loses_the_drive_by_a_change_of_the_line_is_told_how_to_follow(
     bench: Bench, name: str, value: Value, setting: str
 ) -> None:
     bench.simulator(paced=False)
-    bench.driver(*QUIET, '-p', 'allow_communication_changes:=true')
+    bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
     client = bench.client().connected()
     result = set_one(client, name, value)
     refused(result, name, 'is not known', 'at once: then start this driver with the', setting)

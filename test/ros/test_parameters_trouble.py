@@ -101,7 +101,7 @@ def test_what_was_written_before_a_refusal_is_put_back(
     assert stubborn.parameters() == before
     assert values(client, *stubborn.names) == before
     assert client.parameter('poll_rate') == 10.0
-    assert wire.writes()[-2:] == [
+    assert wire.written()[-2:] == [
         written('control.st_mode', (1,)), written('control.accel', (5000, 0))
     ]
     assert set_one(client, 'control.accel', 6.0).successful, 'the others can be set'
@@ -150,7 +150,7 @@ def test_a_value_that_the_drive_alters_is_put_back(
         set_one(client, 'control.accel', 6.3),
         'control.accel', 'keeps 6 s', '6.3 s was written', '5 s as before',
     )
-    assert wire.writes() == [
+    assert wire.written() == [
         written('control.accel', (6300, 0)), written('control.accel', (5000, 0))
     ]
     assert stubborn.parameters() == before

@@ -36,13 +36,18 @@ _READ_DEVICE = frozenset(
 )
 _ENQUIRY = re.compile(rb'\x04([ -\x7f])E([0-9A-F]{4})\x05', re.DOTALL)
 _SELECT = re.compile(rb'\x04([ -\x7f])\x02(E([0-9A-F]{4})=([0-9A-F]{4})\x03)(.)', re.DOTALL)
+#: ENQUIRY, SELECT and LONG_SELECT: what is between start delimiter and sum [M4 §2.1.1].
+_MOVITRAC = {0xB5: '>BH', 0xA9: '>BH2H', 0xAD: '>BH4H'}
+#: The addresses that a drive may have [M4 §2.3.1].
+_MOVITRACS = range(64)
 
 
 class Request(NamedTuple):
     """
     A read or a write.
 
-    :ivar place: the register or the Classic id of the first word.
+    :ivar place: the register or the Classic id of the first word; the index.
+    :ivar count: how many registers, else 1.
     :ivar words: what is written, ``None`` for a read.
     :ivar source: place and count of what is read in the same transaction as the write.
     """
@@ -62,6 +67,8 @@ def understand(data: bytes, protocol: str) -> Request | None:
     """
     if protocol == 'classic':
         return _of_classic(data)
+    if protocol == 'movitrac':
+        return _of_movitrac(data)
     return _of_message(_message(data, protocol))
 
 
@@ -128,3 +135,15 @@ def _of_classic(data: bytes) -> Request:
     if reduce(xor, match[2]) != match[5][0]:
         raise ValueError('has a wrong BCC')
     return Request(match[1][0] - 0x20, int(match[3], 16), 1, (int(match[4], 16),))
+
+
+def _of_movitrac(data: bytes) -> Request:
+    shape = _MOVITRAC.get(data[0])
+    if shape is None or len(data) != struct.calcsize(shape) + 2:
+        raise ValueError('is neither ENQUIRY nor SELECT')
+    if sum(data[:-1]) % 256 != data[-1]:
+        raise ValueError('has a wrong sum')
+    unit, index, *words = struct.unpack(shape, data[1:-1])
+    if unit not in _MOVITRACS:
+        raise ValueError(f'is for address {unit}')
+    return Request(unit, index, 1, tuple(words) or None)

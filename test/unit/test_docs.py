@@ -157,9 +157,11 @@ def documented(text: str) -> set[str]:
 
 
 def headings(text: str) -> set[str]:
-    """The anchors of a page."""
+    """The anchors of a page; a title that comes again has a number behind it."""
     titles = re.findall(r'^#+ (.+)$', text, re.MULTILINE)
-    return {re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-') for title in titles}
+    plain = [re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-') for title in titles]
+    again = [f'{one}-{plain[:at].count(one)}' for at, one in enumerate(plain) if one in plain[:at]]
+    return {*plain, *again}
 
 
 def links(text: str) -> list[tuple[str, str]]:

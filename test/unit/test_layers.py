@@ -62,7 +62,6 @@ NAMES_FAMILIES = {'families', 'simulator'}
 NAMED = {
     'catalog/page.py': {'control.accel'},
     'cli/options.py': {'control.accel'},
-    'cli/run.py': {'control.mode'},
     'cli/scan.py': {'serial.si_baud'},
     # the default of a public parameter, which the documentation shows
     'node/settings.py': {'sinus_g2'},

@@ -26,6 +26,7 @@ from collections.abc import Sequence
 import contextlib
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import Acknowledge
 from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
 from nfo_sinus_driver.catalog.profile import ControlMethod
@@ -62,7 +63,7 @@ INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
 _MASK = 'fieldbus.drv_ctrl_write_mask'
 _SIO_ERR = 'fieldbus.sio_err'
 
-_HOLDERS: Mapping[int, Holder] = {
+_HOLDERS: Mapping[Value, Holder] = {
     Mode.INHIBIT: Holder.INHIBITED,
     Mode.STOP: Holder.NOBODY,
     Mode.EXT: Holder.LOCAL,

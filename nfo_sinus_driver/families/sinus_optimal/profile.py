@@ -26,6 +26,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
 from nfo_sinus_driver.catalog.profile import Procedure
@@ -50,7 +51,7 @@ from nfo_sinus_driver.families.sinus_optimal.words import Control
 from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 
-_HOLDERS: Mapping[int, Holder] = {
+_HOLDERS: Mapping[Value, Holder] = {
     Mode.MANUAL: Holder.LOCAL,
     Mode.AUTO: Holder.LOCAL,
     Mode.BUS: Holder.BUS,

@@ -43,8 +43,7 @@ from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 #: Counters of 24 bits [C26].
-_SHORT = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
-_24_BITS = 0xFFFFFF
+_COUNTERS = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
 _REFERENCES = frozenset({'status.frq_set', 'status.spd_set', 'status.trq_set', 'status.reg_set'})
 _FLAGS: Mapping[Reason, LineError] = {
     # there are no functions here, only parameters
@@ -85,9 +84,13 @@ class Server(classic.Server):
             raw = self._read(parameter.key)
         except Refused as refused:
             raise Wrong(_FLAGS[refused.reason]) from refused
-        if parameter.key in _SHORT and self._firmware.short_counters:
-            raw &= _24_BITS
-        words = to_words(parameter.at('classic').number.encode(raw))
+        if parameter.key in _COUNTERS:
+            # nobody says whether the drive has more than the 24 bits that count [C26]
+            high = 0xFF if self._firmware.short_counters else 0xFFFF
+            raw = self._drive.read_raw(parameter.key)
+            words: tuple[int, ...] = (raw & 0xFFFF, raw >> 16 & high)
+        else:
+            words = to_words(parameter.at('classic').number.encode(raw))
         if len(words) > 1 and self.tears:
             role, factor = self._drive.model.role_of.get(parameter.key), parameter.factor('classic')
             self.tears -= self._drive.counters.carry(role, float(factor))

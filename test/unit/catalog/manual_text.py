@@ -67,7 +67,7 @@ class Line:
 
 def manual(short: str) -> list[str]:
     """The lines of a manual; the test is skipped where it is not there."""
-    number = {'M0': '000', 'M2': '002'}[short]
+    number = {'M0': '000', 'M2': '002', 'M4': '004'}[short]
     found = sorted((SHARED / 'manuals').glob(f'{number}_*.txt'))
     if not found:
         pytest.skip(f'{short} is not beside this clone')

@@ -56,8 +56,8 @@ def rewrite(path: Path, change: Callable[[list[Row]], object]) -> None:
     """Let a function change the rows of a table."""
     with path.open(encoding='utf-8', newline='') as stream:
         rows = list(csv.DictReader(stream))
-    names = list(rows[0])
     change(rows)
+    names = list(rows[0])
     with path.open('w', encoding='utf-8', newline='') as stream:
         writer = csv.DictWriter(stream, names)
         writer.writeheader()
@@ -113,8 +113,15 @@ def test_every_control_method_has_a_constant_in_the_message(name: str) -> None:
 
 
 def test_unknown_family() -> None:
-    with pytest.raises(ValueError, match="unknown model 'sinus_h': choose one of sinus_g2"):
-        load_family('sinus_h')
+    with pytest.raises(ValueError, match=r"unknown model 'sinus_x': choose one of .*sinus_g2"):
+        load_family('sinus_x')
+
+
+def test_folder_that_would_not_be_installed(folder: Path) -> None:
+    again = folder.rename(folder.with_name('sinus_bare'))
+    (again / '__init__.py').unlink()
+    with pytest.raises(CatalogError, match=r'sinus_bare: no __init__\.py, without which'):
+        load_afresh('sinus_bare')
 
 
 def test_copied_tables_are_as_good(folder: Path) -> None:
@@ -274,3 +281,23 @@ def test_the_catalog_knows_no_family() -> None:
     for path in Path(family.__file__).parent.glob('*.py'):
         text = path.read_text(encoding='utf-8')
         assert {name for name in names | keys if name in text} == set(), path.name
+
+
+@pytest.mark.parametrize(
+    ('steps', 'reason'),
+    [
+        ('0.05', 'not all steps are counts on classic'),
+        ('0.1|20.05:0.5', 'not all steps are counts on classic'),
+        ('0.1:', 'Invalid literal for Fraction'),
+    ],
+)
+def test_steps_that_the_drive_cannot_take(folder: Path, steps: str, reason: str) -> None:
+    def change(rows: list[Row]) -> None:
+        for row in rows:
+            row['steps'] = steps if row['parameter'] == 'control.accel' else ''
+
+    rewrite(folder / PARAMETERS, change)
+    line = line_of(folder / PARAMETERS, 'control.accel')
+    said = refusal()
+    assert said.startswith(f'{NAME}/{PARAMETERS}, line {line}: ')
+    assert reason in said

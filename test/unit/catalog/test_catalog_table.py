@@ -40,6 +40,8 @@ CODECS = {
     'SINT32': 'sint32_ws',
     # of which the upper half is described nowhere [C24]
     'UINT32, low half': 'uint32_ws[0:15]',
+    # of which nobody says what more than these bits have over Classic [C26]
+    'SINT32, 24 bits': 'uint32_ws[0:23]',
 }
 
 #: Written off the manual by hand: key, register, type, unit, value, words on Modbus.
@@ -150,8 +152,8 @@ GOLDEN_CLASSIC = [
     ('status.pf', (0x00DB,), 'SINT16', 0.82, (82,)),
     ('status.dc_link', (0x0014,), 'SINT16', 565.5, (5655,)),
     ('status.frq_act', (0x00B6,), 'SINT16', -0.1, (0xFFFF,)),
-    ('status.op_time', (0x0027, 0x0127), 'SINT32', 12345.6, (0xE240, 1)),
-    ('status.br_time', (0x00DD, 0x00DE), 'SINT32', 65536, (0, 1)),
+    ('status.op_time', (0x0027, 0x0127), 'SINT32, 24 bits', 12345.6, (0xE240, 1)),
+    ('status.br_time', (0x00DD, 0x00DE), 'SINT32, 24 bits', 65536, (0, 1)),
     ('fieldbus.spd_scl_numerator', (0x00E2, 0x00E1), 'SINT32', 1, (1, 0)),
     ('fieldbus.drive_status', (0x007D,), 'UINT16', 0x0337, (0x0337,)),
 ]

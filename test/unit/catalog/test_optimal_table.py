@@ -164,5 +164,7 @@ def test_the_tables_have_the_columns_of_the_others() -> None:
         headers = set()
         for drive in families():
             with (folder / drive / f'{name}.csv').open(encoding='utf-8', newline='') as stream:
-                headers.add(stream.readline())
+                columns = stream.readline().strip().split(',')
+            # these two may be left out
+            headers.add(tuple(one for one in columns if one not in ('steps', 'option')))
         assert len(headers) == 1, name

@@ -31,6 +31,7 @@ import yaml
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
 from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.options import parse
 
 Nfo = Callable[..., Done]
 G2 = load_family('sinus_g2')
@@ -161,6 +162,7 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
         (['info', '--address', '0'], 'address 0: Modbus has 1 to 247'),
         (['info', '--protocol', 'classic', '--address', '95'], 'Classic has 0 to 94'),
         (['scan', '--protocol', 'classic', '--addresses', '90-95'], 'Classic has 0 to 94'),
+        (['info', '--protocol', 'movitrac', '--address', '64'], 'Movitrac has 0 to 63'),
         (['info', '--baud-rate', '300'], 'invalid choice'),
         (['info', '--char-format', '8X1'], '8E1'),
         (['info', '--port', '192.0.2.1:4001'], 'socket://192.0.2.1:4001'),
@@ -192,6 +194,17 @@ def test_scan_finds_who_answers(nfo: Nfo, bench: Bench) -> None:
     assert [row[0] for row in rows[1:]] == ['1', '2']
     assert ' '.join(rows[1]) == '1 19200 8E1 NFO Sinus 1.50/400 4.38 / 4018 NFO1001'
     assert bench.writes() == []
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'first', 'last'),
+    [('modbus_rtu', 1, 247), ('classic', 1, 94), ('movitrac', 0, 63)],
+)
+def test_scan_asks_every_address_that_a_drive_may_have(
+    protocol: str, first: int, last: int
+) -> None:
+    options = parse(['scan', '--protocol', protocol])
+    assert options.addresses == tuple(range(first, last + 1))
 
 
 def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:

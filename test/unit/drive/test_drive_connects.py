@@ -34,7 +34,12 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import drive_state
+from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import LineProtocol
+from nfo_sinus_driver.link import NoAnswer
 
 OVERLOAD = 5
 #: Read registers, and who are you.
@@ -80,6 +85,15 @@ def test_nobody_at_this_address(make_rig: MakeRig) -> None:
     assert hints == sorted(hints)
     assert rig.drive.identity is None
     assert not rig.drive.snapshot.connected
+
+
+@pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
+def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
+    silent = NoAnswer('unit 3 did not answer')
+    first = explain(silent, 3, check=protocol.check)
+    assert first == Report(Cause.NO_RESPONSE, address=3, check=protocol.check)
+    # what has answered once is set right
+    assert explain(silent, 3).cause is Cause.NOT_REACHED
 
 
 def test_rubbish_at_this_address(make_rig: MakeRig) -> None:

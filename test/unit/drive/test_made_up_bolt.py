@@ -45,9 +45,9 @@ from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
-PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ = 11, 12, 100, 102, 400, 402, 403
+PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
 RUN, RESET = 1 << 0, 1 << 3
-RUNNING, TRIPPED, LINE = 1 << 0, 1 << 1, 1 << 2
+RUNNING, TRIPPED, BACKWARDS = 1 << 0, 1 << 1, 1 << 3
 
 
 class Bolt(FarEnd):
@@ -61,6 +61,8 @@ class Bolt(FarEnd):
         self.fault = 0
         #: It goes on as it was told before, whatever is written.
         self.deaf = False
+        #: Its motor is turned the other way.
+        self.backwards = False
         self._demand = 0
 
     @property
@@ -75,8 +77,8 @@ class Bolt(FarEnd):
             registers[HERTZ] = has + max(-self.step, min(self.step, wanted - has))
         runs = (registers[BITS] & RUN or registers[HERTZ]) and not self.fault
         registers[TOLD] = self.fault or (2 if runs else 1)
-        facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault) | LINE * registers[SOURCE]
-        registers[TOLD + 1] = facts
+        facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault)
+        registers[TOLD + 1] = facts | BACKWARDS * self.backwards
 
     def was_written(self, before: dict[int, int]) -> None:
         if self.registers[BITS] & RESET and not before[BITS] & RESET:
@@ -137,32 +139,71 @@ def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: B
     seen = drive.snapshot.status
     assert seen is not None
     assert (seen.code, drive.snapshot.text) == (2, 'Run')
-    assert seen.word == 2 << 16 | RUNNING | LINE
+    assert seen.word == 2 << 16 | RUNNING
     # the code is not published a second time
-    assert seen.shown_word == RUNNING | LINE
+    assert seen.shown_word == RUNNING
     with bolt.lock:
         bolt.reads.clear()
     wait_until(lambda: bolt.reads.count(TOLD) > 20)
     with bolt.lock:
         reads = [number for number in bolt.reads if number in (TOLD, HERTZ)]
+    # it may be in the midst of one when it is begun to be counted
+    reads = reads[reads.index(TOLD) :]
     assert reads[: len(reads) // 2 * 2] == [TOLD, HERTZ] * (len(reads) // 2)
     assert (drive.snapshot.frequency, drive.snapshot.actual) == (40.0, 40.0)
+
+
+def test_the_word_tells_the_sign_of_what_is_measured(bolt: Bolt, bus: Bus) -> None:
+    drive = turning(bolt, bus, Notes())
+    bolt.registers[TURNS] = 1200
+    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (40.0, 1200.0))
+    bolt.backwards = True
+    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (-40.0, -1200.0))
+    # in size it has not changed
+    assert drive.snapshot.status is not None and drive.snapshot.status.keeps_running
+
+
+def test_who_has_control_is_asked_now_and_then(bolt: Bolt, bus: Bus) -> None:
+    notes = Notes()
+    drive = turning(bolt, bus, notes)
+    with bolt.lock:
+        bolt.reads.clear()
+    wait_until(lambda: SOURCE in bolt.reads)
+    wait_until(lambda: bolt.reads.count(SOURCE) > 1)
+    with bolt.lock:
+        asked = [number for number in bolt.reads if number in (TOLD, SOURCE)]
+    first = asked.index(SOURCE)
+    # not with every status
+    assert asked.index(SOURCE, first + 1) - first > 10
+    with bolt.lock:
+        bolt.registers[SOURCE] = 0
+    wait_until(lambda: notes.told(Cause.OTHERS_IN_CONTROL))
+    wait_until(lambda: not drive.snapshot.enabled)
 
 
 def test_a_stop_is_confirmed_by_a_frequency_that_falls(bolt: Bolt, bus: Bus) -> None:
     notes = Notes()
     drive = turning(bolt, bus, notes)
-    bolt.step = 5
-    answer = drive.stop().result(PATIENCE)
-    assert (answer.cause, bolt.hertz > 30) == (Cause.RAMPING, True)
+    bolt.step = 1
+    assert drive.stop().result(PATIENCE).cause is Cause.RAMPING
     seen = drive.inverter.seen
-    assert seen is not None and seen.runs and seen.driven
+    assert seen is not None and seen.runs and seen.driven and seen.frequency > 0
     # all the way down nobody takes it for a motor that runs unasked
+    looks = len(notes.snapshots)
+    wait_until(lambda: len(notes.snapshots) > looks + 50)
+    bolt.step = 100
     wait_until(lambda: drive.snapshot.frequency == 0)
-    bolt.was_read(TOLD)
     assert not notes.told(Cause.RUNS_UNASKED)
     assert drive.snapshot.status is not None and not drive.snapshot.status.driven
     assert drive.stop().result(PATIENCE).cause is Cause.STOPPED
+
+
+def test_a_motor_that_stands_is_not_driven_whatever_the_word_says(bus: Bus) -> None:
+    drive = connected(bus, Notes())
+    drive.enable().result(PATIENCE)
+    seen = drive.read_status().result(PATIENCE)
+    assert seen.runs and seen.frequency == 0
+    assert not seen.driven and not seen.keeps_running
 
 
 def test_a_fall_from_before_the_stop_confirms_nothing(bolt: Bolt, bus: Bus) -> None:
@@ -226,6 +267,7 @@ def test_control_that_is_kept_is_said(bolt: Bolt, bus: Bus) -> None:
 
 
 def test_an_enable_that_is_not_possible_leaves_the_drive_as_it_was(bolt: Bolt, bus: Bus) -> None:
+    bolt.registers[SOURCE] = 1
     drive = connected(bus, Notes())
     bolt.registers[INPUTS] = 1
     begun = len(bolt.writes)

@@ -22,6 +22,7 @@ its direction in another register.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Iterator
 import dataclasses
 import math
@@ -60,6 +61,9 @@ class Acme(FarEnd):
     def __init__(self) -> None:
         super().__init__(dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0))
         self.registers[RAMP] = 50
+        #: What it was told to follow after each write, Hz; what to do after the next one.
+        self.followed: list[float] = []
+        self.then: Callable[[], object] = lambda: None
         self.trip(0)
 
     def trip(self, code: int) -> None:
@@ -89,6 +93,9 @@ class Acme(FarEnd):
         """Reset a fault on the edge, and go on as the control word says."""
         reset = self.registers[WORD] & RESET and not before[WORD] & RESET
         self.trip(0 if reset else self.fault)
+        self.followed.append(self.hertz)
+        then, self.then = self.then, lambda: None
+        then()
 
 
 @pytest.fixture(autouse=True)
@@ -208,6 +215,27 @@ def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) ->
     none = [(SIZE, 0), (SIZE + 1, 0)]
     assert acme.writes[begun:] == [*none, *none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
     wait_until(lambda: drive.snapshot.setpoint == 30.0)
+
+
+def test_no_size_is_followed_in_the_other_direction(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    wanted = [35.0, -12.5, -50.0, 50.0, 0.0, -1.0, 0.0, 1.0, -0.01, 400.0, -400.0]
+    for before, value in zip([-20.0, *wanted], wanted, strict=False):
+        acme.followed.clear()
+        drive.set_setpoint(value)
+        wait_until(lambda value=value: acme.hertz == drive.snapshot.setpoint == value)
+        assert set(acme.followed) <= {before, 0.0, value}, value
+
+
+def test_a_newer_set_point_comes_between_the_writes_of_one(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    begun = len(acme.writes)
+    # when the size of -20 Hz is none, it is asked for once more, instead of 30 Hz
+    acme.then = lambda: drive.set_setpoint(-20.0)
+    drive.set_setpoint(30.0)
+    wait_until(lambda: len(acme.writes) == begun + 4)
+    assert acme.writes[begun:] == [(SIZE, 0), (SIZE + 1, 0), (SIZE, 0), (SIZE + 1, 0x2000)]
+    assert acme.hertz == -20.0
 
 
 def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:

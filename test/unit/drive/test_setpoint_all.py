@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
+import dataclasses
 from typing import Any
 
 from line_rig import LineRig
@@ -26,6 +27,7 @@ import pytest
 from support.said import Said
 from support.said import said
 
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.setpoint_all import SetpointAll
 from nfo_sinus_driver.drive.setpoint_all import Told
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -260,6 +262,27 @@ def test_it_is_refused_as_long_as_one_drive_is_not_enabled(make: MakeConveyor) -
     conveyor.keep(20.0)
     conveyor.rig.pass_time(2.0)
     assert conveyor.frequencies == [20.0] * 4
+
+
+@pytest.mark.parametrize(
+    'change', [{'at': '', 'key': 'fieldbus.scmd'}, {'forward_only': True}], ids=['place', 'range']
+)
+def test_it_is_refused_where_it_would_not_be_written_alike(
+    make: MakeConveyor, monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]
+) -> None:
+    # what only drives of different families could do, which no line of Classic has yet
+    conveyor = make(2, enable=False)
+    conveyor.rig.enable(1)
+    family = load_family('sinus_g2')
+    target = dataclasses.replace(family.profile.setpoints['Freque'], **change)
+    setpoints = {**family.profile.setpoints, 'Freque': target}
+    other = dataclasses.replace(family.profile, setpoints=setpoints)
+    monkeypatch.setitem(family.__dict__, 'profile', other)
+    conveyor.rig.enable(2)
+    conveyor.keep(20.0)
+    conveyor.rig.pass_time(1.0)
+    assert conveyor.refused == 'it would not be written alike to all drives (drive1 and drive2)'
+    assert conveyor.calls == []
 
 
 def test_it_is_refused_where_it_would_not_mean_the_same(make: MakeConveyor) -> None:

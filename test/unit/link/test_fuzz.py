@@ -27,6 +27,7 @@ import pytest
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link import modbus_ascii
 from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import rtu
 
 #: Fixed, so that every run goes through the same.
@@ -79,6 +80,16 @@ def test_a_wrong_block_check_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 'not among the bytes' in _find('classic')[0].what
 
 
+def test_a_wrong_sum_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(movitrac, 'check_sum', lambda body: AnyBytes())
+    assert 'from a damaged frame' in _find('movitrac')[0].what
+
+
+def test_an_ack_behind_remains_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(movitrac, 'is_glitch', lambda junk: True)
+    assert 'was believed behind' in _find('movitrac')[0].what
+
+
 def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def understand(request: modbus_pdu.Request[object], message: bytes) -> object:
         return request.decode(message) if message.startswith(request.answer_head) else None
@@ -91,6 +102,14 @@ def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) 
     feed = classic.Reader.feed
     monkeypatch.setattr(classic.Reader, 'feed', lambda self, data: feed(self, data)[:1])
     assert 'was not found' in _find('classic')[0].what
+    feed_one = movitrac.Reader.feed
+
+    def feed_seldom(reader: movitrac.Reader, data: bytes) -> movitrac.Answer | None:
+        answer = feed_one(reader, data)
+        return None if isinstance(answer, movitrac.Data) else answer
+
+    monkeypatch.setattr(movitrac.Reader, 'feed', feed_seldom)
+    assert 'was not found' in _find('movitrac')[0].what
 
 
 def test_memory_that_grows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import classic_link
+from nfo_sinus_driver.link import movitrac_link
 from nfo_sinus_driver.link.late_replies import LATEST_REPLY
 from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
 from nfo_sinus_driver.link.late_replies import Doubt
@@ -106,6 +107,20 @@ def test_a_quarantine_lasts_until_the_latest_reply_or_any_certain_one() -> None:
     assert late.quarantined(2, nearly + 0.002) == set()
     late.release(UNIT)
     assert late.quarantined(UNIT, nearly + 0.002) == set()
+
+
+def test_a_reply_that_names_no_unit_may_be_of_another() -> None:
+    late = make()
+    late.expect(Ask('A', 2), NOW)
+    assert late.may_be_of_another(1, 'A', NOW) and late.may_be_of_another(1, 'no A', NOW)
+    assert not late.may_be_of_another(1, 'B', NOW)
+    assert not late.may_be_of_another(2, 'A', NOW), 'that is what it was asked itself'
+    # what the one asked replies says nothing of the other
+    late.release(1)
+    assert late.may_be_of_another(1, 'A', NOW)
+    assert not late.may_be_of_another(1, 'A', NOW + LATEST_REPLY * TIMEOUT)
+    late.release(2)
+    assert not late.may_be_of_another(1, 'A', NOW)
 
 
 def test_a_question_is_certain_when_each_of_its_replies_is() -> None:
@@ -201,4 +216,12 @@ def test_what_is_asked_over_classic_is_in_the_table_of_every_firmware_and_does_n
             and parameter.at('classic').numbers == (number,)
         )
         assert parameter.since is None
+        assert parameter.access in (Access.READ, Access.READ_WRITE)
+
+
+def test_what_is_asked_of_a_movitrac_is_in_its_table_and_does_nothing() -> None:
+    rows = load_family('movitrac31').values()
+    for index in movitrac_link._EVERYWHERE:
+        (parameter,) = (row for row in rows if row.at('movitrac').index == index)
+        assert parameter.option == '', 'every drive has it'
         assert parameter.access in (Access.READ, Access.READ_WRITE)

@@ -21,6 +21,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
@@ -32,11 +33,22 @@ from nfo_sinus_driver.link.interface import LineSettings
 
 EVERY = pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
 PORTS = {'modbus_tcp': 'gateway:502'}
+#: What each protocol reaches, of every family.
+ROWS = {
+    protocol.name: [
+        row
+        for family in families()
+        for row in load_family(family).values()
+        if protocol.addressing in row.addresses
+    ]
+    for protocol in PROTOCOLS.values()
+}
 
 
 def open_with(protocol: str, char_format: str) -> None:
     """Make the link that speaks a protocol on a line that is set so."""
-    open_link(protocol, PORTS.get(protocol, '/dev/x'), LineSettings(char_format=char_format))
+    line = line_settings(protocol, char_format=char_format)
+    open_link(protocol, PORTS.get(protocol, '/dev/x'), line)
 
 
 @EVERY
@@ -48,8 +60,7 @@ def test_a_link_says_what_it_speaks(protocol: LineProtocol) -> None:
 
 @EVERY
 def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProtocol) -> None:
-    rows = load_family('sinus_g2').values()
-    assert any(protocol.addressing in row.addresses for row in rows)
+    assert ROWS[protocol.name]
     assert protocol.broadcast not in protocol.units
     assert protocol.point_to_point in (None, protocol.units[0])
 
@@ -58,21 +69,19 @@ def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProto
 def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol) -> None:
     port = PORTS.get(protocol.name, '/dev/x')
     link = open_link(protocol.name, port, line_settings(protocol.name))
-    for row in load_family('sinus_g2').values():
-        if protocol.addressing in row.addresses:
-            place = row.at(protocol.addressing)
-            address = Address(*place.place)
-            parts = link.parts(address)
-            assert sum(part.size for part in parts) == address.size == place.codec.size
-            assert all(link.parts(part) == (part,) for part in parts), 'each is one transaction'
-            # a gateway and Modbus read registers that belong together at once
-            assert parts == (address,) or protocol.name == 'classic'
+    for row in ROWS[protocol.name]:
+        place = row.at(protocol.addressing)
+        address = Address(*place.place)
+        parts = link.parts(address)
+        assert sum(part.size for part in parts) == address.size == place.codec.size
+        assert all(link.parts(part) == (part,) for part in parts), 'each is one transaction'
+        # all but Classic read what belongs together at once
+        assert parts == (address,) or protocol.name == 'classic'
 
 
 @given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
 def test_addresses(protocol: LineProtocol, address: int) -> None:
-    highest = 94 if protocol.name == 'classic' else 247
-    lowest = 0 if protocol.name == 'classic' else 1
+    lowest, highest = {'classic': (0, 94), 'movitrac': (0, 63)}.get(protocol.name, (1, 247))
     if lowest <= address <= highest:
         protocol.require_unit(address)
     else:
@@ -104,6 +113,16 @@ def test_classic_has_the_formats_of_its_firmwares(format_: str) -> None:
             open_with('classic', format_)
 
 
+@given(st.sampled_from(list(PROTOCOLS)), st.sampled_from(BAUD_RATES))
+def test_baud_rates(protocol: str, baud_rate: int) -> None:
+    line = line_settings(protocol, baud_rate=baud_rate)
+    if protocol != 'movitrac' or baud_rate == 9600:
+        open_link(protocol, PORTS.get(protocol, '/dev/x'), line)
+    else:
+        with pytest.raises(ValueError, match=f'^baud_rate {baud_rate}: movitrac has 9600$'):
+            open_link(protocol, '/dev/x', line)
+
+
 @given(FORMATS)
 def test_the_line_of_a_gateway_is_the_gateways(format_: str) -> None:
     open_with('modbus_tcp', format_)
@@ -111,10 +130,15 @@ def test_the_line_of_a_gateway_is_the_gateways(format_: str) -> None:
 
 @pytest.mark.parametrize(
     ('protocol', 'baud_rate', 'char_format'),
-    [('modbus_rtu', 19200, '8E1'), ('modbus_ascii', 19200, '7E1'), ('classic', 9600, '7E1')],
+    [
+        ('modbus_rtu', 19200, '8E1'),
+        ('modbus_ascii', 19200, '7E1'),
+        ('classic', 9600, '7E1'),
+        ('movitrac', 9600, '8N1'),
+    ],
 )
 def test_factory_settings(protocol: str, baud_rate: int, char_format: str) -> None:
-    # [M0 §6.2.2], [M0 §6.1.2], [C6]
+    # [M0 §6.2.2], [M0 §6.1.2], [C6], [M4 §2.3.3]
     line = line_settings(protocol)
     assert (line.baud_rate, line.char_format) == (baud_rate, char_format)
     open_link(protocol, '/dev/x', line)

@@ -29,7 +29,9 @@ from unittest import mock
 import pymodbus_opinion as opinion
 
 from nfo_sinus_driver.link import classic_link
+from nfo_sinus_driver.link import movitrac_link
 from nfo_sinus_driver.link import serial_link
+from nfo_sinus_driver.link import silence
 from nfo_sinus_driver.link.interface import LineSettings
 
 #: More looks at the clock than any honest transaction takes: the link hangs.
@@ -77,7 +79,7 @@ class Wire:
         """Let the link see this clock."""
         clock = SimpleNamespace(monotonic=self.monotonic)
         with contextlib.ExitStack() as stack:
-            for module in (serial_link, classic_link):
+            for module in (serial_link, classic_link, movitrac_link, silence):
                 stack.enter_context(mock.patch.object(module, 'time', clock))
             yield
 

@@ -15,7 +15,8 @@
 """
 How a Bolt is commanded: function bits, the size of a frequency, and a source that is stored.
 
-All of its status is one word, the code included, which says that the motor runs until it stands.
+All of its status is one word, the code included, which says that the motor runs until it stands,
+and nothing of who has control.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from collections.abc import Sequence
 import enum
 import math
 
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
 from nfo_sinus_driver.catalog.profile import NotPossible
@@ -45,6 +47,7 @@ from nfo_sinus_driver.catalog.status import StatusWord
 
 _BITS, _SIZE, _SOURCE, _INPUTS = 'bus.bits', 'bus.size', 'bus.source', 'bus.inputs'
 _TOLD = 'bus.told'
+_HOLDERS: Mapping[Value, Holder] = {'terminals': Holder.LOCAL, 'line': Holder.BUS}
 
 
 class Bit(enum.IntFlag):
@@ -59,7 +62,7 @@ class Told(enum.IntFlag):
 
     RUNNING = 1 << 0
     TRIPPED = 1 << 1
-    LINE = 1 << 2
+    BACKWARDS = 1 << 3
 
 
 class Frequency(SetpointTarget):
@@ -88,11 +91,11 @@ class FunctionBits(ControlMethod):
 
     def in_control(self) -> Steps[bool]:
         """Tell whether the line has control."""
-        return bool(int((yield Read(_TOLD))) & Told.LINE)
+        return (yield from self.holder()) is Holder.BUS
 
     def holder(self) -> Steps[Holder]:
         """Tell who has control."""
-        return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
+        return _HOLDERS[(yield Read(_SOURCE))]
 
     def require_startable(self) -> Steps[None]:
         """See to it that no terminal would start the motor."""
@@ -153,14 +156,15 @@ PROFILE = Profile(
         by_bit={
             Told.RUNNING: Fact.OPERATION_ENABLED,
             Told.TRIPPED: Fact.FAULT,
-            Told.LINE: Fact.NETWORK_CONTROL,
+            Told.BACKWARDS: Fact.REVERSE,
         },
         by_state={},
         code=lambda word: word >> 16,
         shown=0xFFFF,
         by_frequency=True,
+        tells_sign=True,
     ),
-    holders={},
+    holders=_HOLDERS,
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _FREQUENCY},
     in_charge=_in_charge,

@@ -1,0 +1,373 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The protocol of SEW's MOVITRAC 31.. over one serial line: no belief in a doubtful answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import time
+
+from nfo_sinus_driver.link import movitrac
+from nfo_sinus_driver.link import movitrac_refusal
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NothingToAsk
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.movitrac import Answer
+from nfo_sinus_driver.link.movitrac import Data
+from nfo_sinus_driver.link.movitrac import Enquiry
+from nfo_sinus_driver.link.movitrac import Kind
+from nfo_sinus_driver.link.movitrac import Nack
+from nfo_sinus_driver.link.movitrac import Reader
+from nfo_sinus_driver.link.movitrac import Request
+from nfo_sinus_driver.link.movitrac import Select
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.serial_link import Echo
+from nfo_sinus_driver.link.silence import NEVER_SILENT
+from nfo_sinus_driver.link.silence import await_silence
+
+#: How much later than at once a drive may be told to answer (P843), s.
+LONGEST_RESPONSE_TIME = 0.2
+#: Pauses within an answer, s: 10 ms of the drive [M4 §2.4.2], and what a USB adapter holds back.
+_INTER_BYTE_TIMEOUT = 0.03
+#: Silence between two frames, in characters: the manual wants none, but the drive has to let go of
+#: the two wires before it can see a start delimiter.
+_GAP = 2
+#: How long a write waits at least for a line that is not silent, s.
+_WRITE_WAIT = 0.02
+#: The least that an answer takes, s; less is a line without speed.
+_AT_ONCE = 0.001
+#: What every drive has and may be read at any time: its address (P842), its response time (P843),
+#: frequency and heat sink temperature. With four of them one is always certain, see LateReplies.
+_EVERYWHERE = (206, 207, 0, 4)
+
+
+class _Ambiguous(DamagedAnswer):
+    """An ACK or NACK came that may belong to an earlier request."""
+
+
+class MovitracLink:
+    """
+    A master of the MOVITRAC's protocol on one line.
+
+    A DATA names its index, ACK and NACK name nothing, and no answer names its drive. So whenever
+    an answer is missing or damaged, or bytes come that nobody asked for, the kinds of answers that
+    may still come from that drive are in quarantine (:class:`LateReplies`). One of these kinds is
+    only read after the drive has answered something else. A write is never kept waiting, for it
+    may be a stop; but if its answer is in quarantine it is not believed: the line is cleared by
+    reading something, and :class:`DamagedAnswer` says that nobody knows.
+
+    Where the late answer may be *another* drive's, or be the one before told twice, the line is
+    listened to for as long as the right answer may take; if anything more comes, nothing is
+    believed. So a drive that is dead costs its neighbours no transaction.
+
+    Drives may be set to answer up to 0.2 s late (P843). Nobody has to say so: the first request,
+    and each after a failure, is waited for so much longer than ``response_timeout``, any other as
+    much longer as the drive has taken of late.
+
+    An adapter that echoes what is sent is noticed at the first request; from then on an answer
+    counts only behind the echo.
+
+    What is promised: no value of another index is taken, no answer of the drive up to three
+    time-outs late to a question asked before, no ACK of another write to it. Not told apart is a
+    late answer of another drive just when the right one is lost, and one that is told twice, the
+    second time when the right one may be on its way, but does not come. There is no parity, and
+    the check is a sum: choose short wires.
+    """
+
+    #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
+    protocol = LineProtocol(
+        name='movitrac',
+        addressing='movitrac',
+        units=movitrac.UNITS,
+        baud_rate=9600,
+        char_format='8N1',
+        baud_rates=(9600,),
+        char_formats=('8N1',),
+        check='power, the interface (USS 11A or UST 11A on X4, or terminals 67/68 of the option '
+        'on X20), master-slave operation off (P880 = No), the address (P842), A and B of the '
+        'wires, 9600 bit/s 8N1 in a device server',
+    )
+
+    def __init__(self, port: Port, settings: LineSettings) -> None:
+        self._port = port
+        self._settings = settings
+        self._late: LateReplies[Request, Kind] = LateReplies(
+            settings.response_timeout, movitrac.kinds
+        )
+        self._echo = Echo()
+        #: The frame of the last answer, if the last request had one.
+        self._last = b''
+        #: When the last byte was on the line, as far as we know.
+        self._line_end = 0.0
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> MovitracLink:
+        """Return the link on a port; a ValueError says what is no port."""
+        return cls(port_of(port, settings), settings)
+
+    def open(self) -> None:
+        """Open the port."""
+        self._port.open()
+        self._line_end = time.monotonic()
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        self._port.close()
+        self._late.clear()
+        self._echo = Echo()
+        self._last = b''
+
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """Take parameters that are safe to read; here those are asked that every drive has."""
+
+    def parts(self, address: Address) -> tuple[Address]:
+        """Return the whole: a frame carries all of a value."""
+        return (address,)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter, of 4 or of 8 bytes."""
+        answer, arrived = self._enquire(Enquiry(unit, address.index))
+        if isinstance(answer, Nack):
+            raise movitrac_refusal.refusal(answer.code)
+        assert isinstance(answer, Data)
+        if len(answer.value) != address.size:
+            came = f'a value of {len(answer.value)} bytes came instead of {address.size}'
+            raise DamagedAnswer(f'unit {unit}, index {address.index}: {came}')
+        return Reply(answer.value, arrived)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """
+        Write one parameter, of 4 or of 8 bytes.
+
+        A drive that says by NACK that it has started a factory setting, or keeps the value only
+        until it is switched off, has done it [C81].
+        """
+        request = Select(unit, address.index, data)
+        self._await_gap(is_write=True)
+        try:
+            answer, arrived = self._transact(request)
+        except _Ambiguous:
+            # not after mere noise: a stop that is given again would only have to wait for it
+            self._settle(unit)
+            raise
+        if isinstance(answer, Nack) and answer.code not in movitrac_refusal.DONE:
+            raise movitrac_refusal.refusal(answer.code)
+        return Reply(b'', arrived)
+
+    def write_and_read(
+        self, unit: int, address: Address, data: bytes, source: Address
+    ) -> Reply:
+        """Write one parameter, then read another; in as many transactions as that takes."""
+        self.write(unit, address, data)
+        return self.read(unit, source)
+
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, data: bytes
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        self._await_gap(is_write=True)
+        try:
+            with contextlib.suppress(NoAnswer, DamagedAnswer):
+                self._transact(Enquiry(unit, source.index))
+            return self.write(unit, address, data)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
+
+    def identify(self, unit: int) -> NothingToAsk:
+        """Return no questions: the protocol has none but for parameters."""
+        return NothingToAsk()
+
+    # --- belief -----------------------------------------------------------------------------------
+
+    def _enquire(self, request: Enquiry) -> tuple[Answer, float]:
+        """
+        Return the answer to a question that is not in quarantine, if need be after another one.
+
+        :raises NotReady: everything that could be asked first is in quarantine, too.
+        """
+        self._await_gap()
+        certain = self._first_certain(request, *self._resync_reads(request.unit))
+        if certain is not request:
+            self._resync_read(certain)
+            self._await_gap()
+        try:
+            return self._transact(request)
+        except LinkError as error:
+            error.heard = certain is not request
+            raise
+
+    def _resync_read(self, request: Enquiry) -> None:
+        """Have the unit answer; whatever it says, what was late has come before it."""
+        try:
+            self._transact(request)
+        except LinkError as error:
+            # nobody has heard the request for which it was asked
+            error.maybe_done = False
+            raise
+
+    def _settle(self, unit: int) -> None:
+        """Read something, so that the next answer is believed again; if not, then not."""
+        try:
+            self._await_gap()
+            self._transact(self._first_certain(*self._resync_reads(unit)))
+        except PortError:
+            raise
+        except LinkError:
+            return
+
+    def _resync_reads(self, unit: int) -> Iterator[Enquiry]:
+        return (Enquiry(unit, index) for index in _EVERYWHERE)
+
+    def _first_certain(self, *requests: Enquiry) -> Enquiry:
+        questions = ((request, (request.index,)) for request in requests)
+        return self._late.first_certain(requests[0].unit, questions, time.monotonic())
+
+    def _response_time(self, unit: int) -> float:
+        """Return how much later than at once a drive may answer, s."""
+        longest = self._late.longest(unit)
+        unsettled = bool(self._late.quarantined(unit, time.monotonic()))
+        return LONGEST_RESPONSE_TIME if unsettled or not longest else longest
+
+    def _is_doubtful(self, request: Request, answer: Answer, arrived: float, sent: float) -> bool:
+        """Tell whether an answer may be another unit's, late, or the one before, told twice."""
+        frame = movitrac.encode(answer)
+        # a character less, for no clock is exact
+        soonest = sent + (len(frame) - 1) * self._settings.char_time
+        return (frame == self._last and arrived < soonest) or self._late.may_be_of_another(
+            request.unit, movitrac.kind(answer), arrived
+        )
+
+    def _listen(self, request: Request, until: float) -> None:
+        """
+        Wait as long as the right answer may take, if this was none.
+
+        :raises DamagedAnswer: it came.
+        """
+        while (now := time.monotonic()) < until:
+            if self._port.read(until):
+                self._line_end = max(self._line_end, now)
+                raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')
+
+    def _await_gap(self, *, is_write: bool = False) -> None:
+        """
+        Wait for a gap of silence, so that the drives hear the request; take what came unasked.
+
+        A write may be a stop, and the noise may be on our side of the line alone: rather than not
+        at all it is sent into it, as soon as no answer that began before can still be coming.
+
+        :raises NeverSilent: there is none.
+        """
+        gap = _GAP * self._settings.char_time
+        longest = movitrac.LONGEST_ANSWER * self._settings.char_time
+        wait = max(_WRITE_WAIT, longest) if is_write else self._settings.response_timeout
+        data, self._line_end, silent = await_silence(self._port, self._line_end, gap, wait)
+        self._heard_unasked(data)
+        if not silent and not is_write:
+            raise NeverSilent(NEVER_SILENT)
+
+    def _heard_unasked(self, data: bytes) -> None:
+        """Take note of bytes that nobody asked for, unless switching a transmitter makes them."""
+        if not movitrac.is_glitch(data):
+            self._late.heard_unasked(time.monotonic())
+
+    # --- one transaction --------------------------------------------------------------------------
+
+    def _transact(self, request: Request) -> tuple[Answer, float]:
+        """Return the answer to a request, and when its last byte came."""
+        unit, char_time = request.unit, self._settings.char_time
+        frame = movitrac.encode(request)
+        response_time = self._response_time(unit)
+        self._late.sent(request)
+        self._echo.sent(frame)
+        sent = time.monotonic() + len(frame) * char_time
+        self._line_end = sent
+        self._port.write(frame)
+        reader = Reader(request)
+        try:
+            answer, arrived = self._receive(request, reader, sent + response_time)
+            length = len(reader.frame) * char_time
+            if self._is_doubtful(request, answer, arrived, sent):
+                self._listen(request, sent + response_time + length)
+        except (NoAnswer, DamagedAnswer):
+            self._late.expect(request, time.monotonic())
+            self._last = b''
+            raise
+        finally:
+            if frame in reader.other:
+                self._echo.present = True
+        # units answer in order: whatever was still to come from it has come before this
+        self._late.release(unit)
+        self._late.took(unit, max(_AT_ONCE, arrived - sent - length))
+        self._last = reader.frame
+        # and the request has left, even where the port is faster than its settings say
+        self._line_end = arrived
+        self._heard_unasked(reader.rest)
+        return answer, arrived
+
+    def _receive(
+        self, request: Request, reader: Reader, due: float
+    ) -> tuple[Answer, float]:
+        """
+        Return the answer, and when it came.
+
+        :param due: when it begins at last, if the drive is as fast as it can be.
+        """
+        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        longest = movitrac.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
+        deadline = due + self._settings.response_timeout
+        # one answer, and as much rubbish again, however long somebody keeps talking
+        last_chance = deadline + 2 * longest
+        while True:
+            data = self._port.read(deadline)
+            now = time.monotonic()
+            if not data:
+                if now < deadline:
+                    continue
+                break
+            self._line_end = max(self._line_end, now)
+            data = self._echo.strip(data)
+            while (answer := reader.feed(data)) is not None:
+                if movitrac.kind(answer) not in quarantined:
+                    return answer, now
+                if isinstance(request, Select):
+                    raise _Ambiguous(
+                        f'unit {request.unit} answered, but perhaps to an earlier request'
+                    )
+                data = b''
+            deadline = min(max(deadline, now + longest), last_chance)
+        held = self._echo.give_up()
+        if held:
+            # an adapter that echoes no more; if it does, the next echo will tell
+            self._echo.present = False
+        came = len(held) + len(reader.frame + reader.other)
+        if held or reader.frame or reader.other not in (b'', movitrac.encode(request)):
+            raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
+        raise NoAnswer(f'unit {request.unit} did not answer')

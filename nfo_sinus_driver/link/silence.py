@@ -1,0 +1,61 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The silence that has to be on a line before the next frame."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+from nfo_sinus_driver.link.port import Port
+
+#: What is wrong where there is none.
+NEVER_SILENT = 'the line is never silent: noise, or another master on it'
+
+
+class Heard(NamedTuple):
+    """
+    What came while silence was waited for.
+
+    :ivar data: all bytes; nobody asked for them.
+    :ivar line_end: when the last byte was on the line.
+    :ivar silent: silence came, too.
+    """
+
+    data: bytes
+    line_end: float
+    silent: bool
+
+
+def await_silence(port: Port, line_end: float, gap: float, wait: float) -> Heard:
+    """
+    Wait for silence on a line; all times are in seconds.
+
+    :param line_end: when the last byte was on the line, as far as is known.
+    :param gap: how long the silence has to last.
+    :param wait: how much longer than that it is waited for.
+    """
+    give_up = max(line_end + gap, time.monotonic()) + wait
+    came = b''
+    while True:
+        data = port.read(line_end + gap)
+        now = time.monotonic()
+        if data:
+            came += data
+            line_end = max(line_end, now)
+            if now > give_up:
+                return Heard(came, line_end, silent=False)
+        elif now >= line_end + gap:
+            return Heard(came, line_end, silent=True)

@@ -1,0 +1,47 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The option cards of a MOVITRAC 31.., as the drive tells of them [M4 §1]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+#: What stands for "none" in a place for a card.
+_NONE = 9
+#: The cards, by the half-bytes of the places X20 and X21 (indices 237 and 284).
+_PLACES: Mapping[str, tuple[int, int]] = {
+    'none': (_NONE, _NONE),
+    'fea': (1, _NONE),
+    'fio': (5, _NONE),
+    'ffi': (2, _NONE),
+    'ffp': (2, _NONE),
+    'fen': (_NONE, 1),
+    'fpi': (_NONE, 3),
+}
+CARDS = tuple(_PLACES)
+
+
+def places(card: str) -> tuple[int, int]:
+    """Return what the drive tells of the places X20 and X21."""
+    return _PLACES[card]
+
+
+def suffices(card: str, needed: str) -> bool:
+    """
+    Tell whether a parameter is there with a card.
+
+    :param needed: the cards of which it needs one, as the tables name them; empty: none.
+    """
+    return not needed or card.upper() in needed.split(' or ')

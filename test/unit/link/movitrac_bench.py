@@ -1,0 +1,80 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The link of the MOVITRAC's protocol on a line in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from movitrac_far_end import FarEnd
+from movitrac_far_end import Fate
+from virtual_wire import Wire
+
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.movitrac_link import MovitracLink
+
+TIMEOUT = 0.2
+SETTINGS = LineSettings(baud_rate=9600, char_format='8N1', response_timeout=TIMEOUT)
+CHAR = SETTINGS.char_time
+UNIT = 1
+#: What the link asks where it has to be certain, the first first.
+RESYNC = 206
+VALUE = bytes.fromhex('00000370')
+
+_T = TypeVar('_T')
+
+
+def at(index: int, size: int = 4) -> Address:
+    """Return the address of a parameter."""
+    return Address('index', index, None, size)
+
+
+A = at(0x19)
+B = at(0x11C)
+LONG = at(0x107, 8)
+
+
+class Bench:
+    """A link on a virtual line; everything done with it happens in virtual time."""
+
+    def __init__(self, *fates: Fate, settings: LineSettings = SETTINGS) -> None:
+        self.wire = Wire(settings)
+        self.wire.gap = 2 * settings.char_time
+        self.drive = FarEnd(self.wire, iter(fates))
+        self.drive.sizes[LONG.index] = 8
+        self.link = MovitracLink(self.wire, settings)
+        self.do(self.link.open)
+
+    def do(self, action: Callable[[], _T]) -> _T:
+        with self.wire.time():
+            return action()
+
+    def read(self, address: Address, unit: int = UNIT) -> Reply:
+        return self.do(lambda: self.link.read(unit, address))
+
+    def write(self, address: Address, value: bytes = VALUE, unit: int = UNIT) -> Reply:
+        return self.do(lambda: self.link.write(unit, address, value))
+
+    @property
+    def asked(self) -> list[int]:
+        """The parameters of all requests so far."""
+        return [index for _, index, _, _ in self.drive.requests]
+
+    def answer_of(self, number: int) -> bytes:
+        """What the drive says to the request with this number."""
+        return self.drive.value(self.asked[number], number)

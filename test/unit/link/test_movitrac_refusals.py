@@ -1,0 +1,121 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The 34 return codes of the MOVITRAC: each with its meaning and what to do about it."""
+
+from __future__ import annotations
+
+from movitrac_bench import RESYNC
+from movitrac_bench import A
+from movitrac_bench import Bench
+from movitrac_far_end import Fate
+import pytest
+
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.movitrac_refusal import DONE
+from nfo_sinus_driver.link.movitrac_refusal import REFUSALS
+from nfo_sinus_driver.link.movitrac_refusal import refusal
+
+#: Words of the manual's table [M4 §2.1.2], and what a program makes of each code.
+MANUAL = {
+    0x10: ('illegal index', 'no parameter'),
+    0x11: ('not implemented', 'no parameter'),
+    0x12: ('read access only', 'no parameter'),
+    0x13: ('parameter lock (P800) active', 'state'),
+    0x14: ('factory setting (P830) running', 'busy'),
+    0x15: ('too large', 'value'),
+    0x16: ('too small', 'value'),
+    0x17: ('option pcb', 'no parameter'),
+    0x18: ('fault in system software', 'state'),
+    0x19: ('via this serial interface', 'state'),
+    0x1A: ('speed control (P770) active', 'state'),
+    0x1B: ('unauthorized access', 'state'),
+    0x1C: ('output stage is not inhibited', 'state'),
+    0x1D: ('invalid parameter value', 'value'),
+    0x22: ('4Q operation 1 (P890) required', 'state'),
+    0x23: ('4Q operation 2 (P891) required', 'state'),
+    0x24: ('DC braking 1 (P730) active', 'state'),
+    0x25: ('DC braking 2 (P733) active', 'state'),
+    0x26: ('hoist function set 1 (P710) active', 'state'),
+    0x27: ('hoist function set 2 (P712) active', 'state'),
+    0x29: ('via this serial interface', 'state'),
+    0x2A: ('speed control (P770) inactive', 'state'),
+    0x2B: ('controller inhibit required', 'state'),
+    0x2C: ('motor size-up 1 (P328) and rapid start 1 (P720)', 'state'),
+    0x2D: ('motor size-up 2 (P348) and rapid start 2 (P723)', 'state'),
+    0x2E: ('option pcb', 'no parameter'),
+    0x2F: ('4Q operation 1 (P890) and DC braking 1 (P730)', 'state'),
+    0x30: ('4Q operation 2 (P891) and DC braking 2 (P733)', 'state'),
+    0x31: ('controller inhibit active', 'state'),
+    0x32: ('synchronous operation control (P760) inactive', 'state'),
+    0x33: ('slave of the synchronous operation control (P761)', 'state'),
+    0x34: ('illegal message type', 'no function'),
+}
+KINDS = {
+    'no parameter': Refused.ILLEGAL_ADDRESS,
+    'value': Refused.ILLEGAL_VALUE,
+    'state': Refused.DEVICE_FAILURE,
+    'busy': Refused.BUSY,
+    'no function': Refused.ILLEGAL_FUNCTION,
+}
+
+
+def test_every_code_of_the_manual_is_known() -> None:
+    # the other two inform
+    assert REFUSALS.keys() == MANUAL.keys() and DONE.keys() == {0x1E, 0x28}
+    assert len(REFUSALS) + len(DONE) == 34
+
+
+@pytest.mark.parametrize('code', MANUAL)
+def test_a_refusal_says_what_it_means_and_what_to_do(code: int) -> None:
+    bench = Bench(Fate(what='refuse'))
+    bench.drive.code = code
+    with pytest.raises(Refused) as raised:
+        bench.write(A)
+    meaning, kind = MANUAL[code]
+    assert raised.value.code == KINDS[kind]
+    assert meaning in str(raised.value)
+    text, _, remedy = str(raised.value).partition(': ')
+    assert text and remedy.removesuffix(f' (return code {code:02X})') == REFUSALS[code].remedy
+    assert str(raised.value) == raised.value.behind.removeprefix(': ')
+    assert bench.asked == [A.index]
+
+
+@pytest.mark.parametrize('code', DONE)
+def test_what_only_informs_is_done(code: int) -> None:
+    bench = Bench(Fate(what='refuse'), Fate(what='refuse'))
+    bench.drive.code = code
+    assert bench.write(A).data == b''
+    # nothing was asked for that could be done
+    with pytest.raises(Refused, match=f'return code {code:02X}'):
+        bench.read(A)
+
+
+@pytest.mark.parametrize('code', [0, 0x0F, 0x1F, 0x21, 0x35, 0xFF])
+def test_a_code_that_no_manual_lists(code: int) -> None:
+    bench = Bench(Fate(what='refuse'))
+    bench.drive.code = code
+    with pytest.raises(Refused, match=f'no manual lists why .return code {code:02X}.') as raised:
+        bench.read(A)
+    assert raised.value.code == Refused.DEVICE_FAILURE
+    assert str(raised.value) == str(refusal(code))
+
+
+def test_a_refusal_is_an_answer() -> None:
+    bench = Bench(Fate(what='refuse'))
+    with pytest.raises(Refused) as raised:
+        bench.read(A)
+    assert not raised.value.maybe_done
+    bench.read(A)
+    assert bench.asked == [A.index, A.index], f'nothing was in doubt, {RESYNC} not asked'
