@@ -55,11 +55,7 @@ class Codec(abc.ABC, Generic[Raw]):
         self.size = size
 
     def decode(self, data: bytes) -> Raw:
-        """
-        Return what bytes mean.
-
-        :raises ValueError: not exactly :attr:`size` bytes, or none that this codec makes.
-        """
+        """Return what bytes mean, or a ValueError if there are not just enough, or none such."""
         if len(data) != self.size:
             raise ValueError(f'{self.name} takes {self.size} bytes, not {len(data)}')
         return self._unpack(data)

@@ -176,11 +176,7 @@ class StatusWord:
         return valid
 
     def facts(self, word: int, listed: Kind) -> Fact:
-        """
-        Return what a status word says.
-
-        :param listed: the kind of the inverter status code read with it, as its table has it.
-        """
+        """Return what a status word says, with the kind that the table lists for its code."""
         facts = self._bits(word) | self.by_state.get(self.state(word), Fact(0))
         return facts | Fact.ALARM if self.kind(word, listed) is Kind.ALARM else facts
 

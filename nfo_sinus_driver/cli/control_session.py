@@ -106,11 +106,7 @@ class EventLog:
 
 
 class ControlSession:
-    """
-    The means to command one drive.
-
-    :ivar remote: the same drive, to look at before it is commanded.
-    """
+    """The means to command one drive, and ``remote`` to look at it before."""
 
     def __init__(
         self, session: Session, screen: Screen, signals: HeldSignals, mute: Collection[Cause]

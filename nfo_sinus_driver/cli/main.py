@@ -72,11 +72,7 @@ _INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """
-    Run the command and return its exit status: 0 only when the drive did it.
-
-    :param argv: the arguments, without the program's name; by default the process's own.
-    """
+    """Run the command; return its exit status, 0 only when the drive did it."""
     options = parse(sys.argv[1:] if argv is None else argv)
     failed = _DIFF_FAILED if options.verb == 'diff' else _FAILED
     try:

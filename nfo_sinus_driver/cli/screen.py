@@ -38,11 +38,9 @@ _MOST_WAITING = 1000
 
 class Screen:
     """
-    Prints by a thread of its own, while the ``with`` block lasts.
+    Prints by a thread of its own, in a ``with`` block; ``live``: the status stays in one line.
 
     After Ctrl-S in the terminal, or with a reader that does not read, only that thread waits.
-
-    :ivar live: the status is one line of a terminal, and not a line each time.
     """
 
     def __init__(self, *, live: bool) -> None:

@@ -139,12 +139,7 @@ class Remote:
 
 
 class Session:
-    """
-    The line that the options name, open while the ``with`` block lasts.
-
-    :param writes: whether drives on it may be written to; without it they are only read.
-    :raises UsageError: an option that can never work.
-    """
+    """The line that the options name, open in a ``with`` block; only read without ``writes``."""
 
     def __init__(self, options: argparse.Namespace, *, writes: bool = False) -> None:
         self._options = options

@@ -217,12 +217,7 @@ class Loading:
             raise CliError(self._clean_up(stained)) from error
 
     def _write(self, what: str, data: Mapping[str, bytes], written: dict[str, Change]) -> None:
-        """
-        Write, and keep account of it.
-
-        :raises DriveError: something was not taken.
-        :raises Interrupted: a signal came; the parameter that was on its way was finished.
-        """
+        """Write, and keep account of it; a signal ends it after the parameter on its way."""
         with _signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
 
             def wrote(change: Change) -> None:

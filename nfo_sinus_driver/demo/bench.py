@@ -34,11 +34,7 @@ BAUD_RATE = 57600
 
 
 class Bench(contextlib.ExitStack):
-    """
-    A simulated drive on a pseudo-terminal and a driver for it, each a process of its own.
-
-    :param log: where both write what they say; ``None``: to our own output.
-    """
+    """A simulated drive on a pseudo-terminal and a driver for it, whose log is ours or a file."""
 
     def __init__(self, log: IO[bytes] | None = None) -> None:
         super().__init__()
@@ -107,13 +103,7 @@ _DOMAINS = range(1, 102)
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """
-    Have a ROS domain that nobody else who asks here has at the time.
-
-    It is not the one that is set: that is where the user's own robots are.
-
-    :raises RuntimeError: there is none left.
-    """
+    """Have a ROS domain that nobody else has who asks here, and not that of the user."""
     users = os.environ.get('ROS_DOMAIN_ID', '')
     for number in random.sample(_DOMAINS, len(_DOMAINS)):
         if str(number) == users:

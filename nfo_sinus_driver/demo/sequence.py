@@ -59,12 +59,7 @@ class StepError(Exception):
 
 
 class DemoSequence(Node):
-    """
-    A client of the driver: publishes set-points, calls services, and prints what it sees.
-
-    It enables the drive, runs it forward and backward, lets a fault happen, acknowledges it,
-    enables again and stops.
-    """
+    """A client of the driver: it enables, runs, lets a fault happen, and prints what it sees."""
 
     def __init__(self) -> None:
         super().__init__('demo_sequence')

@@ -266,11 +266,7 @@ class MovitracLink:
         )
 
     def _listen(self, request: Request, until: float) -> None:
-        """
-        Wait as long as the right answer may take, if this was none.
-
-        :raises DamagedAnswer: it came.
-        """
+        """Wait as long as the right answer may take, if this was none (DamagedAnswer: it came)."""
         while (now := time.monotonic()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)

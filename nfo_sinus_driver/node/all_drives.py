@@ -41,12 +41,7 @@ _Command = Callable[[ManagedDrive], Future[Report]]
 
 
 class AllDrives:
-    """
-    Offers ``~/stop_all``, ``~/enable_all`` and ``~/disable_all`` on the bus node.
-
-    Drives that are only monitored are left alone. The answer has a part for each of the others,
-    those that failed in front.
-    """
+    """Offers ``~/stop_all`` and its like on the bus node, for all drives but monitored ones."""
 
     def __init__(self, node: Node, context: BusContext) -> None:
         self._node = node

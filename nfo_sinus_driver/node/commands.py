@@ -66,11 +66,7 @@ _T = TypeVar('_T')
 
 
 class Commands:
-    """
-    Takes commands for the drive of a node.
-
-    Each kind has a callback group of its own, so that none waits for another.
-    """
+    """Takes commands for the drive of a node, each kind in a callback group of its own."""
 
     def __init__(self, node: Node, managed: ManagedDrive) -> None:
         self._node = node
@@ -160,11 +156,7 @@ _LONGEST = 60.0
 
 
 class ErrorLogServices:
-    """
-    Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``.
-
-    :param stamp: gives the node's time of a moment of ``time.monotonic``.
-    """
+    """Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``."""
 
     def __init__(
         self, node: Node, managed: ManagedDrive, commands: Commands, stamp: Callable[[float], Time]
@@ -223,11 +215,7 @@ _LOOK_PERIOD = 0.05
 
 
 class TuningServices:
-    """
-    Offers ``~/tune_full`` and its like, and the action ``~/tune``.
-
-    :param stamp: gives the node's time of a moment of ``time.monotonic``.
-    """
+    """Offers ``~/tune_full`` and its like, and the action ``~/tune``."""
 
     def __init__(self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]) -> None:
         self._node = node

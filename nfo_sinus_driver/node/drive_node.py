@@ -250,11 +250,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return settings
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """
-        Set parameters for somebody outside, all of them or none.
-
-        Only what comes this way is written to the drive: declaring and following it do not.
-        """
+        """Set parameters for somebody outside, all or none: only so the drive is written to."""
         try:
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
             admitted = self._drive_parameters.admit(coerced)

@@ -184,12 +184,7 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
 
 
 def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
-    """
-    Return the settings of a drive that were given to its node, in a parameter file or by ``-p``.
-
-    :raises DriveError: the drive cannot have one of them.
-    :raises ValueError: one is of a wrong type.
-    """
+    """Return the settings of a drive that were given to its node, by file or by ``-p``."""
     # rclpy has no other way to see the overrides that nobody declared
     given = node._parameter_overrides
     wanted: dict[str, Value] = {}
@@ -205,11 +200,7 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
 
 
 def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
-    """
-    Return what ``ros2 param describe`` shows.
-
-    :param value: what the drive has; the range takes it in, even if the manual does not.
-    """
+    """Return what ``ros2 param describe`` shows; its range takes in what the drive has."""
     parameter = drive.model[key]
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     shown = ParameterDescriptor(

@@ -159,12 +159,7 @@ _LONGEST_STEP = 1.0
 
 
 class Joint:
-    """
-    The joint that a motor turns.
-
-    :param name: its name.
-    :param ratio: motor turns per turn of the output shaft; negative inverts the direction.
-    """
+    """The joint that a motor turns; its ratio is motor turns per turn, negative inverts."""
 
     def __init__(self, name: Callable[[], str], ratio: Callable[[], float]) -> None:
         self._name = name
@@ -178,11 +173,7 @@ class Joint:
         return self._name()
 
     def state(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> JointState:
-        """
-        Return the joint's state of a poll.
-
-        Nobody measures the position: it is what the measured speed comes to since the node began.
-        """
+        """Return its state of a poll; the position, since it began, is what the speed comes to."""
         velocity = snapshot.speed * _RPM / self._ratio()
         step = snapshot.at - self._at
         if 0 < step < _LONGEST_STEP and not math.isnan(velocity):
@@ -196,11 +187,7 @@ class Joint:
         )
 
     def setpoint(self, velocity: float, drive: Drive) -> float:
-        """
-        Return the set-point in the unit of the control mode for a velocity of the shaft, rad/s.
-
-        :raises ValueError: the drive controls something else, or its motor is not known.
-        """
+        """Return the set-point for a velocity of the shaft, rad/s, or a ValueError."""
         rpm = velocity * self._ratio() / _RPM
         mode = drive.snapshot.control_mode
         if mode == 'Speed':

@@ -63,11 +63,7 @@ def _given_to(name: str) -> dict[str, Parameter]:
 
 
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
-    """
-    Return a warning for each parameter that was given and that no node declares.
-
-    What is given without a node's name reaches every node, so one that declares it is enough.
-    """
+    """Return a warning for each parameter that was given and that no node declares."""
     nodes = list(nodes)
     declared = {name for node in nodes for name in _declared(node)}
     unknown: dict[str, set[str]] = {}

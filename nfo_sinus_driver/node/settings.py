@@ -61,13 +61,7 @@ class Setting:
     unit: str = ''
 
     def coerce(self, given: object) -> SettingValue:
-        """
-        Take what was given for what was meant: 5 for 5.0, and 8E1 for '8E1'.
-
-        The types of ROS parameters are stricter than people, and YAML takes 8E1 for eighty.
-
-        :raises ValueError: another type altogether, or out of range; the message says what can be.
-        """
+        """Take what was given for what was meant: 5 for 5.0, and 8E1, eighty in YAML, for text."""
         value = given
         if type(given) is int and isinstance(self.default, float):
             value = float(given)

@@ -66,11 +66,7 @@ class ControlUnit(abc.ABC):
 
     @abc.abstractmethod
     def write(self, key: str, raw: int) -> bool:
-        """
-        Carry out a write of a command; ``False`` if ``key`` is none, so that it is stored.
-
-        :raises Refused: VALUE or STATE.
-        """
+        """Carry out a write of a command, or refuse it; ``False`` if it is none: it is stored."""
 
     @abc.abstractmethod
     def show(self, key: str) -> int | None:

@@ -122,22 +122,14 @@ class SimulatedDrive:
         self.control_unit.heard()
 
     def read_raw(self, key: str) -> int:
-        """
-        Read a parameter as the bus does, a number of the memory, side effects included.
-
-        :raises Refused: ADDRESS; it can only be written.
-        """
+        """Read a parameter as the bus does, a number of the memory, side effects included."""
         if self.memory.model[key].access is Access.WRITE:
             raise Refused(Reason.ADDRESS, f'{key} cannot be read')
         raw = self.control_unit.read(key)
         return self._peek(key) if raw is None else raw
 
     def write_raw(self, key: str, raw: int) -> None:
-        """
-        Write a parameter as the bus does, a number of the memory.
-
-        :raises Refused: ADDRESS when it can only be read, VALUE or STATE.
-        """
+        """Write a parameter as the bus does, a number of the memory, or be refused."""
         key = self.control_unit.key_of(key)
         parameter = self.memory.model[key]
         if parameter.access not in (Access.WRITE, Access.READ_WRITE):
@@ -159,7 +151,6 @@ class SimulatedDrive:
         Let a fault happen: the motor coasts, and it wants acknowledging.
 
         :param cause_present: the cause lasts, so that it cannot be acknowledged yet.
-        :raises ValueError: the model has no such fault.
         """
         self.control_unit.trip(code, cause_present=cause_present)
         self._settle()
@@ -174,11 +165,7 @@ class SimulatedDrive:
         self._settle()
 
     def set_from_keypad(self, key: str, value: Value) -> None:
-        """
-        Change a parameter at the keypad, in engineering units.
-
-        :raises ValueError: an unknown key or a value that the drive would refuse.
-        """
+        """Change a parameter at the keypad, in engineering units, or a ValueError."""
         if key not in self.settings and key not in self.control_unit.setpoints:
             raise ValueError(f'{key} cannot be changed at the keypad')
         self.memory.set(key, value)
@@ -265,11 +252,7 @@ class SimulatedDrive:
 
 
 def _serial_number(text: str | None, address: int) -> str:
-    """
-    Return the characters of a serial number; by default one for each address.
-
-    :raises ValueError: too long, or not ASCII.
-    """
+    """Return the characters of a serial number; by default one for each address."""
     if text is None:
         text = f'{26_0117_0000_0000 + address:0{SERIAL_LENGTH}d}'
     if len(text) > SERIAL_LENGTH or not (text.isascii() and text.isprintable()):

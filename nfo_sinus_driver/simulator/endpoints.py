@@ -118,11 +118,7 @@ def endpoint(
     baud: int | None = None,
     char_format: str | None = None,
 ) -> Endpoint:
-    """
-    Return an end of a line; what is not given is the protocol's default.
-
-    :raises ValueError: an unknown protocol, or one that does not go with the rest.
-    """
+    """Return an end of a line; what is not given is the protocol's default."""
     if protocol not in PROTOCOLS:
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
@@ -139,11 +135,7 @@ def endpoint(
 
 
 def parse_endpoint(text: str) -> Endpoint:
-    """
-    Return the end that was typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``.
-
-    :raises ValueError: it is none.
-    """
+    """Return the end typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``."""
     protocol, _, place = text.partition(':')
     if place.isascii() and place.isdigit():
         if int(place) > 65535:

@@ -130,11 +130,7 @@ class Verb:
         return replace(self, help=f'{self.help}; or {other.help}', arguments=arguments)
 
     def bind(self, values: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
-        """
-        Return the arguments by name, converted and complete.
-
-        :raises ValueError: too many, one missing, unknown or wrong.
-        """
+        """Return the arguments by name, converted and complete, or a ValueError."""
         names = [argument.name for argument in self.arguments]
         if len(values) > len(names):
             raise ValueError(f'takes at most {len(names)} arguments: {", ".join(names)}')

@@ -51,11 +51,7 @@ _ROS_ARGS = '--ros-args'
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """
-    Run the command and return its exit status.
-
-    :param argv: the arguments, without the program's name; by default the process's own.
-    """
+    """Run the command, by default as the process was called, and return its exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if _ROS_ARGS in arguments:
         # a launch file's Node action adds them; there is no ROS in here

@@ -364,11 +364,7 @@ class Counters:
             self.brake_time += dt
 
     def carry(self, role: Role | None, factor: float) -> bool:
-        """
-        Let a counter go on to where its low word begins anew; ``False`` if it is none.
-
-        :param factor: how much one count of its low word is.
-        """
+        """Let a counter go on to where its low word, so much a count, begins anew; else false."""
         if role is None or role.value not in self.__dict__:
             return False
         high = round(getattr(self, role.value) / factor) >> 16

@@ -56,11 +56,7 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def enquiry(self, index: int) -> bytes:
-        """
-        Return the 4 or 8 bytes that stand at an index.
-
-        :raises Nack: they cannot be read.
-        """
+        """Return the 4 or 8 bytes that stand at an index (Nack: they cannot be read)."""
 
     @abc.abstractmethod
     def select(self, index: int, value: bytes) -> None:

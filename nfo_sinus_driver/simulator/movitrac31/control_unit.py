@@ -219,11 +219,7 @@ class MovitracControlUnit(ControlUnit):
         self._switch(ENABLE, active)
 
     def switch(self, number: int, closed: bool) -> None:
-        """
-        Close or open a binary input.
-
-        :raises ValueError: there is no such input.
-        """
+        """Close or open a binary input (ValueError: there is no such input)."""
         self._switch(number, closed)
         self.settle()
 

@@ -63,11 +63,7 @@ class Terminals:
         self.closed: frozenset[int] = frozenset()
 
     def switch(self, number: int, closed: bool) -> None:
-        """
-        Close or open a binary input.
-
-        :raises ValueError: there is no such input.
-        """
+        """Close or open a binary input (ValueError: there is no such input)."""
         if number not in self.inputs:
             known = ', '.join(map(str, self.inputs))
             raise ValueError(f'there is no binary input {number}, only {known}')

@@ -51,11 +51,7 @@ class LineRules:
     at_once: bool = False
 
     def check(self, protocol: str, timing: Timing) -> None:
-        """
-        Look whether a drive can be set to a line.
-
-        :raises ValueError: it does not know the speed or the format.
-        """
+        """Look whether a drive can be set to a line, or a ValueError."""
         if timing.baud not in BAUD_CODES:
             choices = ', '.join(map(str, BAUD_CODES))
             raise ValueError(f'{timing.baud} baud: choose one of {choices}')

@@ -55,11 +55,7 @@ _FLAGS: Mapping[Reason, LineError] = {
 
 
 class Server(classic.Server):
-    """
-    The Classic side of one G2.
-
-    :ivar tears: how many times yet a counter goes on between the readings of its two halves.
-    """
+    """The Classic side of one G2; so many times yet a counter ``tears`` while it is read."""
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, G2ControlUnit)
