@@ -40,10 +40,10 @@ from nfo_sinus_driver.catalog.profile import Refusal
 from nfo_sinus_driver.catalog.profile import Removal
 from nfo_sinus_driver.catalog.profile import Reset
 from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord

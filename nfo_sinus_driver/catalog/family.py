@@ -40,9 +40,9 @@ from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'

@@ -39,7 +39,7 @@ from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord

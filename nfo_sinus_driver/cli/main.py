@@ -36,11 +36,11 @@ from nfo_sinus_driver.cli.read import errors
 from nfo_sinus_driver.cli.read import get
 from nfo_sinus_driver.cli.read import info
 from nfo_sinus_driver.cli.read import list_
+from nfo_sinus_driver.cli.read import set_
 from nfo_sinus_driver.cli.run import ack
 from nfo_sinus_driver.cli.run import run
 from nfo_sinus_driver.cli.run import stop
 from nfo_sinus_driver.cli.scan import scan
-from nfo_sinus_driver.cli.set import set_
 from nfo_sinus_driver.cli.transfer import diff
 from nfo_sinus_driver.cli.transfer import dump
 from nfo_sinus_driver.cli.transfer import load

@@ -130,9 +130,7 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
         rates = [rate for rate in _LIKELIEST if rate in protocol.baud_rates]
         formats = usual or protocol.char_formats
         return [(baud_rate, format_) for baud_rate in rates for format_ in formats]
-    return [
-        (options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)
-    ]
+    return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
 
 
 def _who_answers(

@@ -177,16 +177,12 @@ class MovitracLink:
             raise movitrac_refusal.refusal(answer.code)
         return Reply(b'', arrived)
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter, then read another; in as many transactions as that takes."""
         self.write(unit, address, data)
         return self.read(unit, source)
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
@@ -328,9 +324,7 @@ class MovitracLink:
         self._heard_unasked(reader.rest)
         return answer, arrived
 
-    def _receive(
-        self, request: Request, reader: Reader, due: float
-    ) -> tuple[Answer, float]:
+    def _receive(self, request: Request, reader: Reader, due: float) -> tuple[Answer, float]:
         """
         Return the answer, and when it came.
 

@@ -29,8 +29,7 @@ from nfo_sinus_driver.link.rtu import RtuLink
 
 #: A new protocol is a file of this folder, and its link stands here.
 _LINKS = {
-    link.protocol.name: link
-    for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
+    link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
 }
 #: What the driver's ``protocol`` parameter takes, and what each is.
 PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}

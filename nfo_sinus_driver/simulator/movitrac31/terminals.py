@@ -40,10 +40,7 @@ _MORE_INPUTS: Mapping[str, tuple[int, ...]] = {
     'fea': (48, 49, 50, 51),
     'fio': (48, 49, 50, 51, 52, 53, 54),
 }
-_MORE_OUTPUTS: Mapping[str, tuple[int, ...]] = {
-    'fea': (63, 64),
-    'fio': (63, 64, 69, 70, 71, 72),
-}
+_MORE_OUTPUTS: Mapping[str, tuple[int, ...]] = {'fea': (63, 64), 'fio': (63, 64, 69, 70, 71, 72)}
 
 
 class Terminals:
