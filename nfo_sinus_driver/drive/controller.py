@@ -87,7 +87,8 @@ class Controller:
     def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
         self._bus = inverter.bus
         self._inverter = inverter
-        self._method = method
+        #: How the drive is commanded, for a procedure too.
+        self.method = method
         self._setpoint = setpoint
         self._state = ControlState.OFFLINE
         #: When something happened last: what was read before says nothing of it.
@@ -128,11 +129,6 @@ class Controller:
     def stop_overdue(self) -> bool:
         """A stop is not confirmed although there was time; no fault keeps the motor still."""
         return self._sequence.overdue
-
-    @property
-    def method(self) -> Commands:
-        """How the drive is commanded, for a procedure."""
-        return self._method
 
     @property
     def commanded(self) -> bool:
@@ -331,15 +327,15 @@ class Controller:
 
         Where the drive has no way to do that, stop as usual [C96].
         """
-        if not self._method.coasts:
+        if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
         may_run = self.may_run
         with self._stopped_by_itself():
             try:
-                may_run = may_run or await self._method.in_control(Priority.STOP)
+                may_run = may_run or await self.method.in_control(Priority.STOP)
                 may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
                 if may_run:
-                    await self._method.quick_stop(self._inverter.control_mode)
+                    await self.method.quick_stop(self._inverter.control_mode)
                     await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP)
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
@@ -366,7 +362,7 @@ class Controller:
         fault = seen.listed
         if not seen.faulted and fault.kind is Kind.STATUS:
             return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
-        may_run = self.may_run or await self._method.in_control(Priority.SERVICE)
+        may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
         with self._stopped_by_itself():
             return await self._acknowledge(seen, may_run=may_run)
 
@@ -380,7 +376,7 @@ class Controller:
                     lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
                 )
         try:
-            details = await self._method.acknowledge(seen.code, inverter.control_mode)
+            details = await self.method.acknowledge(seen.code, inverter.control_mode)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
@@ -419,7 +415,7 @@ class Controller:
 
     async def _release(self, timeout: float, *, may_run: bool) -> Report:
         stopped = await self.stop() if may_run else None
-        if not await self._method.in_control(Priority.SERVICE):
+        if not await self.method.in_control(Priority.SERVICE):
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
@@ -431,9 +427,9 @@ class Controller:
             if not self._inverter.sio_tot:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
-        await self._method.release()
-        if self._method.keeps_control:
-            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self._method.keeps_control)
+        await self.method.release()
+        if self.method.keeps_control:
+            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     def close(self) -> None:
@@ -448,7 +444,7 @@ class Controller:
     async def secure_found(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
         inverter, seen = self._inverter, self._inverter.seen
-        if await self._method.in_control(Priority.SERVICE):
+        if await self.method.in_control(Priority.SERVICE):
             if seen is not None and seen.runs_by_bus and not self.stopping:
                 inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)

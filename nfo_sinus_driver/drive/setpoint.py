@@ -423,20 +423,17 @@ class Setpoint:
 
     async def _watch_age(self) -> None:
         try:
-            await self._watch_age_for_ever()
+            while True:
+                timeout = self._inverter.settings.setpoint_timeout
+                last = max(self._request.at, self._armed_at)
+                left = last + timeout - time.monotonic() if timeout else math.inf
+                if left > 0 or self._expired:
+                    await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
+                else:
+                    await self._expire(timeout)
         except Exception as error:
             # a set-point that nobody watches must not be followed
             self._refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
-
-    async def _watch_age_for_ever(self) -> None:
-        while True:
-            timeout = self._inverter.settings.setpoint_timeout
-            last = max(self._request.at, self._armed_at)
-            left = last + timeout - time.monotonic() if timeout else math.inf
-            if left > 0 or self._expired:
-                await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
-            else:
-                await self._expire(timeout)
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None

@@ -28,9 +28,9 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.answer_reader import AnswerReader
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.serial_link import SerialLink
 

@@ -23,7 +23,6 @@ import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.link.answer_reader import AnswerReader
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
@@ -35,10 +34,11 @@ from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import Doubt
 from nfo_sinus_driver.link.late_replies import LateReplies
-from nfo_sinus_driver.link.modbus_identify import SPECIFIC
-from nfo_sinus_driver.link.modbus_identify import ReadDevice
-from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
+from nfo_sinus_driver.link.modbus_link import SPECIFIC
 from nfo_sinus_driver.link.modbus_link import ModbusLink
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead

@@ -30,7 +30,7 @@ from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
+from nfo_sinus_driver.link.modbus_link import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.rtu import RtuLink
 

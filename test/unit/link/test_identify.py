@@ -43,14 +43,14 @@ from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_identify import REGULAR
-from nfo_sinus_driver.link.modbus_identify import DeviceObjects
-from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
-from nfo_sinus_driver.link.modbus_identify import ReadDevice
-from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
-from nfo_sinus_driver.link.modbus_identify import revision
-from nfo_sinus_driver.link.modbus_identify import serial_number
-from nfo_sinus_driver.link.modbus_identify import text
+from nfo_sinus_driver.link.modbus_link import REGULAR
+from nfo_sinus_driver.link.modbus_link import DeviceObjects
+from nfo_sinus_driver.link.modbus_link import ModbusInquiry
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_link import revision
+from nfo_sinus_driver.link.modbus_link import serial_number
+from nfo_sinus_driver.link.modbus_link import text
 from nfo_sinus_driver.link.modbus_pdu import Request
 
 # --- what the bytes say ---------------------------------------------------------------------------
