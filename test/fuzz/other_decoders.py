@@ -21,6 +21,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 import math
 from random import Random
+import re
 import struct
 
 from support.addresses import packed
@@ -60,6 +61,9 @@ _PARAMETERS = [
 ]
 
 
+#: Which bits of a number count, as a codec is named.
+_BITS = re.compile(r'\[(\d+):(\d+)\]')
+
 # --- catalog --------------------------------------------------------------------------------------
 
 
@@ -83,6 +87,9 @@ def _catalog(random: Random, frames: int) -> None:
         form = {(1, False): '<H', (1, True): '<h', (2, False): '<I', (2, True): '<i'}
         data = struct.pack(f'<{count}H', *raw)
         number = struct.unpack(form[count, place.number.signed], data)[0]
+        if bits := _BITS.search(place.codec.name):
+            low, high = int(bits[1]), int(bits[2])
+            number = number >> low & (1 << high - low + 1) - 1
         assert type(value) is parameter.kind, f'{parameter.key}: {value!r}'
         if parameter.labels:
             label = parameter.labels.get(number, str(number))
