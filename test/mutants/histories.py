@@ -76,7 +76,7 @@ HISTORIES = (
         2,
         'in any order: a driver that begins lets run what runs',
         CONTROLLER,
-        '        if await self._method.in_control(Priority.SERVICE):\n            if seen',
+        '        if await self.method.in_control(Priority.SERVICE):\n            if seen',
         '        self._since = float("inf")\n        if False:\n            if seen',
         G2_CONTROL,
     ),
