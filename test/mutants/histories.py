@@ -196,8 +196,8 @@ HISTORIES = (
         1,
         'in any order: polling acknowledges faults',
         'nfo_sinus_driver/drive/drive_state.py',
-        'read_at(key, priority, once=once',
-        "read_at('fieldbus.inv_st_with_ack', priority, once=once",
+        'read_reply(key, priority, once=once',
+        "read_reply('fieldbus.inv_st_with_ack', priority, once=once",
         (ANY_ORDER, '-k', 'G2Monitor'),
     ),
     Mutant(
