@@ -132,7 +132,7 @@ class Commands:
     """
 
     def __init__(self, inverter: DriveState) -> None:
-        method = inverter.model.profile.methods[inverter.settings.control_method]
+        method = inverter.model.profile.methods[inverter.settings.method]
         self._method = method(inverter.settings.reference, inverter.registers.reaches)
         self._registers = inverter.registers
         self._tell = inverter.tell

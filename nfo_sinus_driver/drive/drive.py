@@ -101,7 +101,7 @@ class Drive:
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
-        if settings.control_method != 'monitor':
+        if settings.method != 'monitor':
             self._controller = Controller(self.inverter, Commands(self.inverter), self.setpoint)
         self._watch = Poller(
             self.inverter, self.setpoint, self._controller, lambda: self._connect(patient=False)
@@ -248,7 +248,7 @@ class Drive:
             return
         seen = await self.inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
-            method = self.settings.control_method
+            method = self.settings.method
             raise DriveError(self.inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     @on_bus

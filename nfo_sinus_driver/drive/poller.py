@@ -441,7 +441,7 @@ def take_snapshot(
     actual: float = NAN,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
-    method = inverter.settings.control_method
+    method = inverter.settings.method
     snapshot = Snapshot(time.monotonic(), inverter.connected, setpoint.armed, method)
     if seen is None:
         return snapshot

@@ -212,7 +212,7 @@ class Setpoint:
     def why_not_shared(self, name: str) -> Report | None:
         """Return why the drive, of this name, cannot follow a set-point told to all, if so."""
         settings = self._inverter.settings
-        if settings.control_method == 'monitor':
+        if settings.method == 'monitor':
             return Report(Cause.MEMBER_MONITORED, name=name)
         if not settings.follows_setpoints:
             reference = settings.reference

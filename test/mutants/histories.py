@@ -204,7 +204,7 @@ HISTORIES = (
         4,
         'in any order: a monitor writes',
         DRIVE,
-        "        if settings.control_method != 'monitor':",
+        "        if settings.method != 'monitor':",
         '        if True:',
         (ANY_ORDER, '-k', 'G2Monitor'),
     ),

@@ -261,7 +261,7 @@ LAWS = (
         4,
         'a monitor writes',
         DRIVE,
-        "        if settings.control_method != 'monitor':",
+        "        if settings.method != 'monitor':",
         '        if True:',
         (INTERFACE, '-k', 'monitor'),
     ),
