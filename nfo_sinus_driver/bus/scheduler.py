@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Whose turn it is on one line.
+Whose turn it is on one line, and who does not answer.
 
 What waits for the line, and which of it goes next. No thread, no clock and nothing sent:
 :class:`nfo_sinus_driver.bus.Bus` asks, sends, and says how long that kept the line.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-An induction motor, its load and the power stage in front of it, in virtual time.
+An induction motor, its load, the power stage in front of it and what is measured, in virtual time.
 
 Good enough to look right on a plot and to make a driver's mistakes show: frequency ramps,
 slip that grows with the load, a rotor that has inertia and coasts when it is released. All
