@@ -53,7 +53,7 @@ def keep(rig: VirtualRig) -> Kept:
     """Keep the snapshots from now on."""
     kept = Kept(rig)
     kept.snapshot = rig.notes.snapshot
-    rig.drive._watch._listener = rig.notes = kept
+    rig.drive.inverter.listener = rig.notes = kept
     return kept
 
 
