@@ -162,9 +162,9 @@ def errors(options: argparse.Namespace) -> int:
 def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
     rows = [
         (
-            f'{entry.operating_time:.1f} h',
+            '-' if math.isnan(entry.operating_time) else f'{entry.operating_time:.1f} h',
             str(entry.code),
-            entry.text,
+            entry.full_text,
             _ago(entry.age),
             entry.wall_time,
         )
@@ -176,9 +176,9 @@ def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
 def _as_row(entry: LogEntry) -> dict[str, object]:
     return {
         'code': entry.code,
-        'text': entry.text,
-        'operating_time': entry.operating_time,
+        'text': entry.full_text,
         # JSON has no NaN
+        'operating_time': _known(entry.operating_time),
         'age': _known(entry.age),
         'time': entry.wall_time,
     }

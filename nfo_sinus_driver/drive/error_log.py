@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import ErrorLogArea
 from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -39,13 +40,9 @@ from nfo_sinus_driver.link import Refused
 
 _log = logging.getLogger(__name__)
 
-#: The step of the operating time, h ([M0 §8.4], [M2 §9]); what is shown is cut off, not rounded.
-TICK = 0.1
 _HOUR = 3600.0
 #: By how much the clocks of drive and computer may drift apart, s for each s.
 _DRIFT = 1e-4
-#: The operating time of an entry [M2 §9].
-_TICKS = 0xFFFFFF
 #: Of how many entries it is remembered when they came.
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
@@ -61,16 +58,6 @@ _RETRY_PERIOD = 0.2
 _TRIES = 10
 #: An entry that was told so shortly before a poll saw its fault is that fault's, s.
 _SOON = 2.0
-
-
-def code_of(entry: int) -> int:
-    """Return the inverter status code of an entry as it stands in the drive."""
-    return entry >> 24
-
-
-def hours_of(entry: int) -> float:
-    """Return the operating time of an entry as it stands in the drive, h."""
-    return (entry & _TICKS) * TICK
 
 
 class OperatingClock:
@@ -131,11 +118,31 @@ class ErrorLog:
         """A manual says where it stands."""
         return self._registers.protocol in self._inverter.model.error_logs
 
+    @property
+    def timed(self) -> bool:
+        """It is documented, and tells when an error happened."""
+        return self.documented and self.area.timed
+
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """Read it, newest first; at most so many entries, 0: all that every drive has, 32 [C4]."""
-        area = self._area()
+        area = self.area
         entries = await self._read(min(most or area.entries, area.limit), 0, Priority.POLL)
+        if not area.timed:
+            return tuple([await self._with_readings(*found) for found in enumerate(entries)])
         return self.understood(entries, await self.read_time(Priority.POLL))
+
+    async def _with_readings(self, number: int, entry: int) -> LogEntry:
+        """Return what an entry without a time says, and what the drive has kept of it."""
+        told: list[str] = []
+        for what, key in self.area.readings_of(number):
+            try:
+                value = await self._registers.read_number(key, Priority.POLL)
+            except (Refused, ValueError):
+                # what cannot be told, such as a temperature below 0, is left out
+                continue
+            told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
+        code = self.area.code(entry)
+        return LogEntry(code, self._inverter.text_of(code), readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
@@ -143,7 +150,7 @@ class ErrorLog:
 
         :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
         """
-        limit = 1 if known is None else self._area().entries
+        limit = 1 if known is None else self.area.entries
         return await self._read(limit, known or 0, priority)
 
     async def read_time(self, priority: Priority) -> float:
@@ -172,10 +179,10 @@ class ErrorLog:
     async def erase_now(self) -> Report:
         """Erase the error log by SCMD [M0 table 18], and see that it is empty."""
         with self._procedures.begun(Reset.ERROR_LOG) as access:
-            area = self._area()
+            area = self.area
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
-                if code_of(await self._entry(area, 0, Priority.POLL)):
+                if area.code(await self._entry(area, 0, Priority.POLL)):
                     raise DriveError(Cause.LOG_NOT_ERASED)
         return Report(Cause.LOG_ERASED)
 
@@ -200,14 +207,16 @@ class ErrorLog:
                     raise DriveError(Cause.ENERGY_NOT_RESET, key=energy, energy=after)
         return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
 
-    def _area(self) -> ErrorLogArea:
+    @property
+    def area(self) -> ErrorLogArea:
+        """Where it stands."""
         if not self.documented:
             raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name)
         return self._inverter.model.error_logs[self._registers.protocol]
 
     async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
-        area = self._area()
+        area = self.area
         for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
@@ -227,7 +236,7 @@ class ErrorLog:
                 if len(found) < area.entries:
                     raise
                 break
-            if not code_of(entry) or entry == known:
+            if not area.code(entry) or entry == known:
                 break
             found.append(entry)
         return found
@@ -240,7 +249,7 @@ class ErrorLog:
         return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
-        code, then = code_of(entry), hours_of(entry)
+        code, then = self.area.code(entry), self.area.hours(entry)
         # one tick of doubt, for the drive rounds
         age = at = latest = math.nan
         if now > then - TICK:
@@ -275,8 +284,12 @@ class ErrorLogMonitor:
         self._tries = 0
 
     def begin(self) -> None:
-        """Watch from now on, where it is documented how to read the log."""
-        if not self._error_log.documented:
+        """
+        Watch from now on, where it is documented how to read the log.
+
+        Where entries have no time, nothing tells a new one from the same fault before.
+        """
+        if not self._error_log.timed:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf
@@ -328,7 +341,8 @@ class ErrorLogMonitor:
         if known is None:
             self.newest = next(iter(log.understood(news, now)), None)
             # what is older than this driver is no news, but for the fault that stands
-            news = [entry for entry in news if fault and code_of(entry) == fault.code]
+            code = fault and fault.code
+            news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
             news = [newest]
         for entry in reversed(news):
@@ -342,13 +356,15 @@ class ErrorLogMonitor:
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
         """Tell whether a fault has left the same entry as the one before, within one tick."""
-        same = code_of(newest) == fault.code and now - hours_of(newest) < 2 * TICK
+        area = self._error_log.area
+        same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
         return same and self._told_at < fault.at - _SOON
 
     def _moment(self, entry: int, began: float) -> float:
         """Return when a new entry came, as far as that was seen; else NaN."""
         fault = self._fault
-        if fault and fault.code == code_of(entry) and self._inverter.fault_is_fresh:
+        code = self._error_log.area.code(entry)
+        if fault and fault.code == code and self._inverter.fault_is_fresh:
             return fault.at
         return began if began - self._looked_at < 2 * _PERIOD else math.nan
 

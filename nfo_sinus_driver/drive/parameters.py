@@ -243,9 +243,21 @@ class Parameters:
                     )
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
-        for key in keys:
+        self._tell_unreadable({key: refused[key] for key in keys})
+
+    def _tell_unreadable(self, refused: Mapping[str, Refused]) -> None:
+        cards: list[str] = []
+        for key, error in refused.items():
+            if option := self._inverter.model[key].option:
+                cards.append(option)
+            else:
+                self._inverter.tell(
+                    Severity.WARNING, Cause.SETTING_UNREADABLE, key=key, error=str(error)
+                )
+        if cards:
+            options = ', '.join(dict.fromkeys(cards))
             self._inverter.tell(
-                Severity.WARNING, Cause.SETTING_UNREADABLE, key=key, error=str(refused[key])
+                Severity.INFO, Cause.OPTIONS_MISSING, count=len(cards), options=options
             )
 
     async def watch_now(self) -> None:

@@ -118,19 +118,21 @@ class LogEntry:
 
     :ivar code: as the inverter status has it.
     :ivar text: as on the display.
-    :ivar operating_time: the drive's operating time when it happened, h.
+    :ivar operating_time: the drive's operating time when it happened, h; NaN if it does not tell.
     :ivar age: operating hours ago; NaN if the drive does not tell.
     :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
         to come, or the drive is known to have had power ever since; else NaN.
+    :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
     :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
     """
 
     code: int
     text: str
-    operating_time: float
-    age: float
+    operating_time: float = math.nan
+    age: float = math.nan
     at: float = math.nan
     latest: float = math.nan
+    readings: tuple[str, ...] = ()
 
     @property
     def wall_time(self) -> str:
@@ -140,7 +142,14 @@ class LogEntry:
         latest = '' if math.isnan(self.latest) else _local(self.latest)
         return f'{latest} or before' if latest else ''
 
+    @property
+    def full_text(self) -> str:
+        """The text, and what the drive has kept of that moment."""
+        return f'{self.text} ({", ".join(self.readings)})' if self.readings else self.text
+
     def __str__(self) -> str:
+        if math.isnan(self.operating_time):
+            return f'{self.code} {self.full_text}'
         age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
         return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'

@@ -190,6 +190,8 @@ class ErrorLogServices:
         undated = sum(math.isnan(entry.at) for entry in entries)
         if not undated:
             return f'{len(entries)} entries'
+        if all(math.isnan(entry.operating_time) for entry in entries):
+            return f'{len(entries)} entries; the drive does not tell when they came'
         since = self._managed.drive.powered_since
         return (
             f'{len(entries)} entries, {undated} of them without the wall time: it is only known '

@@ -125,7 +125,7 @@ def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
     """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if nobody knows)."""
     return ErrorLogEntry(
         code=entry.code,
-        text=entry.text,
+        text=entry.full_text,
         operating_time=entry.operating_time,
         age=entry.age,
         stamp=stamp,
