@@ -35,8 +35,8 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 DC_LOW = 7
@@ -306,7 +306,7 @@ def test_what_stops_nothing(
 def test_set_points_that_stop_coming(make_rig: MakeRig, model: str, method: str) -> None:
     rig = turning(make_rig, model, method, 'fieldbus', setpoint_timeout=TIMEOUT)
     rig.stop_publishing()
-    last = rig.drive._setpoint._request[1]
+    last = rig.drive.setpoint._request[1]
     wait_until(lambda: rig.notes.snapshots[-1].setpoint == 0.0)
     # the time had passed when these were asked for, and they do not tell it yet
     late = [one for one in rig.notes.snapshots if one.at > last + TIMEOUT and one.setpoint]

@@ -57,7 +57,7 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
 
 LOST = Fate(what='drop')
 NAMES = {'A': A, 'B': B, 'C': C, 'D': D}

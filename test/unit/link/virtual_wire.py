@@ -32,7 +32,7 @@ from nfo_sinus_driver.link import classic_link
 from nfo_sinus_driver.link import movitrac_link
 from nfo_sinus_driver.link import serial_link
 from nfo_sinus_driver.link import silence
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
 
 #: Functions of Modbus that write.
 _WRITING = (6, 16, 23)
