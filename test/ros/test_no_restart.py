@@ -28,7 +28,7 @@ from bench import wait_until
 import pytest
 from ways import Way
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')
