@@ -194,6 +194,7 @@ class Bench(contextlib.ExitStack):
         super().__init__()
         self.folder = folder
         self.way = way
+        self.drives = way.drives
         #: What `Simulator` is told of the line, by the names of its arguments.
         self.line: dict[str, Any] = {**way.simulator, 'control': str(folder / 'control')}
         if way.protocol == 'modbus_tcp':
