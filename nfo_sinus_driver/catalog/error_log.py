@@ -13,10 +13,11 @@
 # limitations under the License.
 
 
-"""Where the error log of a drive stands: an area of entries, not parameters of their own."""
+"""Where the error log of a drive stands: an area of entries, or parameters of their own."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from nfo_sinus_driver.catalog.codec import Number
@@ -67,3 +68,18 @@ class ErrorLogArea:
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None
         return self.space, index, sub_index, self.codec.size
+
+
+@dataclass(frozen=True)
+class RememberedFault:
+    """
+    One entry of an error log that has no operating time, but what was measured when it came.
+
+    :ivar number: the key of the number of the fault; 0 ends the log.
+    :ivar first: what is added to that number for its status code.
+    :ivar readings: the keys of what was measured, by a short name.
+    """
+
+    number: str
+    first: int
+    readings: Mapping[str, str]

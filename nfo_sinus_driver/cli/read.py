@@ -151,9 +151,9 @@ def errors(options: argparse.Namespace) -> int:
 def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
     rows = [
         (
-            f'{entry.operating_time:.1f} h',
+            entry.hours,
             str(entry.code),
-            entry.text,
+            entry.what,
             _ago(entry.age),
             entry.wall_time,
         )
@@ -166,10 +166,11 @@ def _as_row(entry: LogEntry) -> dict[str, object]:
     return {
         'code': entry.code,
         'text': entry.text,
-        'operating_time': entry.operating_time,
+        'operating_time': _known(entry.operating_time),
         # JSON has no NaN
         'age': _known(entry.age),
         'time': entry.wall_time,
+        'readings': {one.name: one.value for one in entry.readings},
     }
 
 

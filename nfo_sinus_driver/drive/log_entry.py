@@ -15,10 +15,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 import math
 import time
+from typing import NamedTuple
+
+
+class Reading(NamedTuple):
+    """What was measured when a fault came."""
+
+    name: str
+    value: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f'{self.name} {self.value:g} {self.unit}'
+
+
+class StoredEntry(NamedTuple):
+    """
+    An entry as it stands in the drive; what is the same in all is the same entry.
+
+    :ivar code: as the inverter status has it; 0 ends the log.
+    :ivar hours: the operating time when it happened, h; ``None`` of a drive that keeps none.
+    :ivar readings: what was measured then, of a drive that keeps that.
+    """
+
+    code: int
+    hours: float | None = None
+    readings: Sequence[Reading] = ()
+
+
+#: What stands where there is none.
+NO_ENTRY = StoredEntry(0)
 
 
 @dataclass(frozen=True)
@@ -28,11 +59,13 @@ class LogEntry:
 
     :ivar code: as the inverter status has it.
     :ivar text: as on the display.
-    :ivar operating_time: the drive's operating time when it happened, h.
+    :ivar operating_time: the drive's operating time when it happened, h; NaN of a drive that keeps
+        none.
     :ivar age: operating hours ago; NaN if the drive does not tell.
     :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
         to come, or the drive is known to have had power ever since; else NaN.
     :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
+    :ivar readings: what was measured then, of a drive that keeps that.
     """
 
     code: int
@@ -41,6 +74,7 @@ class LogEntry:
     age: float
     at: float = math.nan
     latest: float = math.nan
+    readings: Sequence[Reading] = ()
 
     @property
     def wall_time(self) -> str:
@@ -50,10 +84,22 @@ class LogEntry:
         latest = '' if math.isnan(self.latest) else _local(self.latest)
         return f'{latest} or before' if latest else ''
 
+    @property
+    def what(self) -> str:
+        """The text, and what was measured then."""
+        readings = ', '.join(map(str, self.readings))
+        return f'{self.text} ({readings})' if readings else self.text
+
+    @property
+    def hours(self) -> str:
+        """The operating time, such as ``1234.5 h``; ``''`` if the drive keeps none."""
+        return '' if math.isnan(self.operating_time) else f'{self.operating_time:.1f} h'
+
     def __str__(self) -> str:
+        hours = f' at {self.hours}' if self.hours else ''
         age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
-        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
+        return f'{self.code} {self.what}{hours}{age}{wall_time}'
 
 
 def _local(at: float) -> str:

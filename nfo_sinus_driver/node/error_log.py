@@ -83,6 +83,11 @@ class ErrorLogServices:
         if not undated:
             return f'{len(entries)} entries'
         since = self._managed.drive.powered_since
+        if math.isnan(since):
+            return (
+                f'{len(entries)} entries, {undated} of them without the wall time: '
+                'this drive keeps no operating time, and no poll saw them come'
+            )
         return (
             f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
             f'since the driver has seen the drive with power, from operating hour {since:.1f} on'

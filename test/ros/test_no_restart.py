@@ -78,7 +78,8 @@ def _fault_and_acknowledgement(bench: Bench, drive: Simulated, client: Client) -
     drive.inject('fault', overload.code)
     client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
     wait_until(lambda: f'stopped: fault {overload}' in bench.log, 'the reason in the log')
-    assert overload.text in client.enable().message
+    # a stop may not be confirmed yet
+    wait_until(lambda: overload.text in client.enable().message, 'it is refused, and why')
     assert client.call('fault_ack').message == f'acknowledged {overload}'
 
 

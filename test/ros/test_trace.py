@@ -24,7 +24,7 @@ from lifecycle_msgs.msg import Transition
 from support.trace_laws import violations
 from support.wire import Request
 from support.wire import understand
-from told import run_command
+from told import run_commands
 from ways import needs
 
 from nfo_sinus_driver.link import LineSettings
@@ -67,7 +67,7 @@ def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
     driver.signal(signal.SIGTERM)
     assert driver.wait() == 0, driver.text
     # the fifth is that of the enable that was refused, where nobody knows before
-    assert _requests(bench).count(run_command(way)) == 4 + (not bench.drives.tells_run_input)
+    assert run_commands(way, _requests(bench)) == 4 + (not bench.drives.tells_run_input)
     gap = LineSettings(way.baud_rate).frame_gap
     assert violations(bench.frames(), gap, way.model, way.protocol) == []
     state = drive.state()

@@ -99,7 +99,7 @@ def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None
     assert state['fault'] == 0
 
 
-@needs('timeout')
+@needs('timeout', 'quiet')
 def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:

@@ -16,6 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import itertools
+
 from support.wire import Request
 from ways import Way
 
@@ -24,7 +27,7 @@ from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 #: Remote set-point, function bits and inverter status, and the bits CW and enable [M4 §4].
 _SIZE, _BITS, _STATUS = 223, 281, 284
-_CLOCKWISE, _ENABLE = 1, 4
+_CLOCKWISE, _DIRECTIONS, _ENABLE = 1, 3, 4
 
 
 def run_command(way: Way) -> Request:
@@ -32,6 +35,15 @@ def run_command(way: Way) -> Request:
     if way.bus == 'movitrac':
         return _movitrac(_BITS, _ENABLE | _CLOCKWISE)
     return _sinus(way, 'fieldbus.scmd', Scmd.FIELDBUS)
+
+
+def run_commands(way: Way, requests: Sequence[Request]) -> int:
+    """Return how often that drive was told to run; function bits are refreshed while it does."""
+    if way.bus != 'movitrac':
+        return requests.count(run_command(way))
+    told = [one.words[1] for one in requests if one.place == _BITS and one.words is not None]
+    runs = [bool(bits & _DIRECTIONS) for bits in told]
+    return sum(now and not before for before, now in itertools.pairwise([False, *runs]))
 
 
 def stop_sequence(way: Way) -> list[Request]:

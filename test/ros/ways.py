@@ -45,6 +45,7 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
+    'quiet': 'its time-out goes on where nobody is: control stays with the bus',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
@@ -138,7 +139,7 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'parameters', 'timeout'))
+_OLD_G2 = frozenset(('delay', 'format', 'parameters', 'quiet', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer',

@@ -28,6 +28,7 @@ from collections.abc import Sequence
 import contextlib
 import math
 
+from nfo_sinus_driver.catalog.error_log import RememberedFault
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
@@ -84,6 +85,21 @@ _LEAST = {
     'V/f pattern 2': 'frequency.f_min_2',
     'V/f pattern 3': 'frequency.f_min_3',
 }
+
+#: What P060 to P064 keep of a fault; the words of status and terminals are not decoded [C77].
+_READINGS = {
+    'frequency': 'frequency',
+    'DC link': 'dc_link_voltage',
+    'apparent current': 'apparent_current',
+    'utilization': 'utilization',
+    'heat sink': 'heat_sink_temperature',
+}
+
+
+def _remembered(number: int) -> RememberedFault:
+    key = f'status.fault_t{number}'
+    readings = {name: f'{key}_{reading}' for name, reading in _READINGS.items()}
+    return RememberedFault(key, words.FIRST_FAULT, readings)
 
 
 class DirectionAndSize(SetpointTarget):
@@ -316,6 +332,7 @@ PROFILE = Profile(
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _SETPOINT},
     in_charge=_in_charge,
+    fault_memory=tuple(map(_remembered, range(5))),
     # a tenth above what the display values have [M4 §4]: the motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 440.0, Role.ACTUAL_SPEED: 9999.0},
 )
