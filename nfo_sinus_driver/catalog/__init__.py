@@ -21,7 +21,6 @@ from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.codec import to_bytes
 from nfo_sinus_driver.catalog.codec import to_words
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
-from nfo_sinus_driver.catalog.error_log import RememberedFault
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
@@ -66,7 +65,6 @@ __all__ = [
     'Procedure',
     'Profile',
     'Refusal',
-    'RememberedFault',
     'Removal',
     'Reset',
     'Role',

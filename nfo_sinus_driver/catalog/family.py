@@ -191,8 +191,16 @@ def load_family(name: str) -> Family:
         if needed not in dict(roles):
             raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
+
+    def area(row: table.Row) -> ErrorLogArea:
+        found = _area(row)
+        for entry in range(found.limit):
+            for _, key in found.readings_of(entry):
+                known({'parameter': key})
+        return found
+
     log = folder / 'error_log.csv'
-    logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
+    logs = table.read(log, area, lambda row: [row.protocol]) if log.exists() else []
     return Family(
         name=name,
         parameters={row.key: row for row in parameters},
@@ -296,6 +304,12 @@ def _status_code(row: table.Row) -> StatusCode:
     )
 
 
+def _readings(text: str) -> Iterator[tuple[str, str]]:
+    for pair in text.split('|') if text else ():
+        what, key = pair.split('=')
+        yield what, key
+
+
 def _area(row: table.Row) -> ErrorLogArea:
     codec = codec_of(row['codec'])
     if not isinstance(codec, Number):
@@ -308,4 +322,7 @@ def _area(row: table.Row) -> ErrorLogArea:
         entries=int(row['entries']),
         limit=int(row['limit']),
         codec=codec,
+        factor=Fraction(row.get('factor') or 1),
+        above=table.number(row.get('above', '')),
+        readings=tuple(_readings(row.get('readings', ''))),
     )

@@ -38,7 +38,6 @@ from typing import ClassVar
 from typing import Protocol
 from typing import TypeVar
 
-from nfo_sinus_driver.catalog.error_log import RememberedFault
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import State
@@ -396,8 +395,6 @@ class Profile:
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
-    :ivar fault_memory: the entries of its error log, the newest first, where each is parameters of
-        its own; empty where the log is an area, or there is none.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     """
 
@@ -414,7 +411,6 @@ class Profile:
     releases: Value = ''
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
-    fault_memory: Sequence[RememberedFault] = ()
     uncertain: Mapping[str, float] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:

@@ -151,9 +151,9 @@ def errors(options: argparse.Namespace) -> int:
 def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
     rows = [
         (
-            entry.hours,
+            '-' if math.isnan(entry.operating_time) else f'{entry.operating_time:.1f} h',
             str(entry.code),
-            entry.what,
+            entry.full_text,
             _ago(entry.age),
             entry.wall_time,
         )
@@ -165,12 +165,11 @@ def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
 def _as_row(entry: LogEntry) -> dict[str, object]:
     return {
         'code': entry.code,
-        'text': entry.text,
-        'operating_time': _known(entry.operating_time),
+        'text': entry.full_text,
         # JSON has no NaN
+        'operating_time': _known(entry.operating_time),
         'age': _known(entry.age),
         'time': entry.wall_time,
-        'readings': {one.name: one.value for one in entry.readings},
     }
 
 

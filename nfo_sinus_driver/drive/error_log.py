@@ -18,32 +18,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import contextlib
 import math
 import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import RememberedFault
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.log_entry import NO_ENTRY
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.log_entry import Reading
-from nfo_sinus_driver.drive.log_entry import StoredEntry
-from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.operating_clock import OperatingClock
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 
-#: The operating time of an entry [M2 §9].
-_TICKS = 0xFFFFFF
 #: Of how many entries it is remembered when they came.
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
@@ -63,62 +56,75 @@ class ErrorLog:
         self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
-        self._sightings: list[tuple[StoredEntry, float]] = []
+        self._sightings: list[tuple[int, float]] = []
 
     @property
     def documented(self) -> bool:
         """A manual says where it stands."""
-        return bool(self._memory) or self._registers.protocol in self._inverter.model.error_logs
+        return self._registers.protocol in self._inverter.model.error_logs
 
     @property
-    def _memory(self) -> Sequence[RememberedFault]:
-        return self._inverter.model.profile.fault_memory
+    def timed(self) -> bool:
+        """It is documented, and tells when an error happened."""
+        return self.documented and self.area.timed
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
         """
-        Read the error log, newest entry first ([M0 §8.4], [M2 §9], [M4 §4]).
+        Read the error log, newest entry first ([M0 §8.4], [M2 §9]).
 
-        :param most: how many entries at most; 0 is all that every drive has [C4].
+        :param most: how many entries at most; 0 is all that every drive has, 32 [C4].
         :raises DriveError: the model's is not documented, or it cannot be read.
         """
-        entries, limit = self._sizes()
-        found = await self._read(min(most or entries, limit), NO_ENTRY, Priority.POLL)
-        return self.understood(found, await self.read_time(Priority.POLL))
+        area = self.area
+        limit = min(most or area.entries, area.limit)
+        entries = await self._read(area, limit, 0, Priority.POLL)
+        if not area.timed:
+            return tuple([await self._with_readings(*found) for found in enumerate(entries)])
+        return self.understood(entries, await self.read_time(Priority.POLL))
 
-    async def newer_than(
-        self, known: StoredEntry | None, priority: Priority
-    ) -> list[StoredEntry]:
+    async def _with_readings(self, number: int, entry: int) -> LogEntry:
+        """Return what an entry without a time says, and what the drive has kept of it."""
+        told: list[str] = []
+        for what, key in self.area.readings_of(number):
+            try:
+                value = await self._registers.read_number(key, Priority.POLL)
+            except (Refused, ValueError):
+                # what cannot be told, such as a temperature below 0, is left out
+                continue
+            told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
+        code = self.area.code(entry)
+        return LogEntry(code, self._inverter.text_of(code), readings=tuple(told))
+
+    async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
         Read the entries that are newer than one, as they stand in the drive, newest first.
 
-        :param known: the newest one so far; ``None`` for only the newest.
+        :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
         :raises DriveError: the model's log is not documented, or it cannot be read.
         """
-        entries, _ = self._sizes()
+        area = self.area
         if known is None:
-            return await self._read(1, NO_ENTRY, priority)
-        return await self._read(entries, known, priority)
+            return await self._read(area, 1, 0, priority)
+        return await self._read(area, area.entries, known, priority)
 
     async def read_time(self, priority: Priority) -> float:
-        """Read the operating time, h, and have the clock follow it; NaN if the drive has none."""
+        """Read the operating time, h, and have the clock follow it."""
         once = priority > Priority.POLL
         key = self._inverter.model.key(Role.OPERATING_TIME)
-        if not key:
-            return math.nan
         hours, at = await self._registers.read_at(key, priority, once=once)
         assert not isinstance(hours, str)
         self.clock.note(float(hours), at)
         return float(hours)
 
-    def note_sighting(self, entry: StoredEntry, at: float) -> None:
+    def note_sighting(self, entry: int, at: float) -> None:
         """Remember when an entry came, s of ``time.monotonic``."""
         self._sightings = [(entry, at), *self._sightings[: _REMEMBERED - 1]]
 
-    def understood(self, entries: Sequence[StoredEntry], now: float) -> tuple[LogEntry, ...]:
+    def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
         """
         Return what entries say, newest first.
 
-        :param now: the operating time, h; NaN if nobody knows.
+        :param now: the operating time, h.
         """
         sightings = list(self._sightings)
         found: list[LogEntry] = []
@@ -136,10 +142,10 @@ class ErrorLog:
         :raises DriveError: it was not erased, and why.
         """
         with self._procedures.begun(Reset.ERROR_LOG) as access:
-            self._require_documented()
+            area = self.area
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
-                if (await self._entry(0)).code:
+                if area.code(await self._entry(area, 0)):
                     raise DriveError(Report(Cause.LOG_NOT_ERASED))
         return Report(Cause.LOG_ERASED)
 
@@ -170,78 +176,57 @@ class ErrorLog:
                     raise DriveError(Report(Cause.ENERGY_NOT_RESET, key=energy, energy=after))
         return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
 
-    def _require_documented(self) -> None:
+    @property
+    def area(self) -> ErrorLogArea:
+        """
+        Where it stands.
+
+        :raises DriveError: the model's is not documented.
+        """
         if not self.documented:
             raise DriveError(Report(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name))
-
-    @property
-    def _area(self) -> ErrorLogArea:
         return self._inverter.model.error_logs[self._registers.protocol]
 
-    def _sizes(self) -> tuple[int, int]:
-        """Return how many entries every drive has, and how many some have."""
-        self._require_documented()
-        if self._memory:
-            return len(self._memory), len(self._memory)
-        return self._area.entries, self._area.limit
-
     async def _read(
-        self, limit: int, known: StoredEntry, priority: Priority
-    ) -> list[StoredEntry]:
+        self, area: ErrorLogArea, limit: int, known: int, priority: Priority
+    ) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
         for _ in range(_TRIES):
-            entries = await self._read_down(limit, known, priority)
+            entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
-            if not entries or await self._entry(0, priority) == entries[0]:
+            if not entries or await self._entry(area, 0, priority) == entries[0]:
                 return entries
         raise DriveError(Report(Cause.LOG_CHANGES))
 
     async def _read_down(
-        self, limit: int, known: StoredEntry, priority: Priority
-    ) -> list[StoredEntry]:
+        self, area: ErrorLogArea, limit: int, known: int, priority: Priority
+    ) -> list[int]:
         """Read entries until one is empty or known, or until there are no more."""
-        every, _ = self._sizes()
-        found: list[StoredEntry] = []
+        found: list[int] = []
         while len(found) < limit:
             try:
-                entry = await self._entry(len(found), priority)
+                entry = await self._entry(area, len(found), priority)
             except Refused:
-                if len(found) < every:
+                if len(found) < area.entries:
                     raise
                 break
-            if not entry.code or entry == known:
+            if not area.code(entry) or entry == known:
                 break
             found.append(entry)
         return found
 
-    async def _entry(self, number: int, priority: Priority = Priority.POLL) -> StoredEntry:
-        """Read one entry; who waits for it goes by turns with the polls."""
+    async def _entry(
+        self, area: ErrorLogArea, number: int, priority: Priority = Priority.POLL
+    ) -> int:
+        """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
         # nobody waits for what is read in the background, so it is not asked for again at once
-        once = priority > Priority.POLL
-        if self._memory:
-            return await self._remembered(self._memory[number], priority, once)
         data = await self._registers.read_from(
-            Address(*self._area.place(number)), priority, once=once
+            Address(*area.place(number)), priority, once=priority > Priority.POLL
         )
-        raw = self._area.codec.decode(data)
-        return StoredEntry(raw >> 24, (raw & _TICKS) * TICK)
+        return area.codec.decode(data)
 
-    async def _remembered(
-        self, entry: RememberedFault, priority: Priority, once: bool
-    ) -> StoredEntry:
-        fault = int(await self._registers.read_number(entry.number, priority, once=once))
-        if not fault:
-            return NO_ENTRY
-        readings: list[Reading] = []
-        for name, key in entry.readings.items():
-            # one that nobody can read, such as a temperature below zero, is left out [C105]
-            with contextlib.suppress(ValueError):
-                value = await self._registers.read_number(key, priority, once=once)
-                readings.append(Reading(name, value, self._inverter.model[key].unit))
-        return StoredEntry(entry.first + fault, readings=tuple(readings))
-
-    def _understood(self, entry: StoredEntry, now: float, sighted_at: float) -> LogEntry:
-        code, then = entry.code, math.nan if entry.hours is None else entry.hours
+    def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
+        code, then = self.area.code(entry), self.area.hours(entry)
         # one tick of doubt, for the drive rounds
         age = at = latest = math.nan
         if now > then - TICK:
@@ -250,5 +235,4 @@ class ErrorLog:
             latest = time.monotonic() - max(0.0, age - TICK) * 3600
         if not math.isnan(sighted_at):
             at = sighted_at
-        text = self._inverter.text_of(code)
-        return LogEntry(code, text, round(then, 1), age, at, latest, entry.readings)
+        return LogEntry(code, self._inverter.text_of(code), round(then, 1), age, at, latest)

@@ -24,16 +24,14 @@ import time
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.log_entry import NO_ENTRY
 from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.log_entry import StoredEntry
-from nfo_sinus_driver.drive.operating_clock import TICK
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.link import LinkError
@@ -68,16 +66,20 @@ class ErrorLogMonitor:
         self._task: Task | None = None
         #: The newest entry, as it was read; ``None`` if there is none.
         self.newest: LogEntry | None = None
-        #: The same as it stands in the drive; ``None`` before the first look.
-        self._known: StoredEntry | None = None
+        #: The same as it stands in the drive, 0 if there is none; ``None`` before the first look.
+        self._known: int | None = None
         self._looked_at = self._told_at = -math.inf
         #: The fault whose entry is looked for, and how often yet.
         self._fault: InverterStatus | None = None
         self._tries = 0
 
     def begin(self) -> None:
-        """Poller from now on, where it is documented how to read the log."""
-        if not self._error_log.documented:
+        """
+        Watch from now on, where it is documented how to read the log.
+
+        Where entries have no time, nothing tells a new one from the same fault before.
+        """
+        if not self._error_log.timed:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf
@@ -130,12 +132,13 @@ class ErrorLogMonitor:
         log, known, began = self._error_log, self._known, time.monotonic()
         news = await log.newer_than(known, Priority.TELEMETRY)
         now = await log.read_time(Priority.TELEMETRY)
-        newest = self._known = news[0] if news else known or NO_ENTRY
+        newest = self._known = news[0] if news else known or 0
         fault = self._fault
         if known is None:
             self.newest = next(iter(log.understood(news, now)), None)
             # what is older than this driver is no news, but for the fault that stands
-            news = [entry for entry in news if fault and entry.code == fault.code]
+            code = fault and fault.code
+            news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
             news = [newest]
         for entry in reversed(news):
@@ -147,17 +150,17 @@ class ErrorLogMonitor:
             self._told_at = time.monotonic()
             self._tell(log.understood(news, now))
 
-    def _repeats(self, fault: InverterStatus, newest: StoredEntry, now: float) -> bool:
+    def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
         """Tell whether a fault has left the same entry as the one before, within one tick."""
-        if newest.hours is None:
-            return False
-        same = newest.code == fault.code and now - newest.hours < 2 * TICK
+        area = self._error_log.area
+        same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
         return same and self._told_at < fault.at - _SOON
 
-    def _moment(self, entry: StoredEntry, began: float) -> float:
+    def _moment(self, entry: int, began: float) -> float:
         """Return when a new entry came, as far as that was seen; else NaN."""
         fault = self._fault
-        if fault and fault.code == entry.code and self._inverter.fault_is_fresh:
+        code = self._error_log.area.code(entry)
+        if fault and fault.code == code and self._inverter.fault_is_fresh:
             return fault.at
         return began if began - self._looked_at < 2 * _PERIOD else math.nan
 

@@ -210,6 +210,7 @@ class Cause(enum.Enum):
     SETTINGS_BEING_READ = enum.auto()
     SETTINGS_REFRESHED = enum.auto()
     SETTING_UNREADABLE = enum.auto()
+    OPTIONS_MISSING = enum.auto()
     #: What the drive has means nothing, or it cannot have what was asked for.
     BAD_VALUE = enum.auto()
     CHANGED = enum.auto()

@@ -15,41 +15,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 import math
 import time
-from typing import NamedTuple
-
-
-class Reading(NamedTuple):
-    """What was measured when a fault came."""
-
-    name: str
-    value: float
-    unit: str
-
-    def __str__(self) -> str:
-        return f'{self.name} {self.value:g} {self.unit}'
-
-
-class StoredEntry(NamedTuple):
-    """
-    An entry as it stands in the drive; what is the same in all is the same entry.
-
-    :ivar code: as the inverter status has it; 0 ends the log.
-    :ivar hours: the operating time when it happened, h; ``None`` of a drive that keeps none.
-    :ivar readings: what was measured then, of a drive that keeps that.
-    """
-
-    code: int
-    hours: float | None = None
-    readings: Sequence[Reading] = ()
-
-
-#: What stands where there is none.
-NO_ENTRY = StoredEntry(0)
 
 
 @dataclass(frozen=True)
@@ -59,22 +28,21 @@ class LogEntry:
 
     :ivar code: as the inverter status has it.
     :ivar text: as on the display.
-    :ivar operating_time: the drive's operating time when it happened, h; NaN of a drive that keeps
-        none.
+    :ivar operating_time: the drive's operating time when it happened, h; NaN if it does not tell.
     :ivar age: operating hours ago; NaN if the drive does not tell.
     :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
         to come, or the drive is known to have had power ever since; else NaN.
+    :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
     :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
-    :ivar readings: what was measured then, of a drive that keeps that.
     """
 
     code: int
     text: str
-    operating_time: float
-    age: float
+    operating_time: float = math.nan
+    age: float = math.nan
     at: float = math.nan
     latest: float = math.nan
-    readings: Sequence[Reading] = ()
+    readings: tuple[str, ...] = ()
 
     @property
     def wall_time(self) -> str:
@@ -85,21 +53,16 @@ class LogEntry:
         return f'{latest} or before' if latest else ''
 
     @property
-    def what(self) -> str:
-        """The text, and what was measured then."""
-        readings = ', '.join(map(str, self.readings))
-        return f'{self.text} ({readings})' if readings else self.text
-
-    @property
-    def hours(self) -> str:
-        """The operating time, such as ``1234.5 h``; ``''`` if the drive keeps none."""
-        return '' if math.isnan(self.operating_time) else f'{self.operating_time:.1f} h'
+    def full_text(self) -> str:
+        """The text, and what the drive has kept of that moment."""
+        return f'{self.text} ({", ".join(self.readings)})' if self.readings else self.text
 
     def __str__(self) -> str:
-        hours = f' at {self.hours}' if self.hours else ''
+        if math.isnan(self.operating_time):
+            return f'{self.code} {self.full_text}'
         age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
-        return f'{self.code} {self.what}{hours}{age}{wall_time}'
+        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
 
 
 def _local(at: float) -> str:

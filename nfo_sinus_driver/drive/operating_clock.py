@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import math
 
-#: The step of the operating time, h ([M0 §8.4], [M2 §9]); what is shown is cut off, not rounded.
-TICK = 0.1
+from nfo_sinus_driver.catalog.error_log import TICK
+
 _HOUR = 3600.0
 #: By how much the clocks of drive and computer may drift apart, s for each s.
 _DRIFT = 1e-4

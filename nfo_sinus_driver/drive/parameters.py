@@ -256,9 +256,20 @@ class Parameters:
                     self._inverter.tell(Severity.INFO, progress)
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
-        for key in keys:
-            report = Report(Cause.SETTING_UNREADABLE, key=key, error=str(refused[key]))
+        self._tell_unreadable({key: refused[key] for key in keys})
+
+    def _tell_unreadable(self, refused: Mapping[str, Refused]) -> None:
+        cards: list[str] = []
+        for key, error in refused.items():
+            if option := self._inverter.model[key].option:
+                cards.append(option)
+                continue
+            report = Report(Cause.SETTING_UNREADABLE, key=key, error=str(error))
             self._inverter.tell(Severity.WARNING, report)
+        if cards:
+            options = ', '.join(dict.fromkeys(cards))
+            missing = Report(Cause.OPTIONS_MISSING, count=len(cards), options=options)
+            self._inverter.tell(Severity.INFO, missing)
 
     async def watch_now(self) -> None:
         """Read the settings one after the other, again and again, for ever."""

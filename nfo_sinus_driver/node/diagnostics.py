@@ -99,8 +99,7 @@ def _logged(entry: LogEntry | None) -> str:
     if entry is None:
         return ''
     wall_time = f' ({entry.wall_time})' if entry.wall_time else ''
-    hours = f' at {entry.hours}' if entry.hours else ''
-    return f'{entry.code} {entry.what}{hours}{wall_time}'
+    return f'{entry.code} {entry.text} at {entry.operating_time:.1f} h{wall_time}'
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -82,12 +82,9 @@ class ErrorLogServices:
         undated = sum(math.isnan(entry.at) for entry in entries)
         if not undated:
             return f'{len(entries)} entries'
+        if all(math.isnan(entry.operating_time) for entry in entries):
+            return f'{len(entries)} entries; the drive does not tell when they came'
         since = self._managed.drive.powered_since
-        if math.isnan(since):
-            return (
-                f'{len(entries)} entries, {undated} of them without the wall time: '
-                'this drive keeps no operating time, and no poll saw them come'
-            )
         return (
             f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
             f'since the driver has seen the drive with power, from operating hour {since:.1f} on'

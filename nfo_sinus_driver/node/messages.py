@@ -131,7 +131,7 @@ def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
     """
     return ErrorLogEntry(
         code=entry.code,
-        text=entry.what,
+        text=entry.full_text,
         operating_time=entry.operating_time,
         age=entry.age,
         stamp=stamp,

@@ -237,6 +237,10 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.SETTINGS_BEING_READ: 'parameters: {progress}',
     Cause.SETTINGS_REFRESHED: '{count} parameters read, changed: {changed}',
     Cause.SETTING_UNREADABLE: '{key} cannot be read: {error}',
+    Cause.OPTIONS_MISSING: (
+        'parameters: {count} are left out, for the drive has none of the option cards that they '
+        'need ({options})'
+    ),
     Cause.BAD_VALUE: '{error}',
     Cause.CHANGED: '{change}',
     Cause.CHANGED_FOR_TIMEOUT: '{change} ({call.drive_timeout})',

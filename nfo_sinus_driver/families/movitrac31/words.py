@@ -108,7 +108,7 @@ _FAULTS = frozenset(
     )
 )
 #: What a status code begins at that is a fault code.
-FIRST_FAULT = 100
+_FIRST_FAULT = 100
 #: A status code that means nothing, and the highest that the message InvSt has room for.
 _NO_NUMBER = 99
 _HIGHEST = 255
@@ -139,7 +139,7 @@ def code_of(word: int) -> int:
         return _NO_NUMBER if number is None else number
     if fault not in _FAULTS and _decimal(fault) in _FAULTS:
         fault = _decimal(fault)
-    return min(FIRST_FAULT + fault, _HIGHEST)
+    return min(_FIRST_FAULT + fault, _HIGHEST)
 
 
 @functools.lru_cache(maxsize=256)

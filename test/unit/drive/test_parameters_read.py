@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from drive_rig import PATIENCE
@@ -117,6 +118,26 @@ def test_one_that_the_drive_does_not_show_is_not_there(
     assert len(asked) == before
     message = rig.refused(parameters.change({'freque.f_fix1': 7}))
     assert message == 'freque.f_fix1: the drive has no such parameter (exception 2)'
+
+
+def test_what_needs_option_cards_is_told_in_one(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    cards = {'freque.f_fix1': 'X1', 'freque.f_fix2': 'X1', 'control.accel': 'Y or Z'}
+    model = rig.drive.inverter.model
+    for key, card in cards.items():
+        monkeypatch.setitem(model.parameters, key, replace(model[key], option=card))  # type: ignore[arg-type]
+
+    def refuse(key: str) -> None:
+        if key in cards:
+            raise Refused(Reason.ADDRESS, 'no such thing')
+
+    on_read(rig, monkeypatch, refuse)
+    assert len(connect(rig).values) == 116
+    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
+    assert rig.notes.told(
+        'parameters: 3 are left out, for the drive has none of the option cards that they need '
+        '(Y or Z, X1)',
+        Severity.INFO,
+    )
 
 
 @pytest.mark.parametrize('reason', [Reason.ADDRESS, Reason.VALUE, Reason.STATE])
