@@ -20,8 +20,12 @@ from collections import Counter
 from collections.abc import Iterator
 import contextlib
 import json
+from pathlib import Path
 import re
+import subprocess
+import sys
 
+from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from parameter_bench import COUNTED
@@ -33,12 +37,9 @@ from support.movitrac_ends import COUNTS
 from support.movitrac_ends import ENDS
 from support.movitrac_ends import Ends
 from support.movitrac_ends import Value
-from ways import Way
-from ways import needs
+from ways import WAYS
 
 from nfo_sinus_driver.demo.domain import own_domain
-
-pytestmark = [pytest.mark.every_way, needs('movitrac')]
 
 #: What has to be so for a setting to be switched on [M4 §2.1.2].
 _NEEDS = {
@@ -94,22 +95,20 @@ def select(index: int, raw: str) -> str:
 
 
 @pytest.fixture(scope='module')
-def rigs(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[dict[str, Rig]]:
+def rigs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Rig]]:
     """The drives by their option cards, each made when it is first asked for."""
     with contextlib.ExitStack() as stack:
-        yield _Rigs(stack, tmp_path_factory, way)
+        yield _Rigs(stack, tmp_path_factory)
 
 
 class _Rigs(dict[str, Rig]):
-    def __init__(
-        self, stack: contextlib.ExitStack, folders: pytest.TempPathFactory, way: Way
-    ) -> None:
-        self._stack, self._folders, self._way = stack, folders, way
+    def __init__(self, stack: contextlib.ExitStack, folders: pytest.TempPathFactory) -> None:
+        self._stack, self._folders = stack, folders
 
     def __missing__(self, card: str) -> Rig:
         domain = self._stack.enter_context(own_domain())
         folder = self._folders.mktemp(card or 'no_card')
-        bench = self._stack.enter_context(Bench(domain, folder, self._way))
+        bench = self._stack.enter_context(Bench(domain, folder, WAYS['movitrac']))
         self[card] = Rig(bench, card)
         return self[card]
 
@@ -190,9 +189,28 @@ def _numbers(reason: str, name: str) -> set[float]:
     return {float(number) for number in said}
 
 
-def test_the_telegrams_of_the_manual(bench: Bench) -> None:
-    """Reading the heat sink temperature, and setting t11 [M4 §2.4.3, §2.4.4]."""
-    bench.simulator('--address', '0', paced=False)
+def test_the_telegrams_of_the_manual(tmp_path: Path) -> None:
+    """Reading the heat sink temperature, and setting t11 to 3.7 s [M4 §2.4.3, §2.4.4]."""
+    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+        bench.simulator('--address', '0', paced=False)
+        _read_the_temperature(bench)
+        _set_the_ramp(bench)
+
+
+def _read_the_temperature(bench: Bench) -> None:
+    command = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+    drive = ('--protocol', 'movitrac', '--model', 'movitrac31', '--address', '0')
+    done = subprocess.run(
+        [*command, 'get', '--port', bench.port, *drive, 'status.heat_sink_temperature'],
+        capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert '25.5 °C' in done.stdout
+    frames = [frame['hex'] for frame in bench.frames()]
+    assert frames[frames.index('b5000004b9') + 1] == 'c800040000255041'
+
+
+def _set_the_ramp(bench: Bench) -> None:
     bench.driver('-p', 'address:=0')
     client = bench.client().connected()
     assert set_one(client, 'ramp.t11_up', 3.7).successful
