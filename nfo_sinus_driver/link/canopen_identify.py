@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NotReady
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import Reply
 
 _SPACE = 'object'

@@ -29,13 +29,14 @@ from nfo_sinus_driver.link.can import FUNCTION_CODE
 from nfo_sinus_driver.link.can import CanPort
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
@@ -44,7 +45,6 @@ from nfo_sinus_driver.link.sdo import Download
 from nfo_sinus_driver.link.sdo import Kind
 from nfo_sinus_driver.link.sdo import Transfer
 from nfo_sinus_driver.link.sdo import Upload
-from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.link.socketcan import SocketCan
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.

@@ -30,7 +30,7 @@ import struct
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import sdo_abort
-from nfo_sinus_driver.link.errors import DamagedAnswer
+from nfo_sinus_driver.link.interface import DamagedAnswer
 
 #: Added to the address of a node, the identifiers of what it is asked, and of its answers.
 REQUESTS = 0x600

@@ -29,7 +29,7 @@ from nfo_sinus_driver.link.can import CANNOT_SEND
 from nfo_sinus_driver.link.can import IDENTIFIERS
 from nfo_sinus_driver.link.can import MOST_DATA
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.interface import PortError
 
 #: struct can_frame and struct can_filter (linux/can.h).
 _FRAME = struct.Struct('=IB3x8s')

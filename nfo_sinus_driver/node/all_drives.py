@@ -27,7 +27,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive.broadcast import broadcast_stop
+from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -41,12 +41,7 @@ _Command = Callable[[ManagedDrive], Future[Report]]
 
 
 class AllDrives:
-    """
-    Offers ``~/stop_all``, ``~/enable_all`` and ``~/disable_all`` on the bus node.
-
-    Drives that are only monitored are left alone. The answer has a part for each of the others,
-    those that failed in front.
-    """
+    """Offers ``~/stop_all`` and its like on the bus node, for all drives but monitored ones."""
 
     def __init__(self, node: Node, context: BusContext) -> None:
         self._node = node
@@ -81,7 +76,7 @@ class AllDrives:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
         failed, done = self._command(_stop_one, _LONGEST_STOP)
         if failed and self._context.bus.protocol.broadcast is not None:
-            if any(one.settings.control_method == 'monitor' for one in self._context.drives):
+            if any(one.settings.method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
             else:
                 failed.append(self._broadcast())
@@ -106,7 +101,7 @@ class AllDrives:
         futures: list[tuple[ManagedDrive, Future[Report]]] = []
         with self._context.at_once():
             for managed in self._context.drives:
-                if managed.settings.control_method == 'monitor':
+                if managed.settings.method == 'monitor':
                     continue
                 try:
                     futures.append((managed, command(managed)))

@@ -27,8 +27,8 @@ from fuzz.mutations import Mutator
 from nfo_sinus_driver.link import lawicel
 from nfo_sinus_driver.link import sdo
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import Refused
 
 _MOST_KEPT = 30
 _MANY = 25

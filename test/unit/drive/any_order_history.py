@@ -90,7 +90,7 @@ class History:
         self._rig = rig
         self._far = rig.far
         self._optimal = rig.settings.model == 'sinus_optimal'
-        self._method = rig.settings.control_method
+        self._method = rig.settings.method
         self._follows = rig.settings.reference == 'fieldbus'
         rig.gave = self.gave
         self._commands: list[Command] = []

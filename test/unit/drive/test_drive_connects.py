@@ -33,7 +33,7 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -49,7 +49,7 @@ ONLY_READ = {3, 17, 43}
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.2)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
 
 
 def test_connect_says_who_answers(rig: Rig) -> None:
@@ -225,7 +225,7 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
     [
         ({'address': -1}, 'allowed are 0 to 247'),
         ({'address': 248}, 'allowed are 0 to 247'),
-        ({'model': 'sinus_h'}, "choose one of 'sinus_g2'"),
+        ({'model': 'sinus_x'}, "'sinus_g2', "),
         ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'monitor'"),
         (
             {'reference': 'analog', 'control_method': 'drive_control'},

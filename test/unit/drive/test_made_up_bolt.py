@@ -22,6 +22,7 @@ closed, has a time-out that always stops, and runs in one direction.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import dataclasses
 from pathlib import Path
 import shutil
 from typing import Any
@@ -42,7 +43,6 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
-from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
@@ -129,10 +129,13 @@ def test_it_is_found(bus: Bus) -> None:
 
 
 def test_the_usual_control_method_is_that_of_the_family() -> None:
-    assert DriveSettings(model='bolt').control_method == 'function_bits'
-    assert DriveSettings(model='sinus_g2').control_method == 'mode_scmd'
-    # nobody knows it yet
-    assert DriveSettings(model=AUTO).control_method == ''
+    g2 = DriveSettings(model='sinus_g2')
+    assert g2.method == 'mode_scmd'
+    # what was not chosen is not kept when the model turns out to be another
+    assert dataclasses.replace(g2, model='bolt').method == 'function_bits'
+    assert DriveSettings(model=AUTO).method == ''
+    with pytest.raises(ValueError, match="control_method 'mode_scmd': choose one of"):
+        DriveSettings(model='bolt', control_method='mode_scmd')
 
 
 def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: Bus) -> None:
@@ -320,10 +323,10 @@ def test_a_set_point_is_limited_to_the_one_direction(bolt: Bolt, bus: Bus) -> No
 
 def test_what_a_drive_cannot_measure_is_its_familys() -> None:
     bolt, acme = load_family('bolt'), load_family('acme')
-    assert can_be(bolt, 'status.hertz', 119.0) and not can_be(bolt, 'status.hertz', -121.0)
-    assert can_be(acme, 'status.hertz', 400.0)
+    assert bolt.can_be('status.hertz', 119.0) and not bolt.can_be('status.hertz', -121.0)
+    assert acme.can_be('status.hertz', 400.0)
     # neither a word whose code the manual lacks
-    assert can_be(bolt, 'bus.told', 145 << 16) and not can_be(bolt, 'bus.told', 7 << 16)
+    assert bolt.can_be('bus.told', 145 << 16) and not bolt.can_be('bus.told', 7 << 16)
 
 
 @pytest.mark.parametrize('role', ['status_word', 'actual_frequency'])

@@ -31,8 +31,8 @@ from nfo_sinus_driver.link import canopen_link
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.settings import LineSettings
 
 TIMEOUT = 0.2
 SETTINGS = LineSettings(baud_rate=125_000, char_format='8N1', response_timeout=TIMEOUT)

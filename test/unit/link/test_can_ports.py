@@ -36,12 +36,12 @@ from nfo_sinus_driver.link import lawicel_port
 from nfo_sinus_driver.link import socketcan
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
-from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.link.socketcan import SocketCan
 
 REQUEST = Frame(0x605, bytes.fromhex('4013200000000000'))

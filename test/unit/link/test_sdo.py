@@ -22,8 +22,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.sdo import LONGEST_VALUE
 from nfo_sinus_driver.link.sdo import Download
 from nfo_sinus_driver.link.sdo import Transfer
