@@ -24,6 +24,7 @@ import re
 import time
 
 from nfo_sinus_driver.link import lawicel
+from nfo_sinus_driver.link import nmt
 from nfo_sinus_driver.link import sdo
 from nfo_sinus_driver.link.can import FUNCTION_CODE
 from nfo_sinus_driver.link.can import CanPort
@@ -56,6 +57,8 @@ _ADAPTER_RATE = 115_200
 _EVERYWHERE = ((0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1))
 #: The name of a network interface, which no path of a device has.
 _INTERFACE = re.compile(r'[^/:\s]+')
+#: How often nodes hear that the client is there, s, as long as it talks to any of them.
+_HEARTBEAT = 0.1
 #: Bits of a frame with eight bytes, at least.
 _FRAME_BITS = 108
 #: The longest value that comes in one answer, bytes.
@@ -87,6 +90,10 @@ class CanopenLink:
     told twice just when the next one is lost.
 
     A value is as long as the node says, whatever the table says [C102].
+
+    A node is made operational before the first write to it, and again when it has started anew:
+    reading changes nothing. From then on the client's heartbeat is sent along with what it asks,
+    by the thread that asks: a node that watches over it (1016h) notices when that thread is gone.
     """
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
@@ -108,6 +115,9 @@ class CanopenLink:
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds
         )
+        #: The nodes that were made operational.
+        self._started: set[int] = set()
+        self._heartbeat_due = 0.0
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
@@ -119,7 +129,8 @@ class CanopenLink:
         :raises ValueError: it is none of them; the message says what to write.
         """
         if _INTERFACE.fullmatch(port):
-            return cls(SocketCan(port, ((sdo.ANSWERS, FUNCTION_CODE),)), settings)
+            wanted = ((sdo.ANSWERS, FUNCTION_CODE), (nmt.HEARTBEATS, FUNCTION_CODE))
+            return cls(SocketCan(port, wanted), settings)
         serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE))
         return cls(LawicelPort(serial, settings.baud_rate), settings)
 
@@ -131,6 +142,7 @@ class CanopenLink:
         """Close the port; harmless when it is closed already."""
         self._port.close()
         self._late.clear()
+        self._started.clear()
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Take parameters that are safe to read; here those are asked that every node has."""
@@ -157,6 +169,10 @@ class CanopenLink:
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter; the length has to be the one that the node knows."""
         download = Download(unit, address.index, address.sub_index or 0, data)
+        self._drain()
+        if unit not in self._started:
+            self._port.send(nmt.start(unit))
+            self._started.add(unit)
         try:
             return Reply(b'', self._transact(download))
         except _Ambiguous:
@@ -223,13 +239,14 @@ class CanopenLink:
 
     def _transact(self, transfer: Transfer) -> float:
         """Carry out a transfer; return when its last answer came."""
-        while self._port.receive(0.0):
-            # what came unasked: an answer that is late, or one to somebody else
-            continue
+        self._drain()
         arrived = 0.0
         while transfer.request is not None:
             self._late.sent(transfer)
             sent = time.monotonic()
+            if self._started and sent >= self._heartbeat_due:
+                self._port.send(nmt.HEARTBEAT)
+                self._heartbeat_due = sent + _HEARTBEAT
             self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.request))
             try:
                 arrived = self._receive(transfer, sent)
@@ -245,6 +262,17 @@ class CanopenLink:
             self._late.release(transfer.unit)
         return arrived
 
+    def _drain(self) -> None:
+        """Take what came unasked: an answer that is late, one to somebody else, a boot-up."""
+        while self._take(0.0):
+            continue
+
+    def _take(self, until: float) -> Sequence[Frame]:
+        """Return what has come, as the port does; note which nodes have started anew."""
+        frames = self._port.receive(until)
+        self._started.difference_update(map(nmt.booted, frames))
+        return frames
+
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
@@ -252,7 +280,7 @@ class CanopenLink:
         deadline = sent + self._settings.response_timeout
         other = 0
         while True:
-            frames = self._port.receive(deadline)
+            frames = self._take(deadline)
             now = time.monotonic()
             for frame in frames:
                 if frame.identifier != sdo.ANSWERS + unit:
@@ -286,7 +314,7 @@ class CanopenLink:
         if self._late.repeated is not None and now < sent + soonest:
             until = sent + max(soonest, self._late.longest(unit))
             while time.monotonic() < until:
-                came = self._port.receive(until)
+                came = self._take(until)
                 if any(frame.identifier == answer.identifier for frame in came):
                     raise DamagedAnswer(f'unit {unit}: an answer came twice')
         self._late.took(unit, now - sent)

@@ -78,6 +78,7 @@ class Bus:
     The port of a link, the clock that it sees, and the nodes.
 
     :ivar sent: every message, and to which node.
+    :ivar other: whatever else was sent, and when.
     :ivar begun: of the messages with which a transfer begins: node, index, sub-index, whether it
         writes, and its fate.
     """
@@ -92,6 +93,7 @@ class Bus:
             for unit in (UNIT, 6)
         }
         self.sent: list[tuple[int, bytes]] = []
+        self.other: list[tuple[float, Frame]] = []
         self.begun: list[tuple[int, int, int, bool, str]] = []
         self._free: dict[int, float] = {}
         self._arrivals: list[tuple[float, int, Frame]] = []
@@ -126,6 +128,9 @@ class Bus:
 
     def send(self, frame: Frame) -> None:
         unit = frame.identifier - 0x600
+        if not 0 < unit < 128:
+            self.other.append((self.now, frame))
+            return
         self.sent.append((unit, frame.data))
         self._looks = 0
         fate = next(self._fates, GOOD)

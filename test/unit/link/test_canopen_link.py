@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 from canopen_bench import DROP
 from canopen_bench import FRAME_TIME
 from canopen_bench import GOOD
@@ -286,6 +288,67 @@ def test_closing_ends_every_quarantine() -> None:
     bench.do(bench.link.open)
     bench.read(A)
     assert bench.asked == [A.index, A.index]
+
+
+# --- who is there ---------------------------------------------------------------------------------
+
+START = Frame(0, b'\x01\x05')
+HEARTBEAT = Frame(0x77F, b'\x05')
+
+
+def starts(bench: Bench) -> list[Frame]:
+    return [frame for _, frame in bench.bus.other if frame.identifier == 0]
+
+
+def test_reading_changes_nothing() -> None:
+    bench = Bench()
+    for _ in range(3):
+        bench.read(A)
+        bench.bus.now += 1
+    assert bench.bus.other == []
+
+
+def test_a_node_is_made_operational_before_the_first_write() -> None:
+    bench = Bench()
+    bench.write(A)
+    assert bench.bus.other[0][1] == START
+    bench.write(A)
+    bench.write(A, unit=6)
+    assert starts(bench) == [START, Frame(0, b'\x01\x06')]
+    bench.do(bench.link.close)
+    bench.do(bench.link.open)
+    bench.write(A)
+    assert len(starts(bench)) == 3
+
+
+@pytest.mark.parametrize('reads', [0, 1])
+def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
+    bench = Bench()
+    bench.write(A)
+    bench.bus.now += 1
+    # another one produces a heartbeat, and others start anew
+    for identifier, data in ((0x705, b'\x05'), (0x706, b'\0'), (0x700, b'\0')):
+        bench.bus.arrive(bench.bus.now, Frame(identifier, data))
+    bench.write(A)
+    assert len(starts(bench)) == 1
+    bench.bus.arrive(bench.bus.now + (0.0005 if reads else 0.0), Frame(0x705, b'\0'))
+    for _ in range(reads):
+        bench.read(A)
+    bench.write(A)
+    assert starts(bench) == [START, START]
+
+
+def test_whoever_writes_is_heard_ten_times_a_second() -> None:
+    bench = Bench()
+    bench.write(A)
+    until = bench.bus.now + 2
+    while bench.bus.now < until:
+        bench.read(A)
+        bench.bus.now += 0.01
+    beats = [when for when, frame in bench.bus.other if frame == HEARTBEAT]
+    pauses = [after - before for before, after in itertools.pairwise(beats)]
+    assert min(pauses) >= 0.1 and max(pauses) < 0.12
+    assert len(beats) >= 18
 
 
 # --- whatever happens -----------------------------------------------------------------------------
