@@ -254,7 +254,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         nargs='?',
         type=_setpoint,
         metavar='SETPOINT',
-        help='in the unit of the control mode: Hz, rpm, % of nominal torque, or that of the '
+        help='in the unit of the control mode: Hz, rpm, %% of nominal torque, or that of the '
         'process; negative is reverse',
     )
     add(

@@ -128,10 +128,10 @@ class Rig:
 
     def why_not(self, **values: Any) -> str:
         """Return why parameters are not changed; nothing may have been written."""
-        before = (dict(self.far.writes), list(self.modes), self.far.control_unit.status_code)
+        before = (dict(self.far.writes), list(self.modes), self.far.motor.driven)
         with pytest.raises(DriveError) as error:
             self.change(**values)
-        assert (dict(self.far.writes), self.modes, self.far.control_unit.status_code) == before
+        assert (dict(self.far.writes), self.modes, self.far.motor.driven) == before
         return said(error.value)
 
 
