@@ -82,21 +82,13 @@ class ErrorLogArea:
         return [(what, key.format(entry)) for what, key in self.readings]
 
     def address(self, entry: int) -> int:
-        """
-        Return where an entry begins, 0 being the newest.
-
-        :raises IndexError: no drive has so many entries.
-        """
+        """Return where an entry begins, 0 being the newest; an IndexError beyond the last."""
         if not 0 <= entry < self.limit:
             raise IndexError(f'the error log has {self.limit} entries, not {entry + 1}')
         return self.first + self.stride * entry
 
     def place(self, entry: int) -> tuple[str, int, int | None, int]:
-        """
-        Return what a link is told of an entry: space, index, sub-index and size in bytes.
-
-        :raises IndexError: no drive has so many entries.
-        """
+        """Return what a link is told of an entry: space, index, sub-index and size in bytes."""
         index = self.address(entry)
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None

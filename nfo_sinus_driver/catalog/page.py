@@ -124,11 +124,7 @@ def page() -> str:
 
 
 def _family(family: Family, taken: list[str]) -> Iterator[str]:
-    """
-    Return the parts of a family.
-
-    :param taken: the titles of groups that stand on the page already: their links have a number.
-    """
+    """Return the parts of a family; links to titles that were ``taken`` before have a number."""
     yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'

@@ -80,11 +80,7 @@ class Address:
 
     @property
     def number(self) -> Number:
-        """
-        The codec of what is no text.
-
-        :raises ValueError: it is a text.
-        """
+        """The codec of what is no text (ValueError: it is a text)."""
         if isinstance(self.codec, Text):
             raise ValueError(f'{self.codec.name} is no number')
         return self.codec
@@ -177,11 +173,7 @@ class Parameter:
         return switched == {0: False, 1: True}
 
     def at(self, protocol: str) -> Address:
-        """
-        Return where it stands on ``protocol``.
-
-        :raises KeyError: the parameter cannot be reached over that protocol.
-        """
+        """Return where it stands on ``protocol``; a KeyError if that does not reach it."""
         try:
             return self.addresses[protocol]
         except KeyError:
@@ -275,11 +267,7 @@ class Parameter:
         return any(isinstance(codec, Number) and not codec.signed for codec in codecs)
 
     def quantise(self, value: float, protocol: str = 'modbus') -> bytes:
-        """
-        Turn a set-point into the bytes of the nearest step of the drive.
-
-        :raises ValueError: not finite, or out of range.
-        """
+        """Turn a finite set-point in range into the bytes of the nearest step of the drive."""
         number = self._number(value)
         factor = self.factor(protocol)
         self._check_range(number, protocol)
@@ -299,11 +287,7 @@ class Parameter:
         return found
 
     def _meaning(self, code: Fraction) -> Value:
-        """
-        Return what a code of an enumeration means.
-
-        :raises ValueError: it means nothing of the type, or is none.
-        """
+        """Return what a code of an enumeration means, or a ValueError if it means nothing."""
         label = self.labels.get(int(code)) if code.denominator == 1 else None
         if self.kind is str and code.denominator == 1:
             return str(code) if label is None else label

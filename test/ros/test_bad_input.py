@@ -39,7 +39,7 @@ from ways import SILENCE
 from ways import Way
 from ways import needs
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _CANNOT_START = 2

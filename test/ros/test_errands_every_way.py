@@ -34,7 +34,7 @@ from rclpy.qos import QoSProfile
 from tuner import Tuner
 from ways import Way
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: test/unit/drive has the same over every way.

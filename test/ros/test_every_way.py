@@ -35,7 +35,7 @@ from unit.catalog import setting_names
 from ways import Way
 from ways import needs
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.simulator.control import Client as Simulated
 

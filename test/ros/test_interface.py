@@ -39,7 +39,7 @@ from rclpy.qos import ReliabilityPolicy
 from ways import Way
 from ways import needs
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 
 #: What a drive says of itself that turns at its set-point.
 _RUNNING = (

@@ -29,7 +29,7 @@ import pytest
 from support.variants import hardest
 from ways import Way
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: The computer has more to do than this one driver.

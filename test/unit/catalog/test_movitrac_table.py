@@ -252,7 +252,7 @@ def test_error_log() -> None:
     assert kept[4] == [436, 438, 439, 440, 442]
 
 
-@pytest.mark.parametrize(('number', 'first'), enumerate((400, 409, 418, 427, 436)))
+@pytest.mark.parametrize(('number', 'first'), list(enumerate((400, 409, 418, 427, 436))))
 def test_fault_memory(number: int, first: int) -> None:
     kept = [row for row in MOVITRAC.values() if row.name.startswith(f'Fault t-{number} ')]
     assert [index(row) - first for row in kept] == [0, 2, 3, 4, 6, 7, 8]

@@ -44,8 +44,8 @@ from support import trace_laws
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.sinus.variant import ALL
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0

@@ -37,14 +37,14 @@ import pytest
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.refusal import Refused as Refusal
-from nfo_sinus_driver.simulator.sinus.variant import ALL
-from nfo_sinus_driver.simulator.sinus.variant import DROPS
-from nfo_sinus_driver.simulator.sinus.variant import KEEPS
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
-from nfo_sinus_driver.simulator.sinus.variant import REFUSED
-from nfo_sinus_driver.simulator.sinus.variant import SCMD
-from nfo_sinus_driver.simulator.sinus.variant import TAKEN
+from nfo_sinus_driver.simulator.memory import Refused as Refusal
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL
+from nfo_sinus_driver.simulator.sinus.control_unit import DROPS
+from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
+from nfo_sinus_driver.simulator.sinus.control_unit import SCMD
+from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.

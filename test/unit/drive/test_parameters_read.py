@@ -39,11 +39,10 @@ from support.said import said
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import parameters as parameters_module
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 
 @pytest.fixture
@@ -166,11 +165,11 @@ def test_switch_that_is_neither_on_nor_off(
     assert rig.notes.told('serial.auto_stop: the drive has code 2', Severity.WARNING)
     at_keypad(rig, 'serial.auto_stop', True)
     wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
-    wait_until(lambda: rig.drive._inverter.auto_stop)
+    wait_until(lambda: rig.drive.inverter.auto_stop)
     # nobody relies on a value that is gone
     put_raw(rig, 'serial.auto_stop', 2)
     wait_until(lambda: 'serial.auto_stop' not in parameters.values)
-    wait_until(lambda: not rig.drive._inverter.auto_stop)
+    wait_until(lambda: not rig.drive.inverter.auto_stop)
     told = [text for _, text in rig.notes.events if 'has code 2' in text]
     assert len(told) == 2
 
@@ -302,7 +301,7 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
     rig: Rig, busy_watch: None, auto: bool
 ) -> None:
     parameters = connect(rig)
-    inverter = rig.drive._inverter
+    inverter = rig.drive.inverter
     at_keypad(rig, 'serial.sio_tot', 5)
     at_keypad(rig, 'serial.auto_stop', auto)
     wait_until(lambda: inverter.sio_tot == 5 and inverter.auto_stop is auto)
@@ -316,12 +315,12 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
 def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig) -> None:
     rig = make_rig(allow_communication_changes=True)
     connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
-    assert rig.drive._inverter.sio_tot == 3
-    assert rig.drive._inverter.auto_stop
+    assert rig.drive.inverter.sio_tot == 3
+    assert rig.drive.inverter.auto_stop
 
 
 @pytest.mark.parametrize(
-    'error', [DriveError(Report(Cause.NOT_ACTIVE)), RuntimeError('a mistake')]
+    'error', [DriveError(Cause.NOT_ACTIVE), RuntimeError('a mistake')]
 )
 def test_a_first_reading_that_fails_leaves_nothing_connected(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception
