@@ -144,7 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     common = _common()
     parser = argparse.ArgumentParser(
         prog='nfo-sinus',
-        description='Looks after NFO Sinus drives on a serial line.',
+        description='Looks after frequency inverters on a serial line.',
         epilog=_EPILOG,
         parents=[common],
     )

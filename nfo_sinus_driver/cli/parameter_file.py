@@ -50,7 +50,7 @@ _PARAMETERS = 'ros__parameters'
 STANDARD = '-'
 #: What ROS itself gives to nodes, below names with dots.
 _ROS_OWN = ('qos_overrides.',)
-_TITLE = '# Parameters of an NFO Sinus drive; also a ROS parameter file.'
+_TITLE = '# Parameters of a drive; also a ROS parameter file.'
 _HEADER_LINE = re.compile(rf'# ({"|".join(HEADER)}): (.*)')
 
 

@@ -46,6 +46,8 @@ from nfo_sinus_driver.drive import Report
 _PERIOD = 0.1
 #: How long the word may take why it was stopped, s.
 _LONGEST_WORD = 1.0
+#: How long the stop may take that comes with connecting, s.
+_LONGEST_STOP = 5.0
 #: Why a motor follows set-points no more.
 _ENDS = (Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, Cause.LOST, Cause.LOST_IN_USE)
 _FAILED = 1
@@ -145,9 +147,24 @@ class _Ride:
         control, drive = self._session, self._drive
         control.wait(drive.connect())
         drive.activate()
-        control.wait(drive.enable(), self._show)
+        self._enable()
         if self._options.seconds is not None:
             self._ends_at = time.monotonic() + self._options.seconds
+
+    def _enable(self) -> None:
+        """Enable it, once the stop is confirmed that connecting has made sure of."""
+        deadline = time.monotonic() + _LONGEST_STOP
+        while True:
+            try:
+                self._session.wait(self._drive.enable(), self._show)
+                return
+            except DriveError as error:
+                pending = error.report.cause is Cause.STOP_PENDING
+                if not pending or time.monotonic() >= deadline:
+                    raise
+            name = self._session.signal(_PERIOD)
+            if name:
+                raise Ended(name, _INTERRUPTED, name)
 
     def _follow(self) -> None:
         """Keep the set-point fresh until something ends it, by :class:`Ended`."""

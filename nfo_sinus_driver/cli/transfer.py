@@ -70,7 +70,8 @@ def dump(options: argparse.Namespace) -> int:
         lost = [key for key in drive.parameters.data if key not in values]
     write_file(options.file, format_file(_header(drive, identity), values, drive.model))
     where = '' if options.file == '-' else f' saved in {options.file}'
-    remark(f'{len(values)} parameters of {drive}, {identity}{where}')
+    told = ', '.join(filter(None, (str(drive), str(identity))))
+    remark(f'{len(values)} parameters of {told}{where}')
     if lost:
         remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
     return int(bool(lost))

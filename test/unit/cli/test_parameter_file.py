@@ -88,7 +88,7 @@ def test_it_is_a_ros_parameter_file() -> None:
     }
     text = format_file({'model': 'sinus_g2', 'date': '2026-01-02 03:04:05 +0000'}, values, G2)
     assert text == (
-        '# Parameters of an NFO Sinus drive; also a ROS parameter file.\n'
+        '# Parameters of a drive; also a ROS parameter file.\n'
         '#\n'
         '# model: sinus_g2\n'
         '# date: 2026-01-02 03:04:05 +0000\n'

@@ -553,3 +553,17 @@ def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
         assert bench.state()['driven']
         process.send_signal(signal.SIGINT)
         process.wait(PATIENCE)
+
+
+def test_a_drive_whose_stop_takes_its_time_is_enabled_when_it_is_confirmed(
+    make_bench: MakeBench,
+) -> None:
+    """A MOVITRAC keeps its control mode: connecting makes sure that nothing of before turns it."""
+    settings = {'serial.control_mode': 'Remote control', 'serial.response_time': 100}
+    bench = make_bench(
+        model='movitrac31', protocol='movitrac', serial_numbers=[], settings=settings
+    )
+    done = bench.run('run', 10, '--for', 1)
+    assert done.status == 0, done.err
+    assert '10.0 Hz' in done.out
+    assert not bench.state()['driven']
