@@ -79,10 +79,23 @@ def words_classic(answer: bytes) -> tuple[int, ...]:
     return (int(answer[8:12], 16),)
 
 
+def ask_movitrac(request: bytes) -> bytes:
+    """Return an ENQUIRY with its check sum."""
+    return request[:-1] + bytes((sum(request[:-1]) & 0xFF,))
+
+
+def words_movitrac(answer: bytes) -> tuple[int, ...]:
+    """Return the words of a DATA."""
+    if sum(answer[:-1]) & 0xFF != answer[-1]:
+        raise SystemExit(f'damaged on a perfect line: {answer.hex()}')
+    return struct.unpack(f'>{len(answer) // 2 - 2}H', answer[3:-1])
+
+
 #: How a request is made, and how its answer is read.
 _CODECS: dict[str, tuple[Callable[[bytes], bytes], Callable[[bytes], tuple[int, ...]]]] = {
     'modbus_rtu': (ask_rtu, words_rtu),
     'classic': (ask_classic, words_classic),
+    'movitrac': (ask_movitrac, words_movitrac),
 }
 
 

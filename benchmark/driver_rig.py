@@ -41,7 +41,7 @@ from nfo_sinus_driver.catalog import load_family
 
 #: Unlike any other drive's name: what is said to these must never reach a motor.
 NAMES = [f'simulated_for_bench_{number}' for number in range(1, 33)]
-_FORMATS = {'modbus_rtu': '8E1', 'modbus_ascii': '7E1', 'classic': '7E1'}
+_FORMATS = {'modbus_rtu': '8E1', 'modbus_ascii': '7E1', 'classic': '7E1', 'movitrac': '8N1'}
 _DEPTH = 10
 #: From the moment that every drive is polled until nothing is special any more, s.
 _SETTLE = 2.0
@@ -145,6 +145,7 @@ class DriverRig(Rig):
             parameters = {
                 'port': self.port,
                 'protocol': protocol,
+                'model': self.line.model,
                 'baud_rate': baud_rate,
                 **settings,
             }
@@ -172,9 +173,12 @@ class DriverRig(Rig):
         active = self.listener.active
         self.wait_for(lambda: active.keys() >= set(self.names), self.driver)
         done = max(active.values())
-        space = 'classic' if self.line.protocol == 'classic' else 'modbus'
-        settings = load_family('sinus_g2').settings
-        wanted = {parameter.key for parameter in settings if space in parameter.addresses}
+        wanted = {
+            parameter.key
+            for parameter in load_family(self.line.model).settings
+            # no drive here has an option card
+            if self.line.space in parameter.addresses and not parameter.option
+        }
         for name in self.names:
             if not self.listener.known(name) >= wanted:
                 self.wait_for(lambda name=name: self.listener.known(name) >= wanted, self.driver)

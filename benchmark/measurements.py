@@ -51,8 +51,10 @@ def all_measurements() -> Iterator[Measurement]:
     """Return every measurement in the order of the tables."""
     for group, protocol in (('rtu', 'modbus_rtu'), ('classic', 'classic')):
         for baud_rate in (57600, 19200):
-            measure = partial(speed.measure, protocol, baud_rate)
+            measure = partial(speed.measure, protocol, baud_rate, speed.DRIVES)
             yield Measurement(group, protocol, baud_rate, measure)
+    measure = partial(speed.measure, 'movitrac', 9600, speed.SLOW_DRIVES)
+    yield Measurement('movitrac', 'movitrac', 9600, measure)
     at = setpoints.BAUD_RATE
     yield Measurement('setpoints', 'an idle line', at, setpoints.measure_idle)
     for drives in setpoints.DRIVES:

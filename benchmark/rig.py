@@ -85,7 +85,8 @@ class Rig(contextlib.ExitStack):
             simulator = self.start(
                 *(executable('simulator'), '--link', self.port, '--baud', str(baud_rate)),
                 *('--char-format', char_format, '--paced', '--trace', str(self._trace)),
-                *('--protocol', protocol, '--boot-time', '0', *addresses),
+                *('--protocol', protocol, '--model', self.line.model),
+                *('--boot-time', '0', *addresses),
             )
             self.wait_for(lambda: 'serving' in self.log, simulator)
             failing.pop_all()

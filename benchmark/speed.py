@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 import subprocess
@@ -37,9 +38,14 @@ from nfo_sinus_driver.catalog import load_family
 
 #: The first and the second are measured one after the other: they are compared.
 DRIVES = (32, 1, 8)
-#: What a poll reads, one transaction each: the plain cycle of four.
-_POLLED = ('fieldbus.drive_status', 'fieldbus.inv_st', 'status.frq_act', 'status.spd_act')
-_STATUS = _POLLED[0]
+#: Of a MOVITRAC a cycle at 9600 bit/s takes half a second with so many.
+SLOW_DRIVES = (8, 1)
+#: What a poll reads, one transaction each, by the model: the plain cycle.
+_POLLED = {
+    'sinus_g2': ('fieldbus.drive_status', 'fieldbus.inv_st', 'status.frq_act', 'status.spd_act'),
+    # the status has the code in it; who controls the drive is asked once a second
+    'movitrac31': ('fieldbus.inverter_status', 'status.frequency', 'status.speed'),
+}
 #: So much longer than the plain cycle is a cycle that carries telemetry and parameters too.
 _LONGER = 1.4
 #: A window lasts this many cycles more at most, until it has two polls of every drive.
@@ -49,13 +55,15 @@ _WARM_UP = 1.0
 #: Where others than the bare loop and minimalmodbus are measured: bit/s and drives.
 _OTHERS_AT = (57600, 8)
 _AIMS = {'ratio': 1.05, 'bare_ratio': 1.02, 'short_gaps': 0.0, 'cpu_to_bare': 2.0}
-_CHAR_FORMATS = {'modbus_rtu': '8N2', 'classic': '7E1'}
+_CHAR_FORMATS = {'modbus_rtu': '8N2', 'classic': '7E1', 'movitrac': '8N1'}
 
 
-def measure(protocol: str, baud_rate: int, effort: Effort) -> list[Row]:
+def measure(
+    protocol: str, baud_rate: int, numbers: Sequence[int], effort: Effort
+) -> list[Row]:
     """Return the rows of the driver, and of other masters that make its transactions."""
     rows = [
-        row for drives in DRIVES for row in _with(protocol, baud_rate, drives, effort)
+        row for drives in numbers for row in _with(protocol, baud_rate, drives, effort)
     ]
     of_one = next(row for row in rows if row.table == 'driver' and row.drives == 1)
     rows = [_compared(row, of_one) if row.table == 'driver' else row for row in rows]
@@ -145,12 +153,15 @@ def watch(rig: Rig, process: subprocess.Popen[str], effort: Effort) -> Window:
 
 
 def plain_cycle(line: Line) -> float:
-    """Return the least time of the four transactions of a poll, for one drive, s."""
-    return sum(_read_time(line, key) for key in _POLLED)
+    """Return the least time of the transactions of a poll, for one drive, s."""
+    return sum(_read_time(line, key) for key in _POLLED[line.model])
 
 
 def _read_time(line: Line, key: str) -> float:
-    parameter = load_family('sinus_g2')[key]
+    parameter = load_family(line.model)[key]
+    if line.protocol == 'movitrac':
+        # an ENQUIRY of 5 characters and a DATA of 8 [M4 §2.1.1]
+        return 13 * line.character + line.gap
     if line.protocol == 'classic':
         # an ENQUIRY of 8 characters and a REPLY of 14 for each word [M0 §6.1.3]
         return parameter.at('classic').codec.size * 11 * line.character
@@ -170,5 +181,5 @@ def cycles(window: Window, rig: Rig) -> Figures:
 
 def _place(rig: Rig) -> int:
     """Return the register or Classic id of the status."""
-    space = 'classic' if rig.line.protocol == 'classic' else 'modbus'
-    return load_family('sinus_g2')[_STATUS].at(space).index
+    line = rig.line
+    return load_family(line.model)[_POLLED[line.model][0]].at(line.space).index

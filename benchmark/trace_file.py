@@ -26,12 +26,14 @@ import statistics
 import struct
 
 #: Start, eight data, parity and stop bits, or two stop bits in place of the parity: Modbus RTU;
-#: and with seven data bits: Modbus ASCII and Classic.
-_BITS = {'modbus_rtu': 11, 'modbus_ascii': 10, 'classic': 10}
+#: and with seven data bits: Modbus ASCII and Classic; without a parity: MOVITRAC.
+_BITS = {'modbus_rtu': 11, 'modbus_ascii': 10, 'classic': 10, 'movitrac': 10}
 READ_FUNCTIONS = (3, 4)
 _WRITE_ONE, _WRITE_SEVERAL, _READ_AND_WRITE = 6, 16, 23
 #: How a Classic ENQUIRY begins and ends; the address is a character from here on [M0 §6.1].
 _EOT, _ENQ, _ADDRESS_ZERO = 4, 5, 0x20
+#: How a MOVITRAC's ENQUIRY begins, and how many characters of silence are before it.
+_ENQUIRY, _SWITCHING = 0xB5, 2
 #: Less than this is what floating point makes of a time since the machine started, s.
 _ROUNDING = 1e-7
 
@@ -66,15 +68,38 @@ class Line:
 
     @property
     def gap(self) -> float:
-        """The silence before each frame, s: t3.5, fixed above 19200 bit/s; of Modbus RTU alone."""
+        """
+        The silence before each request, s.
+
+        Of Modbus RTU t3.5, fixed above 19200 bit/s; of MOVITRAC what the driver leaves the drive to
+        switch its transmitter off.
+        """
+        if self.protocol == 'movitrac':
+            return _SWITCHING * self.character
         if self.protocol != 'modbus_rtu':
             return 0.0
         return 0.00175 if self.baud_rate > 19200 else 3.5 * self.character
 
+    @property
+    def answer_gap(self) -> float:
+        """The silence before each answer, s; of Modbus RTU alone."""
+        return self.gap if self.protocol == 'modbus_rtu' else 0.0
+
+    @property
+    def model(self) -> str:
+        """The family of the drives on it."""
+        return 'movitrac31' if self.protocol == 'movitrac' else 'sinus_g2'
+
+    @property
+    def space(self) -> str:
+        """How their tables name what addresses are counted in."""
+        return self.protocol if self.protocol in ('classic', 'movitrac') else 'modbus'
+
     def limit(self, frames: Sequence[Frame]) -> float:
         """Return the time that frames and the gaps before them take at least, s."""
         characters = sum(len(frame.data) for frame in frames)
-        return characters * self.character + len(frames) * self.gap
+        gaps = sum(self.gap if frame.is_request else self.answer_gap for frame in frames)
+        return characters * self.character + gaps
 
 
 def frames_of(path: Path, start: float = 0.0, end: float = float('inf')) -> list[Frame]:
@@ -156,6 +181,9 @@ def _asks(frame: Frame, protocol: str) -> tuple[int, int | None]:
     data = frame.data
     if protocol == 'modbus_rtu':
         return data[0], read_register(data)
+    if protocol == 'movitrac':
+        index = int.from_bytes(data[2:4], 'big')
+        return data[1], index if data[0] == _ENQUIRY else None
     enquires = data[0] == _EOT and data[-1] == _ENQ
     return data[1] - _ADDRESS_ZERO, int(data[3:-1], 16) if enquires else None
 
@@ -209,7 +237,7 @@ def additions(frames: Sequence[Frame], line: Line) -> dict[str, float]:
         if frame.is_request:
             master.append(frame.gap - line.gap)
         elif before.is_request:
-            due = before.last + line.gap + len(frame.data) * line.character
+            due = before.last + line.answer_gap + len(frame.data) * line.character
             simulator.append(frame.last - due)
     return {
         'master_adds': 1e3 * statistics.median(master),

@@ -39,7 +39,7 @@ from support.movitrac_ends import Ends
 from support.movitrac_ends import Value
 from ways import WAYS
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 
 #: What has to be so for a setting to be switched on [M4 §2.1.2].
 _NEEDS = {
