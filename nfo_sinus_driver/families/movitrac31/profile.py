@@ -51,6 +51,7 @@ from nfo_sinus_driver.families.movitrac31.words import Bits
 BITS = 'fieldbus.function_bits'
 SIZE = 'fieldbus.remote_setpoint'
 STATUS_WORD = 'fieldbus.inverter_status'
+FREQUENCY = 'status.frequency'
 TERMINALS = 'status.terminals'
 CONTROL_MODE = 'serial.control_mode'
 
@@ -166,7 +167,9 @@ class FunctionBits(ControlMethod):
         _require_enable(assigned, closed)
         word = int((yield Read(STATUS_WORD)))
         runs = words.state_of(word) is State.OPERATION_ENABLED
-        if runs and not (yield from self.in_control()):
+        # it may be shown as enabled for ever although it stands [C105]
+        turns = runs and (yield from _read_if_there(FREQUENCY)) != 0
+        if turns and not (yield from self.in_control()):
             raise NotPossible('the motor is driven by a fieldbus or by terminals (P841): stop it')
         yield from _require_still_at_zero(word)
 

@@ -135,10 +135,15 @@ def test_a_terminal_that_is_for_something_else_may_be_closed_or_open() -> None:
     play(method.require_startable(), *NOTHING_ELSE, *other, closed, word, *STILL)
 
 
-@pytest.mark.parametrize(('mode', 'possible'), [(REMOTE, True), (FIELDBUS, False)])
-def test_a_motor_that_others_drive_is_left_alone(mode: str, possible: bool) -> None:
-    closed = (Read(TERMINALS), CLOSED_43)
-    script = [*NOTHING_ELSE, *assigned(), closed, (Read(WORD), RUNS), (Read(MODE), mode)]
+@pytest.mark.parametrize(
+    ('turns', 'mode', 'possible'),
+    [(3.0, REMOTE, True), (3.0, FIELDBUS, False), (0.0, '', True), (REFUSED, FIELDBUS, False)],
+)
+def test_a_motor_that_others_drive_is_left_alone(turns: Any, mode: str, possible: bool) -> None:
+    # Enable may be shown for ever where the terminal has an enable and nobody a direction [C105]
+    closed, frequency = (Read(TERMINALS), CLOSED_43), (Read('status.frequency'), turns)
+    script = [*NOTHING_ELSE, *assigned(), closed, (Read(WORD), RUNS), frequency]
+    script += [(Read(MODE), mode)] if mode else []
     if possible:
         play(method.require_startable(), *script, *STILL)
     else:
