@@ -139,7 +139,7 @@ class Commands:
         registers: ParameterAccess,
         tell: Callable[[Severity, Report], None],
     ) -> None:
-        method = registers.model.profile.methods[settings.control_method]
+        method = registers.model.profile.methods[settings.method]
         self._method = method(settings.reference, registers.reaches)
         self._registers = registers
         self._tell = tell

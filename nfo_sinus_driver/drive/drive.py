@@ -102,7 +102,7 @@ class Drive:
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
-        if settings.control_method != 'monitor':
+        if settings.method != 'monitor':
             commands = Commands(settings, self._registers, self._inverter.tell)
             self._controller = Controller(bus, self._inverter, commands, self._setpoint)
         self._watch = Poller(
@@ -485,7 +485,7 @@ class Drive:
             return
         seen = await self._inverter.look(Priority.SERVICE)
         if seen.driven and seen.from_bus:
-            method = self.settings.control_method
+            method = self.settings.method
             raise DriveError(self._inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     async def _stop_for_good(self, patience: float) -> Report | None:

@@ -409,7 +409,7 @@ class DriveState:
 
         Who commands by what only newer firmware has says by that that the drive is not of those.
         """
-        method = self.model.profile.methods.get(self.settings.control_method)
+        method = self.model.profile.methods.get(self.settings.method)
         if self.settings.classic_dialect or (method is not None and not method.older):
             return True
         key = self.model.key(Role.CONTROL_SOURCE)

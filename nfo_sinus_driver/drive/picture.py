@@ -45,14 +45,14 @@ def take_snapshot(
             at=time.monotonic(),
             connected=inverter.connected,
             enabled=setpoint.armed,
-            control_method=inverter.settings.control_method,
+            control_method=inverter.settings.method,
         )
     code = seen.listed
     return Snapshot(
         at=seen.at,
         connected=inverter.connected,
         enabled=setpoint.armed,
-        control_method=inverter.settings.control_method,
+        control_method=inverter.settings.method,
         status=seen,
         control_mode=inverter.control_mode,
         unit=inverter.unit,

@@ -87,7 +87,7 @@ class Procedures:
         require_known(procedure, inverter.model)
         profile = inverter.model.profile
         have = profile.methods_with(procedure)
-        if inverter.settings.control_method not in have:
+        if inverter.settings.method not in have:
             raise DriveError(
                 Report(
                     Cause.OTHER_METHOD_NEEDED,

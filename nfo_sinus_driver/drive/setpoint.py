@@ -228,7 +228,7 @@ class Setpoint:
         :param name: of the drive.
         """
         settings = self._inverter.settings
-        if settings.control_method == 'monitor':
+        if settings.method == 'monitor':
             return Report(Cause.MEMBER_MONITORED, name=name)
         if not settings.follows_setpoints:
             reference = settings.reference

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import functools
 import math
 
 from nfo_sinus_driver.catalog import Profile
@@ -77,7 +78,7 @@ class DriveSettings:
 
     :ivar address: one that the protocol of the line has.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
-    :ivar control_method: ``''`` becomes the usual one of the model, once that is known.
+    :ivar control_method: as it was chosen; ``''`` stands for the usual one of the model.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
         with ``fieldbus``.
     :ivar poll_rate: Hz; 0 is as fast as the bus allows.
@@ -117,16 +118,20 @@ class DriveSettings:
         """The motor follows set-points from the bus, and no reference of the drive's own."""
         return self.reference == 'fieldbus'
 
+    @functools.cached_property
+    def method(self) -> str:
+        """The control method, the usual one where none was chosen; ``''`` with ``auto`` then."""
+        if self.control_method or self.model == AUTO:
+            return self.control_method
+        return next(iter(load_profile(self.model).methods))
+
     def __post_init__(self) -> None:
         _one_of('model', self.model, (*families(), AUTO))
-        if not self.control_method and self.model != AUTO:
-            usual = next(iter(load_profile(self.model).methods))
-            object.__setattr__(self, 'control_method', usual)
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))
         _one_of('reference', self.reference, REFERENCES)
-        kind = f'{self.control_method} on {self.model}'
-        allowed = _references(self.model, self.control_method)
+        kind = f'{self.method} on {self.model}'
+        allowed = _references(self.model, self.method)
         if self.reference not in allowed:
             raise ValueError(
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
@@ -167,7 +172,7 @@ class DriveSettings:
         :raises ValueError: it does not, and which it has.
         """
         for profile in _profiles(self.model):
-            method = profile.methods.get(self.control_method)
+            method = profile.methods.get(self.method)
             dialect = profile.older.name if profile.older is not None else ''
             if dialect and dialect == self.classic_dialect and method and not method.older:
                 others = ' or '.join(name for name, one in profile.methods.items() if one.older)

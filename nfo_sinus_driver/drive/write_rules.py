@@ -43,7 +43,7 @@ def followers(model: Family) -> Mapping[str, str]:
 def why_not(key: str, inverter: DriveState) -> Report | None:
     """Return why a setting may not be changed, ``None`` if it may."""
     settings = inverter.settings
-    if settings.control_method == 'monitor':
+    if settings.method == 'monitor':
         return Report(Cause.MONITOR_ONLY)
     if inverter.tuning:
         return Report(Cause.CHANGE_WHILE_TUNING)

@@ -81,7 +81,7 @@ class AllDrives:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
         failed, done = self._command(_stop_one, _LONGEST_STOP)
         if failed and self._context.bus.protocol.broadcast is not None:
-            if any(one.settings.control_method == 'monitor' for one in self._context.drives):
+            if any(one.settings.method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
             else:
                 failed.append(self._broadcast())
@@ -106,7 +106,7 @@ class AllDrives:
         futures: list[tuple[ManagedDrive, Future[Report]]] = []
         with self._context.at_once():
             for managed in self._context.drives:
-                if managed.settings.control_method == 'monitor':
+                if managed.settings.method == 'monitor':
                     continue
                 try:
                     futures.append((managed, command(managed)))

@@ -129,7 +129,7 @@ class ManagedDrive:
             self._found_model = self._bus.run(detection).result()
         if before != self._concrete:
             if before.address == self._settings.address and (
-                before.control_method != self._concrete.control_method
+                before.method != self._concrete.method
             ):
                 self._drive.require_standing().result()
             self._drive = Drive(self._bus, self._concrete, self._listener)

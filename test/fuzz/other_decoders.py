@@ -58,6 +58,13 @@ _PARAMETERS = [
     for protocol in ('modbus', 'classic')
     if protocol in parameter.addresses
 ]
+#: How many bits of two words count [C24], [C26].
+_LOW_BITS = {
+    ('status.op_time', 'classic'): 24,
+    ('status.rn_time', 'classic'): 24,
+    ('status.br_time', 'classic'): 24,
+    ('fieldbus.drive_status', 'modbus'): 16,
+}
 
 
 # --- catalog --------------------------------------------------------------------------------------
@@ -83,6 +90,8 @@ def _catalog(random: Random, frames: int) -> None:
         form = {(1, False): '<H', (1, True): '<h', (2, False): '<I', (2, True): '<i'}
         data = struct.pack(f'<{count}H', *raw)
         number = struct.unpack(form[count, place.number.signed], data)[0]
+        if (bits := _LOW_BITS.get((parameter.key, protocol))) is not None:
+            number &= (1 << bits) - 1
         assert type(value) is parameter.kind, f'{parameter.key}: {value!r}'
         if parameter.labels:
             label = parameter.labels.get(number, str(number))
@@ -172,11 +181,7 @@ def _movitrac_request(random: Random) -> bytes:
 def _movitrac_body(frame: bytes) -> tuple[int, bytes] | None:
     size = _MOVITRAC_VALUES.get(frame[0])
     whole = size is not None and len(frame) == 5 + size
-    return (frame[1], frame) if whole and frame == _summed(frame[:-1]) else None
-
-
-def _summed(message: bytes) -> bytes:
-    return message + bytes((sum(message) % 256,))
+    return (frame[1], frame) if whole and frame == judges.seal_movitrac(frame[:-1]) else None
 
 
 def _seal_tcp(message: bytes) -> bytes:
@@ -262,6 +267,6 @@ OTHER_CASES: Mapping[str, Case] = {
     ),
     'simulator classic': _receiving(Classic, _classic_request, judges.seal_classic, _classic_body),
     'simulator movitrac': _receiving(
-        Movitrac, _movitrac_request, _summed, _movitrac_body, 'movitrac31'
+        Movitrac, _movitrac_request, judges.seal_movitrac, _movitrac_body, 'movitrac31'
     ),
 }

@@ -51,7 +51,7 @@ _RUNNING = (
 
 _SETTINGS = {
     'address': 1,
-    'control_method': 'mode_scmd',
+    'control_method': '',
     'autostart': True,
     'poll_rate': 0.0,
     'idle_poll_rate': 0.0,

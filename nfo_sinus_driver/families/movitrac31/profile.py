@@ -43,7 +43,6 @@ from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.profile import one
 from nfo_sinus_driver.catalog.profile import taken
 from nfo_sinus_driver.catalog.role import Role
-from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
 from nfo_sinus_driver.families.movitrac31.words import Bits
@@ -51,8 +50,8 @@ from nfo_sinus_driver.families.movitrac31.words import Bits
 BITS = 'fieldbus.function_bits'
 SIZE = 'fieldbus.remote_setpoint'
 STATUS_WORD = 'fieldbus.inverter_status'
-FREQUENCY = 'status.frequency'
 TERMINALS = 'status.terminals'
+FREQUENCY = 'status.frequency'
 CONTROL_MODE = 'serial.control_mode'
 
 _HOLDERS: Mapping[Value, Holder] = {
@@ -165,13 +164,10 @@ class FunctionBits(ControlMethod):
         closed = int((yield Read(TERMINALS)))
         _require_no_direction(assigned, closed)
         _require_enable(assigned, closed)
-        word = int((yield Read(STATUS_WORD)))
-        runs = words.state_of(word) is State.OPERATION_ENABLED
-        # it may be shown as enabled for ever although it stands [C105]
-        turns = runs and (yield from _read_if_there(FREQUENCY)) != 0
-        if turns and not (yield from self.in_control()):
+        # at standstill, too, a drive may show that it is enabled
+        if not (yield from self.in_control()) and (yield Read(FREQUENCY)):
             raise NotPossible('the motor is driven by a fieldbus or by terminals (P841): stop it')
-        yield from _require_still_at_zero(word)
+        yield from _require_still_at_zero()
 
     def take_control(self) -> Steps[None]:
         """
@@ -291,12 +287,13 @@ def _require_enable(assigned: Mapping[int, Value | None], closed: int) -> None:
             )
 
 
-def _require_still_at_zero(word: int) -> Steps[None]:
+def _require_still_at_zero() -> Steps[None]:
     """
     See to it that the motor stands at set-point 0.
 
     :raises NotPossible: the parameter set in use has a least frequency.
     """
+    word = int((yield Read(STATUS_WORD)))
     pattern = yield Read(_PATTERNS[bool(word & words.IN_SET_2)])
     least = _LEAST.get(pattern)
     frequency: float = 0.0 if least is None else (yield Read(least))

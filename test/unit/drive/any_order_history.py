@@ -67,7 +67,7 @@ class History:
         self._far = rig.far
         self.shown = shown_by(rig)
         self.times = self.shown.times
-        self._method = rig.settings.control_method
+        self._method = rig.settings.method
         self._follows = rig.settings.reference == 'fieldbus'
         rig.gave = self.gave
         self._commands: list[Command] = []

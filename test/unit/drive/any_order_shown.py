@@ -112,7 +112,7 @@ class Shown(abc.ABC):
         self._rig = rig
         self._far = rig.far
         self._unit: Any = rig.far.control_unit
-        self._method = rig.settings.control_method
+        self._method = rig.settings.method
         self._protocol = rig.link.protocol.name
 
     @property

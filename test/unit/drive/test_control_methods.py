@@ -261,7 +261,7 @@ def test_method_of_a_session_never_changes(make_rig: MakeRig, changed: dict[str,
     with pytest.raises(ValueError, match=f'{next(iter(changed))} cannot change within a session'):
         rig.drive.settings = dataclasses.replace(rig.drive.settings, **changed)
     rig.turn()
-    assert rig.drive.settings.control_method == 'mode_scmd'
+    assert rig.drive.settings.method == 'mode_scmd'
 
 
 @pytest.mark.parametrize(

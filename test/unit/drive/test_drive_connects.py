@@ -225,7 +225,7 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
     [
         ({'address': -1}, 'allowed are 0 to 247'),
         ({'address': 248}, 'allowed are 0 to 247'),
-        ({'model': 'sinus_h'}, "choose one of 'sinus_g2'"),
+        ({'model': 'sinus_x'}, "'sinus_g2', "),
         ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'monitor'"),
         (
             {'reference': 'analog', 'control_method': 'drive_control'},

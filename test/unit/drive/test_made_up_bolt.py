@@ -22,6 +22,7 @@ closed, has a time-out that always stops, and runs in one direction.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import dataclasses
 from pathlib import Path
 import shutil
 from typing import Any
@@ -129,10 +130,13 @@ def test_it_is_found(bus: Bus) -> None:
 
 
 def test_the_usual_control_method_is_that_of_the_family() -> None:
-    assert DriveSettings(model='bolt').control_method == 'function_bits'
-    assert DriveSettings(model='sinus_g2').control_method == 'mode_scmd'
-    # nobody knows it yet
-    assert DriveSettings(model=AUTO).control_method == ''
+    g2 = DriveSettings(model='sinus_g2')
+    assert g2.method == 'mode_scmd'
+    # what was not chosen is not kept when the model turns out to be another
+    assert dataclasses.replace(g2, model='bolt').method == 'function_bits'
+    assert DriveSettings(model=AUTO).method == ''
+    with pytest.raises(ValueError, match="control_method 'mode_scmd': choose one of"):
+        DriveSettings(model='bolt', control_method='mode_scmd')
 
 
 def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: Bus) -> None:

@@ -180,6 +180,17 @@ def test_over_a_pseudo_terminal(open_master):
         assert master.receive(3) == nack(0x10)
 
 
+def test_the_last_value_counts_whichever_of_two_interfaces_it_came_by(open_master):
+    with Simulator(also=['movitrac'], **LINE) as simulator:
+        masters = [open_master(port) for port in simulator.ports]
+        for master, value in zip(masters, (2.0, 3.0), strict=True):
+            master.send(select(25, bcd(value), address=1))
+            assert master.receive(2) == ACK
+        for master in masters:
+            master.send(enquiry(25, address=1))
+            assert master.receive(8) == data(25, bcd(3.0))
+
+
 def test_what_is_injected(capsys, folder):
     link = str(folder / 'm0')
     with Simulator(link=link, control='', **LINE) as simulator:
