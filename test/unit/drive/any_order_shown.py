@@ -373,8 +373,8 @@ class ShownMovitrac(Shown):
         value = words[0] << 16 | words[1]
         if place not in (BITS, SIZE, P841, _TIMEOUT):
             yield f'index {place} was written'
-        # 2.00, in packed decimal digits
-        if place == P841 and value != 0x00000200:
+        # Remote setpoint and Remote control, in packed decimal digits: 1.00 and 2.00
+        if place == P841 and value not in (0x00000100, 0x00000200):
             yield f'P841 = {value:08X}'
         if place == BITS:
             yield from self._wrong_bits(Bit(value))

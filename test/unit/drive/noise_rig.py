@@ -58,6 +58,7 @@ class Kind(NamedTuple):
 
     :ivar link: the driver's end of it, on a port.
     :ivar spoken: the same for the drive.
+    :ivar wait: how long an answer is waited for at most, s.
     :ivar variant: what the drive does where the manual is open.
     """
 
@@ -65,18 +66,19 @@ class Kind(NamedTuple):
     settings: LineSettings
     link: Callable[[Any, LineSettings], Any]
     spoken: Any
+    wait: float
     variant: Mapping[str, str]
 
 
 def modbus_rtu(baud: int) -> Kind:
     """Return a G2 on Modbus RTU."""
-    return Kind('sinus_g2', LineSettings(baud_rate=baud), RtuLink, ModbusRtu(), {})
+    return Kind('sinus_g2', LineSettings(baud_rate=baud), RtuLink, ModbusRtu(), 0.2, {})
 
 
 def movitrac(**variant: str) -> Kind:
-    """Return a MOVITRAC on its own line."""
+    """Return a MOVITRAC on its own line; it may be set to answer up to 0.2 s late (P843)."""
     settings = LineSettings(9600, '8N1')
-    return Kind('movitrac31', settings, MovitracLink, Movitrac(), variant)
+    return Kind('movitrac31', settings, MovitracLink, Movitrac(), 0.4, variant)
 
 
 class Line:

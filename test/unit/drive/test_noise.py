@@ -126,7 +126,7 @@ def test_after_a_burst_the_first_request_goes_out_and_the_first_status_comes_at_
         rig.pass_time(length + 2.0)
         asked = min(at for at in rig.line.sent if at >= end)
         told = min(at for at, _ in rig.notes.published if at >= asked)
-        assert asked - end <= 0.25
+        assert asked - end <= line.wait + 0.05
         assert told - asked <= 0.2
         assert not rig.ends
 
