@@ -74,7 +74,7 @@ class MovitracOrder(AnyOrder):
         stored=st.sampled_from(('Standard', 'Remote control', 'Remote control')),
         left_behind=st.booleans(),
         slow=st.booleans(),
-        response_time=st.sampled_from((0.0, 0.0, 0.0, 50.0, 200.0)),
+        response_time=st.sampled_from((0.0, 0.0, 0.0, 30.0)),
         drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
         resets_itself=st.booleans(),
         magnetizes=st.booleans(),

@@ -91,6 +91,21 @@ class Times:
     found: float = 5.0
     response_timeout: float = RESPONSE_TIMEOUT
 
+    def slowed(self, response_time: float) -> Times:
+        """Return the same for a drive that answers so much later, s; a poll is 4 transactions."""
+        poll = 4 * response_time
+        return Times(
+            noticed=self.noticed + 2 * poll,
+            noticed_idle=self.noticed_idle + 2 * poll,
+            control_told=self.control_told + poll,
+            carried_out=self.carried_out + poll,
+            lost=self.lost + 3 * poll,
+            lost_idle=self.lost_idle + 3 * poll,
+            taken_back=self.taken_back + 3 * poll,
+            found=self.found + 3 * poll,
+            response_timeout=self.response_timeout,
+        )
+
 
 class Shown(abc.ABC):
     """
@@ -302,20 +317,29 @@ class ShownOptimal(ShownSinus):
         }
 
 
-class ShownMovitrac(Shown):
-    """What a MOVITRAC shows; its line has 9600 bit/s, and an answer may be 0.4 s late."""
+#: Its line has 9600 bit/s, and an answer is waited for up to 0.4 s.
+_MOVITRAC = Times(
+    noticed=0.8,
+    noticed_idle=1.8,
+    control_told=1.2,
+    carried_out=0.2,
+    lost=4.5,
+    lost_idle=5.5,
+    taken_back=3.0,
+    found=7.0,
+    response_timeout=0.4,
+)
+#: How many transactions an enable has, and how long each takes at least, s.
+_CHECKS = 45
+_TRANSACTION = 0.018
 
-    times = Times(
-        noticed=0.8,
-        noticed_idle=1.8,
-        control_told=1.2,
-        carried_out=0.2,
-        lost=4.5,
-        lost_idle=5.5,
-        taken_back=3.0,
-        found=7.0,
-        response_timeout=0.4,
-    )
+
+class ShownMovitrac(Shown):
+    """What a MOVITRAC shows."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self.times = _MOVITRAC.slowed(self._unit.response_time)
 
     @property
     def by_bus(self) -> bool:
@@ -364,7 +388,9 @@ class ShownMovitrac(Shown):
         }
 
     def patience(self, name: str) -> float:
-        return self.times.control_told if name in ('by bus', 'running') else 0.0
+        # who enables it reads for so long what all its terminals are for, before the next poll
+        checks = _CHECKS * (_TRANSACTION + self._unit.response_time)
+        return checks + (self.times.control_told if name in ('by bus', 'running') else 0.0)
 
     def reads_status(self, request: Request) -> bool:
         return request.words is None and request.place == STATUS
