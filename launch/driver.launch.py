@@ -15,6 +15,8 @@
 Start the driver: one serial line, one node for each drive on it.
 
     ros2 launch nfo_sinus_driver driver.launch.py port:=/dev/ttyUSB0
+    ros2 launch nfo_sinus_driver driver.launch.py port:=/dev/ttyUSB0 \
+        protocol:=movitrac model:=movitrac31
     ros2 launch nfo_sinus_driver driver.launch.py params_file:=conveyor.yaml namespace:=line1
 
 The node action has no ``name=``: it would rename every node of the process, and the process has
@@ -40,9 +42,11 @@ from launch_ros.substitutions import FindPackageShare
 #: nodes, and what it is.
 OVERRIDES = {
     'port': ('/**/nfo_sinus_bus', str, 'serial port'),
+    'protocol': ('/**/nfo_sinus_bus', str, 'protocol of the line, such as movitrac'),
     'baud_rate': ('/**/nfo_sinus_bus', int, 'bit rate, bit/s'),
     'char_format': ('/**/nfo_sinus_bus', str, 'character format, such as 8E1'),
     'address': ('/**', int, 'address of the drive, where there is one'),
+    'model': ('/**', str, 'family of the drives, such as movitrac31'),
 }
 
 

@@ -17,6 +17,9 @@ Start a simulated drive and the driver for it, to try things without hardware.
     ros2 launch nfo_sinus_driver simulation.launch.py
     ros2 run nfo_sinus_driver simulator inject --link /tmp/nfo_sinus fault 5
 
+    ros2 launch nfo_sinus_driver simulation.launch.py protocol:=movitrac model:=movitrac31 \
+        baud_rate:=9600
+
 The driver needs not wait for the simulated drive: it tries the port until it is there. At the end
 the drive has to outlast the driver, which stops the motor first; see below.
 """
@@ -49,6 +52,8 @@ def generate_launch_description():
     """Return the launch description."""
     link = LaunchConfiguration('link')
     baud_rate = LaunchConfiguration('baud_rate')
+    protocol = LaunchConfiguration('protocol')
+    model = LaunchConfiguration('model')
     # no node, so not to be given ROS arguments
     simulator = ExecuteProcess(
         cmd=[
@@ -56,6 +61,10 @@ def generate_launch_description():
             ExecutableInPackage('simulator', 'nfo_sinus_driver'),
             '--link',
             link,
+            '--protocol',
+            protocol,
+            '--model',
+            model,
             '--baud',
             baud_rate,
             '--paced',
@@ -70,7 +79,15 @@ def generate_launch_description():
         package='nfo_sinus_driver',
         executable='driver',
         namespace=LaunchConfiguration('namespace'),
-        parameters=[{'port': link, 'baud_rate': baud_rate, 'drive_timeout': 2.0}],
+        parameters=[
+            {
+                'port': link,
+                'baud_rate': baud_rate,
+                'protocol': protocol,
+                'model': model,
+                'drive_timeout': 2.0,
+            }
+        ],
         output='screen',
         respawn=False,
         sigterm_timeout=_EXIT_TIMEOUT,
@@ -89,6 +106,12 @@ def generate_launch_description():
             ),
             DeclareLaunchArgument(
                 'baud_rate', default_value='57600', description='bit rate of the line, bit/s'
+            ),
+            DeclareLaunchArgument(
+                'protocol', default_value='modbus_rtu', description='protocol of the line'
+            ),
+            DeclareLaunchArgument(
+                'model', default_value='sinus_g2', description='family of the simulated drive'
             ),
             DeclareLaunchArgument(
                 'namespace', default_value='', description='namespace of all nodes'

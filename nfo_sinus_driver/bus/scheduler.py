@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-Whose turn it is on one line.
+Whose turn it is on one line, and who does not answer.
 
 What waits for the line, and which of it goes next. No thread, no clock and nothing sent:
 :class:`nfo_sinus_driver.bus.Bus` asks, sends, and says how long that kept the line.
@@ -23,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
+import math
 from typing import Literal
 from typing import NamedTuple
 
@@ -30,6 +30,9 @@ from nfo_sinus_driver.bus.tasks import LatestValue
 from nfo_sinus_driver.bus.tasks import Priority
 from nfo_sinus_driver.bus.tasks import Task
 from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.link import Refused
 
 __all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 
@@ -124,11 +127,7 @@ class Scheduler:
         return bool(self._queues[_MISSING])
 
     def take(self, *, missing: bool = True) -> LatestValue | Waiting | None:
-        """
-        Take out what goes next; ``None`` if nothing waits.
-
-        :param missing: what is for a missing unit may go.
-        """
+        """Take out what goes next, or ``None``; for a missing unit only with ``missing``."""
         self._release_found()
         for rank in self._order(missing):
             entry = self._first(rank)
@@ -235,5 +234,61 @@ class Scheduler:
         return _COMMAND if commands else transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:
-        """Tell whether this is a stop for a unit that did not answer the last one."""
         return transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain
+
+
+#: A unit that has been silent for so long counts as missing, s: short enough to spare the others,
+#: longer than a burst of noise.
+_MISSING_AFTER = 2.0
+#: The share of the time that all missing units may take together while others answer.
+_MISSING_SHARE = 1 / 20
+
+
+class Silences:
+    """
+    How long each unit has said nothing although it was asked; all times are of one clock, s.
+
+    Silence begins when the first answer has failed to come, however long it was waited for: a unit
+    that nobody asks is not silent, and one lost answer is no silence yet. Any valid frame ends it.
+
+    Each request to a unit that is missing costs the others a whole time-out, so there is a pause
+    behind it, in which none of the missing units is asked.
+    """
+
+    def __init__(self) -> None:
+        self._heard_at: dict[int, float] = {}
+        self._since: dict[int, float] = {}
+        #: When any unit was heard.
+        self._anybody_at = -math.inf
+        self._pause_ends = -math.inf
+
+    def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> None:
+        """Take note of how a request ended that kept the line for so long, s."""
+        if error is None or error.heard or isinstance(error, Refused):
+            self._heard_at[unit] = self._anybody_at = now
+            self._since.pop(unit, None)
+        elif self.is_missing(unit, now):
+            self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
+        if error is not None and not isinstance(error, (PortError, Refused)):
+            self._since.setdefault(unit, now)
+
+    def is_silent(self, unit: int) -> bool:
+        """Tell whether a unit has not answered the last request to it."""
+        return unit in self._since
+
+    def heard_at(self, unit: int) -> float:
+        """Return when the last valid frame of a unit came."""
+        return self._heard_at.get(unit, -math.inf)
+
+    def lasts(self, unit: int, now: float) -> float:
+        """Return for how long a unit has been silent; 0 if it answers."""
+        return now - self._since.get(unit, now)
+
+    def is_missing(self, unit: int, now: float) -> bool:
+        """Tell whether a unit has been silent for so long that it is asked seldom."""
+        return self.lasts(unit, now) >= _MISSING_AFTER
+
+    @property
+    def missing_from(self) -> float:
+        """From when on a missing unit may be asked again; at any time while nobody answers."""
+        return min(self._pause_ends, self._anybody_at + _MISSING_AFTER)

@@ -61,47 +61,29 @@ class Statistics:
 
 
 class Tally:
-    """
-    What is counted of a line, or of one unit; a transaction costs the same however many there are.
-
-    :param round_trips: how many of the last round trips are kept.
-    """
+    """What is counted of a line, or of one unit; of round trips only the last are kept."""
 
     def __init__(self, round_trips: int = _ROUND_TRIPS) -> None:
-        self.transactions = 0
-        self.timeouts = 0
-        self.damaged = 0
-        self.refused = 0
+        self._counts = dict.fromkeys(('transactions', 'timeouts', 'damaged', 'refused'), 0)
         self.retries = 0
+        #: Every opening or connection but the first is a reconnect.
+        self.opened = 0
         #: How long the last round of polling took, s.
         self.cycle_time = math.nan
-        self._opened = 0
         self._round_trips: deque[float] = deque(maxlen=round_trips)
         self._busy: deque[tuple[float, float]] = deque()
 
-    def opened(self) -> None:
-        """Count an opening or a connection; every one but the first is a reconnect."""
-        self._opened += 1
-
     def transaction(self, now: float, seconds: float, error: LinkError | None) -> None:
         """Count a transaction that kept the line busy until ``now``, and how it ended."""
-        self.busy(now, seconds)
-        if error is None or isinstance(error, Refused):
-            self.answered(seconds)
-        self.timeouts += isinstance(error, NoAnswer)
-        self.damaged += isinstance(error, DamagedAnswer)
-        self.refused += isinstance(error, Refused)
-
-    def busy(self, now: float, seconds: float) -> None:
-        """Count a transaction that kept the line busy until ``now``."""
-        self.transactions += 1
         self._busy.append((now, seconds))
         while self._busy[0][0] < now - _WINDOW:
             self._busy.popleft()
-
-    def answered(self, seconds: float) -> None:
-        """Record the round trip of a transaction that was answered."""
-        self._round_trips.append(seconds)
+        if error is None or isinstance(error, Refused):
+            self._round_trips.append(seconds)
+        self._counts['transactions'] += 1
+        self._counts['timeouts'] += isinstance(error, NoAnswer)
+        self._counts['damaged'] += isinstance(error, DamagedAnswer)
+        self._counts['refused'] += isinstance(error, Refused)
 
     def statistics(self, cycle_time: float) -> Statistics:
         """Return the present figures."""
@@ -111,12 +93,9 @@ class Tally:
         return Statistics(
             utilisation=min(1.0, busy / _WINDOW),
             cycle_time=cycle_time,
-            transactions=self.transactions,
-            timeouts=self.timeouts,
-            damaged=self.damaged,
-            refused=self.refused,
+            **self._counts,
             retries=self.retries,
-            reconnects=max(0, self._opened - 1),
+            reconnects=max(0, self.opened - 1),
             round_trip_min=_at(trips, 0.0),
             round_trip_mean=sum(trips) / len(trips) if trips else math.nan,
             round_trip_median=_at(trips, 0.5),
@@ -138,30 +117,26 @@ class Recorder:
         self._units: dict[int, Tally] = {}
 
     def opened(self) -> None:
-        """Count that the port was opened; every time but the first is a reconnect."""
-        self._line.opened()
+        """Count that the port was opened."""
+        self._line.opened += 1
 
     def connected(self, unit: int) -> None:
-        """Count that a unit was connected to; every time but the first is a reconnect."""
-        self._of(unit).opened()
+        """Count that a unit was connected to."""
+        self._of(unit).opened += 1
 
     def transaction(self, unit: int, now: float, seconds: float, error: LinkError | None) -> None:
         """Count a transaction that kept the line busy until ``now``, and how it ended."""
-        self._line.transaction(now, seconds, error)
-        self._of(unit).transaction(now, seconds, error)
+        for tally in (self._line, self._of(unit)):
+            tally.transaction(now, seconds, error)
 
     def retry(self, unit: int) -> None:
         """Count a request to a unit that is sent again."""
-        self._line.retries += 1
-        self._of(unit).retries += 1
+        for tally in (self._line, self._of(unit)):
+            tally.retries += 1
 
     def cycle(self, unit: int, seconds: float) -> None:
-        """Record how long one round of polling took for a unit."""
+        """Record how long one round of polling took for a unit; NaN: it is no longer polled."""
         self._of(unit).cycle_time = seconds
-
-    def forget_cycle(self, unit: int) -> None:
-        """Take note of a unit that is no longer polled."""
-        self._of(unit).cycle_time = math.nan
 
     def statistics(self, unit: int | None = None) -> Statistics:
         """Return the present figures of the line, or of one unit on it."""
@@ -174,7 +149,6 @@ class Recorder:
         return self._line.statistics(max(known, default=math.nan))
 
     def _of(self, unit: int) -> Tally:
-        tally = self._units.get(unit)
-        if tally is None:
-            tally = self._units[unit] = Tally(_ROUND_TRIPS_OF_A_UNIT)
-        return tally
+        if unit not in self._units:
+            self._units[unit] = Tally(_ROUND_TRIPS_OF_A_UNIT)
+        return self._units[unit]

@@ -21,6 +21,7 @@ from collections.abc import Coroutine
 from collections.abc import Generator
 from collections.abc import Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 import enum
 import heapq
 import itertools
@@ -62,36 +63,25 @@ class Cancelled(BaseException):
     """
 
 
+@dataclass(eq=False, slots=True)
 class Transfer:
     """
     One transaction that a coroutine awaits.
 
     A read, or a write if ``data`` is given, or whatever ``send`` does.
 
-    :param require_wanted: called by the worker at the moment of sending; what it raises goes to the
+    :ivar require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
     :ivar source: what is read in the same transaction as the write, or ``None``.
     """
 
-    __slots__ = ('address', 'data', 'priority', 'require_wanted', 'send', 'source', 'unit')
-
-    def __init__(
-        self,
-        unit: int,
-        address: Address,
-        priority: Priority,
-        data: bytes | None = None,
-        send: Callable[[], Reply] | None = None,
-        require_wanted: Callable[[], None] = lambda: None,
-        source: Address | None = None,
-    ) -> None:
-        self.unit = unit
-        self.address = address
-        self.priority = priority
-        self.data = data
-        self.send = send
-        self.require_wanted = require_wanted
-        self.source = source
+    unit: int
+    address: Address
+    priority: Priority
+    data: bytes | None = None
+    send: Callable[[], Reply] | None = None
+    require_wanted: Callable[[], None] = lambda: None
+    source: Address | None = None
 
     def reads(self, unit: int, address: Address) -> bool:
         """Tell whether it only reads a parameter."""
@@ -121,17 +111,11 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
         if again.data == high.data:
             return Reply(low.data + high.data, again.arrived)
         high = again
-    raise DamagedAnswer(
-        f'unit {unit}: {high_part.space} {high_part.index:04X}h never stood still'
-    )
+    raise DamagedAnswer(f'unit {unit}: {high_part.space} {high_part.index:04X}h never stood still')
 
 
 async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identification:
-    """
-    Ask a unit all questions about itself, each a transaction; return what it said.
-
-    :raises PortError: the port is not open.
-    """
+    """Ask a unit all questions about itself, each a transaction; return what it said."""
     while not inquiry.done:
         try:
             await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
@@ -142,13 +126,11 @@ async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identifica
     return inquiry.found
 
 
+@dataclass(eq=False, slots=True)
 class Pause:
     """A wait until a moment, or until the task is woken."""
 
-    __slots__ = ('until',)
-
-    def __init__(self, until: float) -> None:
-        self.until = until
+    until: float
 
     def __await__(self) -> Generator[Pause, None, None]:
         yield self
@@ -178,10 +160,8 @@ class Task:
         """Run it up to what it awaits next; ``None`` when it has ended."""
         self.running = True
         try:
-            if error is not None:
-                awaited = self._coroutine.throw(error)
-            else:
-                awaited = self._coroutine.send(value)
+            coroutine = self._coroutine
+            awaited = coroutine.throw(error) if error is not None else coroutine.send(value)
         except StopIteration as end:
             self.future.set_result(end.value)
         except BaseException as failure:
@@ -227,23 +207,18 @@ class Sleepers:
         return self._pauses[0][0] if self._pauses else math.inf
 
 
+@dataclass(eq=False)
 class LatestValue:
     """
     A place for one pending write of which only the latest counts, such as a set-point.
 
-    :param make: called by the worker at the moment of sending; returns what to write now, or
+    :ivar make: called by the worker at the moment of sending; returns what to write now, or
         ``None`` if there is nothing to write any more.
-    :param done: called by the worker with the error, or ``None`` when the unit took it.
-    :param told: called after that with the answer of a unit that took it.
+    :ivar done: called by the worker with the error, or ``None`` when the unit took it.
+    :ivar told: called after that with the answer of a unit that took it.
     """
 
-    def __init__(
-        self,
-        make: Callable[[], Transfer | None],
-        done: Callable[[Transfer, LinkError | None], None],
-        told: Callable[[Reply], None] = lambda reply: None,
-    ) -> None:
-        self.make = make
-        self.done = done
-        self.told = told
-        self.pending = False
+    make: Callable[[], Transfer | None]
+    done: Callable[[Transfer, LinkError | None], None]
+    told: Callable[[Reply], None] = lambda reply: None
+    pending: bool = False

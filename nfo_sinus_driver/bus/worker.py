@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 Who talks next on one line.
 
@@ -29,6 +28,7 @@ from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
 from concurrent.futures import Future
+import ctypes
 import functools
 import logging
 import math
@@ -38,8 +38,8 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.bus.scheduler import Scheduler
+from nfo_sinus_driver.bus.scheduler import Silences
 from nfo_sinus_driver.bus.scheduler import Waiting
-from nfo_sinus_driver.bus.silence import Silences
 from nfo_sinus_driver.bus.statistics import Recorder
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled
@@ -52,7 +52,6 @@ from nfo_sinus_driver.bus.tasks import Transfer
 from nfo_sinus_driver.bus.tasks import consistent_read
 from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
-from nfo_sinus_driver.bus.timer_slack import set_timer_slack
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LineProtocol
@@ -72,9 +71,11 @@ REOPEN_PERIOD = 0.5
 
 class Bus:
     """
-    The line that several drives share.
+    The line that several drives share; it opens, closes and re-opens the link.
 
-    :param link: what carries the transactions; the bus opens, closes and re-opens it.
+    What is read and written with it is awaited by coroutines on the worker.
+
+    :raises LinkError: a transaction fails, as the link does.
     """
 
     def __init__(self, link: Link) -> None:
@@ -85,8 +86,7 @@ class Bus:
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
         self._scheduler = Scheduler(
-            self.silences.is_silent,
-            lambda unit: self.silences.is_missing(unit, time.monotonic()),
+            self.silences.is_silent, lambda unit: self.silences.is_missing(unit, time.monotonic())
         )
         self._sleepers = Sleepers()
         self._stopping = False
@@ -119,12 +119,7 @@ class Bus:
             self._end()
 
     def run(self, coroutine: Coroutine[Any, Any, _T]) -> Future[_T]:
-        """
-        Run a coroutine on the worker.
-
-        :returns: a future with its result; a :class:`LinkError` that it does not catch is the
-            future's exception.
-        """
+        """Run a coroutine on the worker; the future has its result, or what it raises."""
         task = Task(coroutine)
         self._enter(task)
         return task.future
@@ -165,11 +160,7 @@ class Bus:
     # --- for coroutines on the worker ---------------------------------------------------------
 
     def read(self, unit: int, address: Address, priority: Priority) -> Awaitable[Reply]:
-        """
-        Read one parameter (to be awaited), one transaction at a time.
-
-        :raises LinkError: as the link does.
-        """
+        """Read one parameter, one transaction at a time."""
         parts = self._link.parts(address)
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
@@ -183,32 +174,17 @@ class Bus:
         priority: Priority,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Transfer:
-        """
-        Write one parameter (to be awaited).
-
-        :param require_wanted: called when its turn has come; if it raises, nothing is written.
-        :raises LinkError: as the link does.
-        """
+        """Write one parameter, unless ``require_wanted`` raises when its turn has come."""
         return Transfer(unit, address, priority, data, require_wanted=require_wanted)
 
     def write_and_read(
         self, unit: int, address: Address, data: bytes, source: Address, priority: Priority
     ) -> Transfer:
-        """
-        Write one parameter and read another, in one transaction (to be awaited, or for a slot).
-
-        The answer has no data if it was only written: see :meth:`Link.write_and_read`.
-
-        :raises LinkError: as the link does.
-        """
+        """Write one parameter and read another at once; see :meth:`Link.write_and_read`."""
         return Transfer(unit, address, priority, data, source=source)
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
-        """
-        Give a task what it waits to read, because it has just been told with something else.
-
-        :returns: whether it waits for that.
-        """
+        """Give a task what it waits to read, told with something else; false if it does not."""
         awaited = task.awaited
         if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
             return False
@@ -220,9 +196,7 @@ class Bus:
         self, unit: int, source: Address, address: Address, data: bytes, priority: Priority
     ) -> Transfer:
         """
-        Read a parameter whose value nobody needs, then write another (to be awaited).
-
-        One turn: nothing is sent between, whatever becomes of the read.
+        Read a parameter whose value nobody needs, then write another: one turn, whatever was read.
 
         :param source: what is read in one transaction.
         :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
@@ -231,13 +205,7 @@ class Bus:
         return Transfer(unit, address, priority, data, send)
 
     def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
-        """
-        Ask a unit who it is, one transaction at a time, and none of them twice (to be awaited).
-
-        What it refuses to say or does not answer stays empty.
-
-        :raises PortError: the port is not open.
-        """
+        """Ask a unit who it is, nothing twice; what it does not say stays empty."""
         return inquire(unit, self._link.identify(unit), priority)
 
     def sleep(self, seconds: float) -> Pause:
@@ -245,20 +213,15 @@ class Bus:
         return Pause(time.monotonic() + seconds)
 
     @property
-    def current(self) -> Task:
-        """The task that is being stepped."""
-        assert self._current is not None, 'only for coroutines on the bus'
-        return self._current
-
-    @property
-    def current_or_none(self) -> Task | None:
+    def current(self) -> Task | None:
         """The task that is being stepped, or ``None`` between two."""
         return self._current
 
     async def join(self, task: Task, timeout: float) -> bool:
         """Wait for the end of another task (to be awaited); false when the time is over."""
         if not task.future.done():
-            me = self.current
+            me = self._current
+            assert me is not None, 'only for coroutines on the bus'
             task.joiners.append(me)
             try:
                 await self.sleep(timeout)
@@ -273,13 +236,9 @@ class Bus:
         self._advance(task, None, None)
         return task
 
-    def cancel(self, task: Task) -> None:
-        """
-        End a task: what it waits to send is never sent.
-
-        The task sees :class:`Cancelled` where it stands.
-        """
-        if task.future.done() or task.cancelled:
+    def cancel(self, task: Task | None) -> None:
+        """End a task, if any: it sees :class:`Cancelled` where it stands; nothing more is sent."""
+        if task is None or task.future.done() or task.cancelled:
             return
         task.cancelled = True
         if task.running:
@@ -290,9 +249,9 @@ class Bus:
         task.pause += 1
         self._advance(task, None, Cancelled())
 
-    def wake(self, task: Task) -> None:
+    def wake(self, task: Task | None) -> None:
         """End the pause of a task early; harmless if it is not in one."""
-        if task.asleep:
+        if task is not None and task.asleep:
             self._end_pause(task)
 
     # --- the worker ---------------------------------------------------------------------------
@@ -361,7 +320,6 @@ class Bus:
         self._advance(task, None, None)
 
     def _rest(self, until: float) -> None:
-        """Sleep until something is asked for or a moment has come."""
         if not self._inbox and not self._stopping:
             self._awake.wait(None if until == math.inf else max(0.0, until - time.monotonic()))
 
@@ -386,7 +344,6 @@ class Bus:
             self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
-        """Send what is most urgent; false if there is nothing to send."""
         entry = self._scheduler.take(missing=time.monotonic() >= self.silences.missing_from)
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
@@ -472,7 +429,6 @@ class Bus:
             self.recorder.opened()
 
     def _fail_all(self, error: PortError) -> None:
-        """Tell everyone who waits that the port is not there."""
         for entry in self._scheduler.clear():
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
@@ -489,3 +445,15 @@ class Bus:
         except BaseException:
             # the others have to be told all the same
             _log.exception('error in a slot; the bus worker goes on')
+
+
+_PR_SET_TIMERSLACK = 29
+
+
+def set_timer_slack() -> None:
+    """Have this thread woken when it asked to be, not 50 microseconds later."""
+    try:
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    except (OSError, AttributeError):
+        # only a little precision is lost
+        return

@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.family import load_profile
 from nfo_sinus_driver.catalog.family import usual_family
+from nfo_sinus_driver.catalog.inverter_status import InverterStatus
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -39,10 +40,10 @@ from nfo_sinus_driver.catalog.profile import Refusal
 from nfo_sinus_driver.catalog.profile import Removal
 from nfo_sinus_driver.catalog.profile import Reset
 from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord
@@ -56,6 +57,7 @@ __all__ = [
     'Fact',
     'Family',
     'Holder',
+    'InverterStatus',
     'Kind',
     'Meaning',
     'NotPossible',

@@ -55,21 +55,13 @@ class Codec(abc.ABC, Generic[Raw]):
         self.size = size
 
     def decode(self, data: bytes) -> Raw:
-        """
-        Return what bytes mean.
-
-        :raises ValueError: not exactly :attr:`size` bytes, or none that this codec makes.
-        """
+        """Return what bytes mean, or a ValueError if there are not just enough, or none such."""
         if len(data) != self.size:
             raise ValueError(f'{self.name} takes {self.size} bytes, not {len(data)}')
         return self._unpack(data)
 
     def encode(self, raw: Raw) -> bytes:
-        """
-        Return the bytes of a value.
-
-        :raises ValueError: it does not fit.
-        """
+        """Return the bytes of a value (ValueError: it does not fit)."""
         if not self.fits(raw):
             raise ValueError(f'{raw} does not fit {self.name}')
         return self._pack(raw)
@@ -178,11 +170,7 @@ class Text(Codec[str]):
 
 @functools.cache
 def codec_of(name: str) -> Number | Text:
-    """
-    Return the codec that a table names.
-
-    :raises ValueError: there is none of that name.
-    """
+    """Return the codec that a table names (ValueError: there is none of that name)."""
     if found := _BCD.fullmatch(name):
         return Bcd(name, int(found[1]))
     if found := _STRING.fullmatch(name):

@@ -17,18 +17,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+import math
 
 from nfo_sinus_driver.catalog.codec import Number
+
+#: The operating time of an entry.
+_TICKS = 0xFFFFFF
+#: Its step, h ([M0 §8.4], [M2 §9]); what is shown is cut off, not rounded.
+TICK = 0.1
 
 
 @dataclass(frozen=True)
 class ErrorLogArea:
     """
-    The error log on one bus, the newest entry first.
+    The error log on one bus, the newest entry first; code 0 ends it.
 
-    The low 24 bits of an entry are the operating time of the error in 0.1 h, the high byte is the
-    code of :class:`StatusCode`; code 0 ends the log [M2 §9].
+    Either the low 24 bits of an entry are the operating time of the error in 0.1 h and the high
+    byte is the code of :class:`StatusCode` [M2 §9], or it is a fault code alone, without a time.
 
     :ivar protocol: the protocol that reaches it.
     :ivar space: which numbering of that protocol ``first`` counts in.
@@ -37,6 +45,10 @@ class ErrorLogArea:
     :ivar entries: how many every drive has.
     :ivar limit: how many some drives have; beyond ``entries`` stop at code 0 or a refusal [C4].
     :ivar codec: how the bytes of an entry are read.
+    :ivar factor: of entries that are a code alone: the code of one raw count.
+    :ivar above: of those, too: what status codes of faults begin above; ``None``: they have a time.
+    :ivar readings: what the drive has kept of an entry: what it is, and the parameter, with ``{}``
+        for the number of the entry, 0 being the newest.
     """
 
     protocol: str
@@ -46,23 +58,37 @@ class ErrorLogArea:
     entries: int
     limit: int
     codec: Number
+    factor: Fraction = Fraction(1)
+    above: int | None = None
+    readings: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def timed(self) -> bool:
+        """It tells when an error happened."""
+        return self.above is None
+
+    def code(self, entry: int) -> int:
+        """Return the status code of an entry as it stands in the drive; 0 if it is empty."""
+        if self.above is None:
+            return entry >> 24
+        return self.above + int(entry * self.factor) if entry else 0
+
+    def hours(self, entry: int) -> float:
+        """Return the operating time of an entry as it stands in the drive, h; NaN if none."""
+        return (entry & _TICKS) * TICK if self.timed else math.nan
+
+    def readings_of(self, entry: int) -> Sequence[tuple[str, str]]:
+        """Return what the drive has kept of an entry, 0 being the newest, and the parameters."""
+        return [(what, key.format(entry)) for what, key in self.readings]
 
     def address(self, entry: int) -> int:
-        """
-        Return where an entry begins, 0 being the newest.
-
-        :raises IndexError: no drive has so many entries.
-        """
+        """Return where an entry begins, 0 being the newest; an IndexError beyond the last."""
         if not 0 <= entry < self.limit:
             raise IndexError(f'the error log has {self.limit} entries, not {entry + 1}')
         return self.first + self.stride * entry
 
     def place(self, entry: int) -> tuple[str, int, int | None, int]:
-        """
-        Return what a link is told of an entry: space, index, sub-index and size in bytes.
-
-        :raises IndexError: no drive has so many entries.
-        """
+        """Return what a link is told of an entry: space, index, sub-index and size in bytes."""
         index = self.address(entry)
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 import functools
 import importlib
+import math
 from pathlib import Path
 
 from nfo_sinus_driver.catalog import table
@@ -37,10 +38,11 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Kind
 from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
@@ -121,6 +123,24 @@ class Family(Mapping[str, Parameter]):
         """The keys of the settings of the line, by which the drive may be lost."""
         return self.group_of(Role.BUS_ADDRESS)
 
+    def can_be(self, key: str, value: Value) -> bool:
+        """Tell whether a drive can have a value, as far as the manual says: else it was spoiled."""
+        parameter, role = self[key], self.role_of.get(key)
+        if role is Role.STATUS_CODE:
+            return value in self.status_codes
+        if role is Role.CONTROL_SOURCE:
+            return value in self.profile.holders
+        if role is Role.STATUS_WORD:
+            word, status_word = int(value), self.profile.status_word
+            told = status_word.code is None or status_word.code(word) in self.status_codes
+            return told and status_word.may_say(word)
+        if isinstance(value, str):
+            return not parameter.labels or value in parameter.labels.values()
+        low, high = parameter.minimum, parameter.maximum
+        most = math.inf if role is None else self.profile.most.get(role, math.inf)
+        in_range = (low is None or value >= float(low)) and (high is None or value <= float(high))
+        return abs(value) <= most and in_range
+
 
 def _folders() -> Mapping[str, Path]:
     roots = [Path(root) for root in importlib.import_module(_FAMILIES).__path__]
@@ -191,8 +211,16 @@ def load_family(name: str) -> Family:
         if needed not in dict(roles):
             raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
+
+    def area(row: table.Row) -> ErrorLogArea:
+        found = _area(row)
+        for entry in range(found.limit):
+            for _, key in found.readings_of(entry):
+                known({'parameter': key})
+        return found
+
     log = folder / 'error_log.csv'
-    logs = table.read(log, _area, lambda row: [row.protocol]) if log.exists() else []
+    logs = table.read(log, area, lambda row: [row.protocol]) if log.exists() else []
     return Family(
         name=name,
         parameters={row.key: row for row in parameters},
@@ -296,6 +324,12 @@ def _status_code(row: table.Row) -> StatusCode:
     )
 
 
+def _readings(text: str) -> Iterator[tuple[str, str]]:
+    for pair in text.split('|') if text else ():
+        what, key = pair.split('=')
+        yield what, key
+
+
 def _area(row: table.Row) -> ErrorLogArea:
     codec = codec_of(row['codec'])
     if not isinstance(codec, Number):
@@ -308,4 +342,7 @@ def _area(row: table.Row) -> ErrorLogArea:
         entries=int(row['entries']),
         limit=int(row['limit']),
         codec=codec,
+        factor=Fraction(row.get('factor') or 1),
+        above=table.number(row.get('above', '')),
+        readings=tuple(_readings(row.get('readings', ''))),
     )

@@ -85,10 +85,15 @@ The name of the ROS parameter, and of the setting on the drive's own display; {c
 
 _NO_SETTINGS = 'Its manual prints none.\n'
 
-_ERROR_LOG = """\
+_TIMED = """\
 Entries of two words, the newest first: the operating time in 0.1 h, 24 bits, and the code of the
 inverter status above it. Code 0 ends the log.
-
+"""
+_UNTIMED = """\
+The codes of the last faults, the newest first, without a time; what the drive measured at that
+moment is shown with them. Code 0 ends the log.
+"""
+_LOG_HEAD = """
 | bus | first entry | next entry | entries |
 |---|---|---|---|
 """
@@ -119,11 +124,7 @@ def page() -> str:
 
 
 def _family(family: Family, taken: list[str]) -> Iterator[str]:
-    """
-    Return the parts of a family.
-
-    :param taken: the titles of groups that stand on the page already: their links have a number.
-    """
+    """Return the parts of a family; links to titles that were ``taken`` before have a number."""
     yield f'## {family.profile.title}\n'
     groups = list(dict.fromkeys(parameter.group for parameter in family.settings))
     yield '### Settings\n'
@@ -150,7 +151,9 @@ def _family(family: Family, taken: list[str]) -> Iterator[str]:
             yield _table(_OTHER_COLUMNS, rows)
     if family.error_logs:
         yield '### Error log\n'
-        yield _ERROR_LOG + ''.join(map(_log_row, family.error_logs.values()))
+        timed = any(area.timed for area in family.error_logs.values())
+        head = (_TIMED if timed else _UNTIMED) + _LOG_HEAD
+        yield head + ''.join(map(_log_row, family.error_logs.values()))
 
 
 def _log_row(area: ErrorLogArea) -> str:

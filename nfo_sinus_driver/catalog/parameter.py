@@ -80,11 +80,7 @@ class Address:
 
     @property
     def number(self) -> Number:
-        """
-        The codec of what is no text.
-
-        :raises ValueError: it is a text.
-        """
+        """The codec of what is no text (ValueError: it is a text)."""
         if isinstance(self.codec, Text):
             raise ValueError(f'{self.codec.name} is no number')
         return self.codec
@@ -177,11 +173,7 @@ class Parameter:
         return switched == {0: False, 1: True}
 
     def at(self, protocol: str) -> Address:
-        """
-        Return where it stands on ``protocol``.
-
-        :raises KeyError: the parameter cannot be reached over that protocol.
-        """
+        """Return where it stands on ``protocol``; a KeyError if that does not reach it."""
         try:
             return self.addresses[protocol]
         except KeyError:
@@ -224,17 +216,17 @@ class Parameter:
         if self.labels:
             return codec.encode(int(self._code(value) / factor))
         number = self._number(value)
-        start, step = self._steps_at(number, factor)
-        nearest = _rounded(number, start, step)
-        if not _means(float(number), nearest, factor):
+        raw = self._nearest(number, factor)
+        if not _means(float(number), raw * factor, factor):
             self._check_range(number, protocol)
+            start, step = self._steps_at(number, factor)
             below = start + math.floor((number - start) / step) * step
             raise ValueError(
                 f'{self.key}: {value} lies between two steps of the drive, '
                 f'{_show(below)} and {_show(below + step)}'
             )
-        self._check_range(nearest, protocol)
-        return codec.encode(int(nearest / factor))
+        self._check_range(raw * factor, protocol)
+        return codec.encode(raw)
 
     def on_step(self, number: float) -> bool:
         """Tell whether :attr:`steps` have a number; any is on one where there are none."""
@@ -275,16 +267,18 @@ class Parameter:
         return any(isinstance(codec, Number) and not codec.signed for codec in codecs)
 
     def quantise(self, value: float, protocol: str = 'modbus') -> bytes:
-        """
-        Turn a set-point into the bytes of the nearest step of the drive.
-
-        :raises ValueError: not finite, or out of range.
-        """
+        """Turn a finite set-point in range into the bytes of the nearest step of the drive."""
         number = self._number(value)
         factor = self.factor(protocol)
         self._check_range(number, protocol)
-        nearest = _rounded(number, *self._steps_at(number, factor))
-        return self.at(protocol).number.encode(int(nearest / factor))
+        return self.at(protocol).number.encode(self._nearest(number, factor))
+
+    def _nearest(self, number: Fraction, factor: Fraction) -> int:
+        """Return the raw count of the step that is nearest to a number."""
+        if not self.steps:
+            # each count is one: set-points come often
+            return round(number / factor)
+        return int(_rounded(number, *self._steps_at(number, factor)) / factor)
 
     def _steps_at(self, number: Fraction, count: Fraction) -> tuple[Fraction, Fraction]:
         """
@@ -299,11 +293,7 @@ class Parameter:
         return found
 
     def _meaning(self, code: Fraction) -> Value:
-        """
-        Return what a code of an enumeration means.
-
-        :raises ValueError: it means nothing of the type, or is none.
-        """
+        """Return what a code of an enumeration means, or a ValueError if it means nothing."""
         label = self.labels.get(int(code)) if code.denominator == 1 else None
         if self.kind is str and code.denominator == 1:
             return str(code) if label is None else label

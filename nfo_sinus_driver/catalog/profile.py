@@ -39,7 +39,7 @@ from typing import Protocol
 from typing import TypeVar
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.catalog.status import StatusWord
@@ -76,11 +76,7 @@ class Status(Protocol):
 
 @dataclass(frozen=True)
 class Read:
-    """
-    Read a parameter; brings its value.
-
-    :ivar once: do not repeat the request when there is no response.
-    """
+    """Read a parameter; brings its value. ``once``: the request is not repeated."""
 
     key: str
     once: bool = False
@@ -203,11 +199,7 @@ class SetpointTarget:
             yield Write(write.key, write.value, at=write.at, once=once)
 
     def set_to_zero(self) -> Steps[None]:
-        """
-        Write set-point 0, and read it back.
-
-        :raises NotPossible: the drive keeps another value.
-        """
+        """Write set-point 0, and read it back, or :class:`NotPossible`."""
         yield from self.zero(once=False)
         values: dict[str, Value] = {}
         for key in dict.fromkeys(write.key for write in self.writes(0.0)):
@@ -295,20 +287,12 @@ class ControlMethod(abc.ABC):
         """Tell who has control of the drive."""
 
     def require_startable(self) -> Steps[None]:
-        """
-        See to it that nothing but a fault keeps the motor from being started; it only reads.
-
-        :raises NotPossible: something does, and what to do about it.
-        """
+        """Raise :class:`NotPossible` if more than a fault keeps the motor from being started."""
         yield from ()
 
     @abc.abstractmethod
     def take_control(self) -> Steps[None]:
-        """
-        Put the drive under bus control with no run command standing.
-
-        :raises NotPossible: it lets nobody.
-        """
+        """Put the drive under bus control with no run command, or :class:`NotPossible`."""
 
     @abc.abstractmethod
     def zero_setpoint(self, control_mode: str) -> Steps[None]:

@@ -32,9 +32,7 @@ class CatalogError(Exception):
     """A table contradicts itself; the message names the file and the line."""
 
 
-def read(
-    path: Path, parse: Callable[[Row], _T], unique: Callable[[_T], Iterable[str]]
-) -> list[_T]:
+def read(path: Path, parse: Callable[[Row], _T], unique: Callable[[_T], Iterable[str]]) -> list[_T]:
     """
     Read a table.
 

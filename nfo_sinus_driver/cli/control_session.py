@@ -11,8 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""Commands one drive; the signals that would end the tool are held until it may end."""
+"""Commands one drive, and stops it; signals that would end the tool wait until it may end."""
 
 from __future__ import annotations
 
@@ -22,16 +21,17 @@ from collections.abc import Collection
 from collections.abc import Iterator
 from concurrent.futures import Future
 import contextlib
+import math
 import sys
 import time
 from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
@@ -65,12 +65,7 @@ def spoken(name: str) -> str:
 
 
 class Ended(Exception):
-    """
-    Something ended it; the message says what.
-
-    :ivar status: the exit status, if all goes well from then on.
-    :ivar signal: the name of the signal that did it; ``''``: something else did.
-    """
+    """Something, such as a signal, ended it; with the exit status if all goes well from then on."""
 
     def __init__(self, why: str, status: int, signal: str = '') -> None:
         super().__init__(why)
@@ -79,11 +74,7 @@ class Ended(Exception):
 
 
 class EventLog:
-    """
-    Hears what a drive has to tell, on the worker of the bus.
-
-    :param mute: of what nothing is said here.
-    """
+    """Hears what a drive has to tell, on the worker of the bus; of some causes nothing is said."""
 
     def __init__(self, show: Callable[[str], None], mute: Collection[Cause]) -> None:
         self._show = show
@@ -115,11 +106,7 @@ class EventLog:
 
 
 class ControlSession:
-    """
-    The means to command one drive.
-
-    :ivar remote: the same drive, to look at before it is commanded.
-    """
+    """The means to command one drive, and ``remote`` to look at it before."""
 
     def __init__(
         self, session: Session, screen: Screen, signals: HeldSignals, mute: Collection[Cause]
@@ -131,12 +118,7 @@ class ControlSession:
         self.remote: Remote = session.drive()
 
     def drive(self, **settings: Any) -> Drive:
-        """
-        Return the drive to be commanded; nothing is sent yet.
-
-        :param settings: fields of ``DriveSettings`` that are not as usual.
-        :raises UsageError: they make no sense.
-        """
+        """Return the drive to be commanded, with some settings not as usual; nothing is sent."""
         return self._session.command(self.events, poll_rate=_POLL_RATE, **settings)
 
     def signal(self, timeout: float) -> str:
@@ -154,9 +136,8 @@ class ControlSession:
 
     def wait(self, future: Future[_T], show: Callable[[], object] = lambda: None) -> _T:
         """
-        Return the result of a future.
+        Return the result of a future; meanwhile ``show`` is called again and again.
 
-        :param show: called again and again meanwhile.
         :raises Ended: a signal came first.
         :raises DriveError: as the future does.
         """
@@ -170,16 +151,12 @@ class ControlSession:
     def finish(
         self, future: Future[_T], timeout: float, show: Callable[[], object] = lambda: None
     ) -> _T:
-        """
-        Return the result of a future, whatever signals come.
-
-        :raises DriveError: as the future does; or it takes longer than so many seconds.
-        """
+        """Return the result of a future, whatever signals come; or a DriveError after so many s."""
         deadline = time.monotonic() + timeout
         while not future.done():
             show()
             if time.monotonic() > deadline:
-                raise DriveError(Report(Cause.TOO_LATE, timeout=timeout))
+                raise DriveError(Cause.TOO_LATE, timeout=timeout)
             self.signal(_LOOK_PERIOD)
         return future.result()
 
@@ -188,12 +165,7 @@ class ControlSession:
 def control_session(
     options: argparse.Namespace, *, mute: Collection[Cause] = (), live: bool = False
 ) -> Iterator[ControlSession]:
-    """
-    Open the line to command a drive; signals are held while the ``with`` block lasts.
-
-    :param mute: of what nothing is said.
-    :param live: whether the status may be one line of a terminal.
-    """
+    """Open the line to command a drive; signals are held while the ``with`` block lasts."""
     live = live and sys.stdout is not None and sys.stdout.isatty()
     with (
         HeldSignals() as signals,
@@ -201,3 +173,90 @@ def control_session(
         Session(options, writes=True) as session,
     ):
         yield ControlSession(session, screen, signals, mute)
+
+
+#: How long an answer of the drive layer may take, s; it gives up earlier by itself.
+_LONGEST_ANSWER = 10.0
+#: How long a stop that is not confirmed is tried on, s.
+_LAST_TRIES = 10.0
+#: The same as the parameter ``shutdown_timeout`` of the driver has, s.
+SHUTDOWN_TIMEOUT = 4.0
+_STOP_LOOK_PERIOD = 0.05
+#: How long a poll may take, s.
+_LONGEST_POLL = 2.0
+
+#: How control was released.
+RELEASED = (Cause.CONTROL_RELEASED, Cause.CONTROL_KEPT)
+
+_EMERGENCY = 'use the RUN input or the emergency stop if the motor turns'
+
+
+class Stopping:
+    """Stops one motor, whatever signals come (show: called again and again meanwhile)."""
+
+    def __init__(self, control: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
+        self._session = control
+        self._drive = drive
+        self._show = show
+        #: What the drive answered, or what became of its stop.
+        self.answer: Report | None = None
+
+    def stop(self, *, quick: bool = False) -> bool:
+        """Stop it; true when the drive has confirmed it. It says loudly when it has not."""
+        show, drive = self._session.screen.say, self._drive
+        try:
+            self.answer = self._finish(drive.quick_stop() if quick else drive.stop())
+        except DriveError as error:
+            self.answer = error.report
+            show(f'{say(error)}: {_EMERGENCY}')
+            return self.confirmed_late()
+        return True
+
+    def give_back(self, patience: float = math.inf) -> bool:
+        """Wait until the motor stands, or for so many s, and give control back; false if not."""
+        begun = time.monotonic()
+        while self._may_turn(begun) and time.monotonic() < begun + patience:
+            self._show()
+            if self._session.signal(_STOP_LOOK_PERIOD):
+                break
+        try:
+            # what is still on its ramp has had its time
+            patience = 0.0 if self._may_turn(begun) else 1.0
+            released = self._finish(self._drive.disconnect(patience))
+        except DriveError as error:
+            self._session.screen.say(f'control was not released: {say(error)}')
+            return False
+        if released.cause in (*RELEASED, Cause.LEFT_TO_RAMP):
+            self.answer = released
+        return True
+
+    def _may_turn(self, since: float) -> bool:
+        """Tell whether the drive drives the motor, for all that is known since then."""
+        seen = self._drive.snapshot
+        if seen.at < since:
+            # no poll yet; if none comes, there is nothing to wait for
+            return time.monotonic() < since + _LONGEST_POLL
+        return seen.status is not None and seen.status.driven
+
+    def confirmed_late(self) -> bool:
+        """Let a stop be tried on for a while; true when the drive has confirmed it."""
+        show, drive = self._session.screen.say, self._drive
+        deadline = time.monotonic() + _LAST_TRIES
+        while drive.stop_unconfirmed and time.monotonic() < deadline:
+            self._show()
+            if self._session.signal(_STOP_LOOK_PERIOD):
+                break
+        if drive.stop_unconfirmed:
+            show(
+                'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
+                'the emergency stop; nfo-sinus stop tries again'
+            )
+            return False
+        seen = drive.snapshot
+        status = f'{seen.status.code} {seen.text}' if seen.status is not None else ''
+        self.answer = Report(Cause.STOP_CONFIRMED_LATE, status=status)
+        show(say(self.answer))
+        return True
+
+    def _finish(self, future: Future[Report]) -> Report:
+        return self._session.finish(future, _LONGEST_ANSWER, self._show)

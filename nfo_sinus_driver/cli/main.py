@@ -26,25 +26,25 @@ import signal
 import sys
 import threading
 
-from nfo_sinus_driver.cli.command import ack
-from nfo_sinus_driver.cli.command import stop
-from nfo_sinus_driver.cli.compare import diff
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import remark
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
-from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.read import errors
 from nfo_sinus_driver.cli.read import get
 from nfo_sinus_driver.cli.read import info
 from nfo_sinus_driver.cli.read import list_
+from nfo_sinus_driver.cli.read import set_
+from nfo_sinus_driver.cli.run import ack
 from nfo_sinus_driver.cli.run import run
+from nfo_sinus_driver.cli.run import stop
 from nfo_sinus_driver.cli.scan import scan
-from nfo_sinus_driver.cli.set import set_
+from nfo_sinus_driver.cli.transfer import diff
 from nfo_sinus_driver.cli.transfer import dump
 from nfo_sinus_driver.cli.transfer import load
 from nfo_sinus_driver.cli.tune import tune
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
@@ -72,11 +72,7 @@ _INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """
-    Run the command and return its exit status: 0 only when the drive did it.
-
-    :param argv: the arguments, without the program's name; by default the process's own.
-    """
+    """Run the command; return its exit status, 0 only when the drive did it."""
     options = parse(sys.argv[1:] if argv is None else argv)
     failed = _DIFF_FAILED if options.verb == 'diff' else _FAILED
     try:

@@ -11,13 +11,14 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The verb ``monitor``: what the drives do, again and again; it only reads."""
+"""The verb ``monitor``: what drives and line do, again and again; it only reads."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from collections.abc import Sequence
+import dataclasses
 from datetime import datetime
 import itertools
 import json
@@ -27,13 +28,12 @@ import sys
 import time
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.statistics_table import as_facts
-from nfo_sinus_driver.cli.statistics_table import statistics_table
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import PortError
@@ -82,9 +82,7 @@ def monitor(options: argparse.Namespace) -> int:
     return int(not answered)
 
 
-def _show(
-    drive: Remote, session: Session, options: argparse.Namespace, *, live: bool
-) -> bool:
+def _show(drive: Remote, session: Session, options: argparse.Namespace, *, live: bool) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
@@ -132,9 +130,7 @@ async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[Role, float]]
     return seen, values
 
 
-def _facts(
-    drive: Remote, seen: InverterStatus, values: Mapping[Role, float]
-) -> dict[str, object]:
+def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) -> dict[str, object]:
     measured = {
         name: None if math.isnan(values[role]) else values[role]
         for role, (name, _, _) in _VALUES.items()
@@ -157,3 +153,66 @@ def _line(drive: Remote, values: Mapping[Role, float]) -> str:
         unit = drive.model[key].unit if key in drive.model else ''
         cells.append(f'{number:>{width}} {unit}')
     return '  '.join(cells)
+
+
+#: The columns: what stands above, and the width.
+_COLUMNS = (
+    ('', 7),
+    ('used', 5),
+    ('cycle', 8),
+    ('min', 7),
+    ('median', 7),
+    ('p99', 7),
+    ('max', 7),
+    ('requests', 8),
+    ('no answer', 9),
+    ('damaged', 7),
+    ('refused', 7),
+    ('repeated', 8),
+)
+
+
+def statistics_table(session: Session, addresses: Sequence[int]) -> list[str]:
+    """Return the lines of a table: the line, and each drive; round trips and cycle in ms."""
+    rows = [('line', session.statistics())]
+    if len(addresses) > 1:
+        rows += [(f'drive {address}', session.statistics(address)) for address in addresses]
+    cells = [[name for name, _ in _COLUMNS], *(_cells(name, figures) for name, figures in rows)]
+    return [_row(row) for row in cells]
+
+
+def as_facts(figures: Statistics) -> dict[str, float | int | None]:
+    """Return figures for JSON, which has no NaN; the names are those of BusStatistics."""
+    return {
+        name: None if math.isnan(value) else value
+        for name, value in dataclasses.asdict(figures).items()
+    }
+
+
+def _cells(name: str, figures: Statistics) -> list[str]:
+    times = (
+        figures.cycle_time,
+        figures.round_trip_min,
+        figures.round_trip_median,
+        figures.round_trip_p99,
+        figures.round_trip_max,
+    )
+    counts = (
+        figures.transactions,
+        figures.timeouts,
+        figures.damaged,
+        figures.refused,
+        figures.retries,
+    )
+    share = f'{100 * figures.utilisation:.0f} %'
+    return [name, share, *map(_milliseconds, times), *map(str, counts)]
+
+
+def _milliseconds(seconds: float) -> str:
+    return '-' if math.isnan(seconds) else f'{1000 * seconds:.1f}'
+
+
+def _row(cells: list[str]) -> str:
+    first, *others = zip(cells, _COLUMNS, strict=True)
+    left = f'{first[0]:<{first[1][1]}}'
+    return '  '.join((left, *(f'{cell:>{width}}' for cell, (_, width) in others)))

@@ -29,7 +29,7 @@ from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
 DEFAULTS = {
@@ -122,8 +122,7 @@ def _common() -> argparse.ArgumentParser:
     add(
         '--char-format',
         metavar='FORMAT',
-        help='such as 8E1, 8O1, 8N2 '
-        f'(default: the one of the factory: {", ".join(formats)})',
+        help=f'such as 8E1, 8O1, 8N2 (default: the one of the factory: {", ".join(formats)})',
     )
     add(
         '--response-timeout',
@@ -167,9 +166,7 @@ def _parser() -> argparse.ArgumentParser:
         help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63)',
     )
     scan.add_argument(
-        '--all-settings',
-        action='store_true',
-        help='try every baud rate and parity; takes long',
+        '--all-settings', action='store_true', help='try every baud rate and parity; takes long'
     )
     scan.add_argument(
         '--params',
@@ -234,9 +231,7 @@ def _parser() -> argparse.ArgumentParser:
     verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
     _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))
     stop = verb('stop', 'stop a motor that the bus runs, and give control back', json=True)
-    stop.add_argument(
-        '--quick', action='store_true', help='release the motor at once: it coasts'
-    )
+    stop.add_argument('--quick', action='store_true', help='release the motor at once: it coasts')
     tune = verb('tune', 'have the drive measure or calculate its motor', json=True)
     tune.add_argument(
         'procedure',
@@ -259,7 +254,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         nargs='?',
         type=_setpoint,
         metavar='SETPOINT',
-        help='in the unit of the control mode: Hz, rpm, % of nominal torque, or that of the '
+        help='in the unit of the control mode: Hz, rpm, %% of nominal torque, or that of the '
         'process; negative is reverse',
     )
     add(

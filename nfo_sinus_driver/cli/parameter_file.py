@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-Parameter files: what ``dump`` writes and ``load`` and ``diff`` read.
+Parameter files, which ``dump`` writes, ``load`` and ``diff`` read; names and values as typed.
 
 They are ROS parameter files at the same time. In front stands a header in comments, which tells
 whose parameters these are; a file without one, such as ``ros2 param dump`` writes, is read too.
@@ -21,11 +20,14 @@ whose parameters these are; a file without one, such as ``ros2 param dump`` writ
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field
 from decimal import Decimal
+import difflib
 from pathlib import Path
 import re
 import sys
@@ -33,10 +35,13 @@ from typing import Any
 
 import yaml
 
+from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import listed
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.drive.parameter_writer import show
 
 #: What the header says, in this order.
 HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')
@@ -82,11 +87,7 @@ def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: F
 
 
 def write_file(name: str, text: str) -> None:
-    """
-    Write a parameter file; ``-`` is the standard output.
-
-    :raises CliError: it cannot be written.
-    """
+    """Write a parameter file; ``-`` is the standard output (CliError: it cannot be written)."""
     if name == STANDARD:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -120,11 +121,7 @@ def read_file(name: str) -> ParameterFile:
 
 
 def parse_file(text: str, name: str) -> ParameterFile:
-    """
-    Return what a parameter file says.
-
-    :raises CliError: it is none, or not clear.
-    """
+    """Return what a parameter file says, or a CliError."""
     try:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:
@@ -180,11 +177,7 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[tuple[str, Any]]:
 
 
 def _flatten(tree: Any, file: str) -> dict[str, Any]:
-    """
-    Return parameters by their full names.
-
-    :raises CliError: one stands twice, once with its group and once below it.
-    """
+    """Return parameters by their full names, each of which may stand only once."""
     found: dict[str, Any] = {}
     for key, value in tree.items() if isinstance(tree, dict) else ():
         below = _flatten(value, file) if isinstance(value, dict) else {'': value}
@@ -197,11 +190,7 @@ def _flatten(tree: Any, file: str) -> dict[str, Any]:
 
 
 def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Value], list[str]]:
-    """
-    Tell the parameters of the drive from those of the node; the latter have no group.
-
-    :raises CliError: some have no value that a parameter can have; all of those are listed.
-    """
+    """Tell the parameters of the drive, which have a group, from those of the node."""
     own = [name for name in parameters if '.' not in name or name.startswith(_ROS_OWN)]
     drive = {name: value for name, value in parameters.items() if name not in own}
     strange = [name for name, value in drive.items() if not isinstance(value, Value)]
@@ -225,3 +214,86 @@ def _scalar(value: Value) -> str:
 def _one_line(text: str) -> str:
     """Return a text of which nothing can be taken for more than a line of a comment."""
     return ' '.join(''.join(c if c.isprintable() else ' ' for c in text).split())
+
+
+_SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
+_MEASURED = 'Status'
+#: Why a setting of the line is left alone.
+BARRED = (
+    'settings of the line are changed with --allow-communication-changes alone, '
+    'for the drive may not be heard any more'
+)
+
+
+def shown(value: Value | None, unit: str) -> str:
+    """Return a value with its unit; ``-`` where there is none."""
+    return '-' if value is None else f'{show(value)} {unit}'.rstrip()
+
+
+def same(one: Value | None, other: Value | None) -> bool:
+    """Tell whether two values are the same; 5 is 5.0, but on is not 1."""
+    if isinstance(one, bool) or isinstance(other, bool):
+        return one is other
+    return one == other
+
+
+def is_barred(key: str, model: Family, options: argparse.Namespace) -> bool:
+    """Tell whether a setting must not be changed without being asked for by an option."""
+    return key in model.communication and not options.allow_communication_changes
+
+
+def parse_value(parameter: Parameter, text: str) -> Value:
+    """Turn what was typed for a parameter into its value; a ValueError says what can be."""
+    if parameter.kind is bool and text.lower() in _SWITCH:
+        return _SWITCH[text.lower()]
+    if parameter.labels:
+        labels = {label.lower(): label for label in parameter.labels.values()}
+        if text.lower() not in labels:
+            choices = ', '.join(parameter.labels.values())
+            raise ValueError(f'{parameter.key}: {text!r} is none of {choices}')
+        label = labels[text.lower()]
+        return int(label) if parameter.kind is int else label
+    try:
+        return int(text, 10)
+    except ValueError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f'{parameter.key}: {text!r} is not a number') from None
+
+
+def measured(model: Family) -> tuple[Parameter, ...]:
+    """Return what a drive measures, where reading it has no effect."""
+    return tuple(
+        parameter
+        for parameter in model.values()
+        if parameter.group == _MEASURED and parameter.access is Access.READ
+    )
+
+
+def readable(model: Family) -> Mapping[str, Parameter]:
+    """Return what this tool shows when asked for it by name: settings and measured values."""
+    return {parameter.key: parameter for parameter in (*model.settings, *measured(model))}
+
+
+def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:
+    """See to it that all names are known; those that are not are listed."""
+    known = list(known)
+    strange = [name for name in dict.fromkeys(names) if name not in known]
+    if strange:
+        what = 'no parameter of this name' if len(strange) == 1 else 'no parameters of these names'
+        lines = (f'{name}{_did_you_mean(name, known)}' for name in strange)
+        raise CliError(listed(f'{whose} has {what}{end}:', lines))
+
+
+def _did_you_mean(name: str, known: list[str]) -> str:
+    bare = _bare(name)
+    close = [key for key in known if _bare(key) == bare]
+    close = close or difflib.get_close_matches(name.lower(), known, n=2)
+    return f' (did you mean {" or ".join(close)}?)' if close else ''
+
+
+def _bare(name: str) -> str:
+    """Return a name without its group, and as people write it who know the manual's names."""
+    return name.rpartition('.')[2].lower().replace('-', '').replace('_', '')

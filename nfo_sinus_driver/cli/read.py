@@ -11,12 +11,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The verbs that read one drive: ``info``, ``list``, ``get`` and ``errors``."""
+"""The verbs for one drive: ``info``, ``list``, ``get``, ``set`` and ``errors``."""
 
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterable
 from collections.abc import Mapping
 from collections.abc import Sequence
@@ -26,19 +26,30 @@ import math
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.erase import erase
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.progress import progress
-from nfo_sinus_driver.cli.progress import put
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import columns
+from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import require_yes
+from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
+from nfo_sinus_driver.cli.control_session import control_session
+from nfo_sinus_driver.cli.parameter_file import BARRED
+from nfo_sinus_driver.cli.parameter_file import is_barred
+from nfo_sinus_driver.cli.parameter_file import measured
+from nfo_sinus_driver.cli.parameter_file import parse_value
+from nfo_sinus_driver.cli.parameter_file import readable
+from nfo_sinus_driver.cli.parameter_file import require_names
+from nfo_sinus_driver.cli.parameter_file import same
+from nfo_sinus_driver.cli.parameter_file import shown
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.table import columns
-from nfo_sinus_driver.cli.values import measured
-from nfo_sinus_driver.cli.values import readable
-from nfo_sinus_driver.cli.values import require_names
-from nfo_sinus_driver.cli.values import shown
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 
 _NAMEPLATE = (
@@ -151,9 +162,9 @@ def errors(options: argparse.Namespace) -> int:
 def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
     rows = [
         (
-            f'{entry.operating_time:.1f} h',
+            '-' if math.isnan(entry.operating_time) else f'{entry.operating_time:.1f} h',
             str(entry.code),
-            entry.text,
+            entry.full_text,
             _ago(entry.age),
             entry.wall_time,
         )
@@ -165,9 +176,9 @@ def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
 def _as_row(entry: LogEntry) -> dict[str, object]:
     return {
         'code': entry.code,
-        'text': entry.text,
-        'operating_time': entry.operating_time,
+        'text': entry.full_text,
         # JSON has no NaN
+        'operating_time': _known(entry.operating_time),
         'age': _known(entry.age),
         'time': entry.wall_time,
     }
@@ -214,9 +225,7 @@ def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
     keys = {role: drive.model.key(role) for role in roles}
     found = _measure(drive, filter(drive.registers.reaches, keys.values()))
     return {
-        role: shown(found[key], drive.model[key].unit)
-        for role, key in keys.items()
-        if key in found
+        role: shown(found[key], drive.model[key].unit) for role, key in keys.items() if key in found
     }
 
 
@@ -233,3 +242,67 @@ def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
                     raise
             step()
     return found
+
+
+_MUTE = {*NO_TIMEOUT, Cause.FAULT_APPEARED}
+_LONGEST = 15.0
+
+
+def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
+    """Erase the error log, whose entries are ``rows`` for a script; see that it is empty."""
+    count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
+    if entries:
+        require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
+        with control_session(options, mute=_MUTE) as control:
+            drive = control.drive()
+            control.finish(drive.connect(), _LONGEST)
+            control.finish(drive.erase_error_log(), _LONGEST)
+    if options.json:
+        put(json.dumps({'erased': rows}, ensure_ascii=False, indent=2))
+    else:
+        put(f'erased: {count}' if entries else 'the error log is empty already')
+    return 0
+
+
+def set_(options: argparse.Namespace) -> int:
+    """Change parameters, all of them or none."""
+    times = Counter(name for name, _ in options.changes)
+    twice = [name for name, count in times.items() if count > 1]
+    if twice:
+        raise UsageError(f'{", ".join(twice)} is given twice')
+    with Session(options, writes=True) as session:
+        drive = session.drive()
+        settings = {parameter.key: parameter for parameter in drive.model.settings}
+        require_names(times, settings, drive.model.name, ', nothing was written')
+        wanted, wrong = {}, []
+        for name, text in options.changes:
+            try:
+                wanted[name] = parse_value(settings[name], text)
+            except ValueError as error:
+                wrong.append(str(error))
+        if not wrong:
+            drive.identify(thoroughly=False)
+            values = drive.read(wanted)
+            require_names(wanted, values, str(drive), ', nothing was written')
+            for name, value in wanted.items():
+                try:
+                    exact = drive.parameters.exact(name, value)
+                    barred = is_barred(name, drive.model, options)
+                    if barred and not same(exact, values.get(name)):
+                        wrong.append(f'{name}: {BARRED}')
+                    else:
+                        drive.parameters.admit(name, value)
+                except ParameterError as error:
+                    wrong.append(say(error))
+        if wrong:
+            raise CliError(listed('nothing was written:', wrong))
+        changes = drive.parameters.change(wanted).result()
+        values = drive.parameters.values
+    if options.json:
+        put(as_json({name: settings[name] for name in wanted}, values))
+        return 0
+    changed = {change.key: change for change in changes}
+    for name in wanted:
+        as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
+        put(str(changed.get(name, as_it_was)))
+    return 0

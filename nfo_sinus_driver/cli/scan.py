@@ -11,8 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The verb ``scan``: who answers on the line."""
+"""The verb ``scan``: who answers on the line, and the parameter file of a driver for them."""
 
 from __future__ import annotations
 
@@ -22,39 +21,39 @@ from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
 import copy
+from datetime import datetime
 import json
+from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.cli.driver_params import driver_params
-from nfo_sinus_driver.cli.driver_params import require_new
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import listed
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import remark
+from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.options import DEFAULTS
 from nfo_sinus_driver.cli.parameter_file import STANDARD
 from nfo_sinus_driver.cli.parameter_file import write_file
-from nfo_sinus_driver.cli.progress import progress
-from nfo_sinus_driver.cli.progress import put
-from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
-_COLUMNS = (
-    ('address', 7),
-    ('line', 10),
-    ('product', 20),
-    ('firmware', 11),
-    ('serial number', 0),
+_COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
+_ADVICE = (
+    'no response: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
+    'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
+    'A and B of the wires'
 )
 
 
@@ -102,11 +101,7 @@ def _write_params(
     found: Mapping[int, Mapping[str, str]],
     lines: Mapping[int, tuple[int, str]],
 ) -> None:
-    """
-    Write what the driver needs to start with the drives that were found.
-
-    :raises CliError: they do not speak alike, so that no line could have them all.
-    """
+    """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
         told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
         raise CliError(
@@ -135,9 +130,7 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
         rates = [rate for rate in _LIKELIEST if rate in protocol.baud_rates]
         formats = usual or protocol.char_formats
         return [(baud_rate, format_) for baud_rate in rates for format_ in formats]
-    return [
-        (options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)
-    ]
+    return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
 
 
 def _who_answers(
@@ -153,11 +146,7 @@ def _who_answers(
 
 
 def _ask(drive: Remote) -> dict[str, str] | None:
-    """
-    Return who answers at an address.
-
-    :raises DriveError: the port cannot be used.
-    """
+    """Return who answers at an address (DriveError: the port cannot be used)."""
     try:
         status = drive.model.key_of_status
         drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))
@@ -186,3 +175,71 @@ def _ask(drive: Remote) -> dict[str, str] | None:
 
 def _row(facts: dict[str, str]) -> str:
     return '  '.join(f'{facts[name]:<{width}}' for name, width in _COLUMNS).rstrip()
+
+
+_HEAD = """\
+# {count} found by nfo-sinus scan on {date}.
+#
+#   ros2 launch nfo_sinus_driver driver.launch.py params_file:=FILE
+#   ros2 run nfo_sinus_driver driver --ros-args --params-file FILE
+#
+# Rename the drives as you like, in `drives` and in front of their sections. Every parameter is
+# listed in docs/interface.md; what is left out here keeps its default. This one is worth a thought:
+# each drive stops by itself when it has heard nothing for so long, s. It is written to the drives.
+#
+# /**:
+#   ros__parameters:
+#     drive_timeout: 2.0
+
+/**/nfo_sinus_bus:
+  ros__parameters:
+"""
+_DRIVE = """
+# {who}
+/**/{name}:
+  ros__parameters:
+    address: {address}
+    model: {model}
+"""
+#: What is written only if it is not what the driver takes by itself.
+_IF_OTHER = ('response_timeout', 'retries')
+
+
+def require_new(name: str, *, force: bool) -> None:
+    """See to it that no file is replaced that somebody may have edited since."""
+    if name != STANDARD and not force and Path(name).exists():
+        raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
+
+
+def driver_params(
+    options: argparse.Namespace,
+    baud_rate: int,
+    char_format: str,
+    found: Mapping[int, Mapping[str, str]],
+) -> str:
+    """Return a parameter file with which the driver starts with what was found, by address."""
+    names = {address: f'drive_{address}' for address in sorted(found)}
+    line: dict[str, object] = {'port': options.port, 'protocol': options.protocol}
+    if baud_rate:
+        line |= {'baud_rate': baud_rate, 'char_format': char_format}
+    for name in _IF_OTHER:
+        # a scan is content with less time than the driver should give
+        if getattr(options, name) > DEFAULTS[name]:
+            line[name] = getattr(options, name)
+    line['drives'] = list(names.values())
+    count = 'one drive' if len(names) == 1 else f'{len(names)} drives'
+    date = f'{datetime.now().astimezone():%Y-%m-%d %H:%M %z}'
+    # what JSON has is YAML, too
+    settings = [f'    {name}: {json.dumps(value)}\n' for name, value in line.items()]
+    drives = [
+        _DRIVE.format(who=_who(facts), name=names[address], address=address, model=facts['model'])
+        for address, facts in sorted(found.items())
+    ]
+    return ''.join((_HEAD.format(count=count, date=date), *settings, *drives))
+
+
+def _who(facts: Mapping[str, str]) -> str:
+    """Return what a drive says of itself, fit for a comment."""
+    told = {'': facts['product'], 'firmware ': facts['firmware'], 'serial ': facts['serial number']}
+    text = ', '.join(f'{name}{value}' for name, value in told.items() if value)
+    return ''.join(char if char.isprintable() else ' ' for char in text)

@@ -11,17 +11,23 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """What is printed while a motor is commanded; nobody ever waits for a terminal or a reader."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
+from datetime import datetime
+import json
+import math
 import os
 import shutil
 import sys
 import threading
 from typing import TextIO
+
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import Snapshot
 
 _CLEAR_LINE = '\r\x1b[K'
 #: How long the last words may take, s.
@@ -32,11 +38,9 @@ _MOST_WAITING = 1000
 
 class Screen:
     """
-    Prints by a thread of its own, while the ``with`` block lasts.
+    Prints by a thread of its own, in a ``with`` block; ``live``: the status stays in one line.
 
     After Ctrl-S in the terminal, or with a reader that does not read, only that thread waits.
-
-    :ivar live: the status is one line of a terminal, and not a line each time.
     """
 
     def __init__(self, *, live: bool) -> None:
@@ -125,3 +129,64 @@ def _write(stream: TextIO | None, text: str) -> None:
     data = text.encode(stream.encoding or 'utf-8', 'replace')
     while data:
         data = data[os.write(number, data) :]
+
+
+#: What is measured beside the status: its name, its unit and its decimals.
+_VALUES = {
+    Role.OUTPUT_CURRENT: ('output_current', 'A', 2),
+    Role.OUTPUT_POWER: ('output_power', 'W', 0),
+    Role.ACTUAL_TORQUE: ('torque', '%', 0),
+}
+
+
+def as_line(seen: Snapshot, values: Mapping[Role, float], more: str = '') -> str:
+    """Return what a drive does, with what was measured and more, in one line."""
+    when = f'{datetime.now().astimezone():%H:%M:%S}'
+    cells = [when, more] if more else [when]
+    if seen.status is None:
+        return '  '.join((*cells, 'not connected'))
+    cells.append(f'{f"{seen.status.code} {seen.text}":<11}')
+    cells.append(f'set {_number(seen.setpoint, 1):>5} {seen.unit}')
+    if seen.control_mode in ('Torque', 'PI-Reg'):
+        cells.append(f'actual {_number(seen.actual, 1):>5} {seen.unit}')
+    cells += [f'{_number(seen.frequency, 1):>5} Hz', f'{_number(seen.speed, 0):>5} rpm']
+    cells += [
+        f'{_number(values.get(role, math.nan), decimals):>4} {unit}'
+        for role, (_, unit, decimals) in _VALUES.items()
+    ]
+    return '  '.join(cells)
+
+
+def as_json(seen: Snapshot, values: Mapping[Role, float]) -> str:
+    """Return the same as a JSON document of one line; the names are those of the messages."""
+    facts: dict[str, object] = {
+        'time': datetime.now().astimezone().isoformat(),
+        'connected': seen.connected,
+        'enabled': seen.enabled,
+    }
+    if seen.status is not None:
+        facts |= {
+            'code': seen.status.code,
+            'text': seen.text,
+            'kind': seen.kind.value,
+            'state': seen.status.state.name,
+            'control_mode': seen.control_mode,
+            'unit': seen.unit,
+            'setpoint': _known(seen.setpoint),
+            'actual': _known(seen.actual),
+            'frequency': _known(seen.frequency),
+            'speed': _known(seen.speed),
+        }
+        facts |= {
+            name: _known(values.get(role, math.nan)) for role, (name, _, _) in _VALUES.items()
+        }
+    return json.dumps(facts, ensure_ascii=False)
+
+
+def _number(value: float, decimals: int) -> str:
+    return '-' if math.isnan(value) else f'{value:.{decimals}f}'
+
+
+def _known(value: float) -> float | None:
+    # JSON has no NaN
+    return None if math.isnan(value) else value

@@ -30,11 +30,11 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import UsageError
-from nfo_sinus_driver.cli.progress import progress
-from nfo_sinus_driver.cli.progress import remark
-from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import remark
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
@@ -47,8 +47,8 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.drive.log_entry import LogEntry
 from nfo_sinus_driver.drive.settings import MONITOR
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
@@ -81,11 +81,7 @@ class Remote:
         return self._drive.run(command).result()
 
     def identify(self, *, thoroughly: bool = True) -> Identity:
-        """
-        Find out who answers.
-
-        :param thoroughly: also ask for model and serial number.
-        """
+        """Find out who answers, thoroughly with model and serial number."""
         try:
             return self._drive.identify(thoroughly=thoroughly).result()
         except DriveError as error:
@@ -143,12 +139,7 @@ class Remote:
 
 
 class Session:
-    """
-    The line that the options name, open while the ``with`` block lasts.
-
-    :param writes: whether drives on it may be written to; without it they are only read.
-    :raises UsageError: an option that can never work.
-    """
+    """The line that the options name, open in a ``with`` block; only read without ``writes``."""
 
     def __init__(self, options: argparse.Namespace, *, writes: bool = False) -> None:
         self._options = options
@@ -197,12 +188,7 @@ class Session:
         return self._bus.run(ask()).result()
 
     def command(self, listener: Listener, **settings: Any) -> Drive:
-        """
-        Return the drive that the options name as the driver has it; nothing is sent.
-
-        :param settings: fields of ``DriveSettings`` that are not as usual.
-        :raises UsageError: they make no sense.
-        """
+        """Return the drive that the options name as the driver has it; nothing is sent."""
         try:
             return Drive(self._bus, self._settings(self._options.address, **settings), listener)
         except ValueError as error:

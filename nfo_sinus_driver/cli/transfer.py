@@ -11,34 +11,48 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The verbs ``dump`` and ``load``: from a drive into a file, and from a file into a drive."""
+"""The verbs that have to do with files: ``dump``, ``load`` and ``diff``."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Mapping
+import contextlib
+from dataclasses import dataclass
 from datetime import datetime
 from importlib import metadata
+import json
+import signal
+import sys
+import threading
 
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.bulk_write import Loading
-from nfo_sinus_driver.cli.errors import CliError
-from nfo_sinus_driver.cli.errors import listed
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import Interrupted
+from nfo_sinus_driver.cli.console import UsageError
+from nfo_sinus_driver.cli.console import columns
+from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.cli.console import progress
+from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import remark
+from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.options import command_line
 from nfo_sinus_driver.cli.parameter_file import ParameterFile
 from nfo_sinus_driver.cli.parameter_file import format_file
+from nfo_sinus_driver.cli.parameter_file import is_barred
 from nfo_sinus_driver.cli.parameter_file import read_file
+from nfo_sinus_driver.cli.parameter_file import require_names
+from nfo_sinus_driver.cli.parameter_file import same
+from nfo_sinus_driver.cli.parameter_file import shown
 from nfo_sinus_driver.cli.parameter_file import write_file
-from nfo_sinus_driver.cli.progress import put
-from nfo_sinus_driver.cli.progress import remark
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.values import is_barred
-from nfo_sinus_driver.cli.values import require_names
-from nfo_sinus_driver.cli.values import same
-from nfo_sinus_driver.cli.values import shown
-from nfo_sinus_driver.cli.wording import say
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
@@ -127,14 +141,8 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
     return notes
 
 
-def _differing(
-    file: ParameterFile, drive: Remote, options: argparse.Namespace
-) -> dict[str, bytes]:
-    """
-    Return what has to be written.
-
-    :raises CliError: the drive cannot have some of it, or it may not be changed; all is listed.
-    """
+def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) -> dict[str, bytes]:
+    """Return what has to be written; all that cannot be is listed in a CliError."""
     found: dict[str, bytes] = {}
     wrong, kept = [], []
     for key, value in file.values.items():
@@ -175,12 +183,200 @@ def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
 
 
 def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
-    """
-    See to it that what only a standing motor allows is not tried while it runs.
-
-    :raises CliError: it runs.
-    """
+    """See to it that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.look().driven:
         head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
         raise CliError(listed(head, keys))
+
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Loading:
+    """Writes what differs into one drive; the options say what to do when it fails half-way."""
+
+    def __init__(
+        self, drive: Remote, data: Mapping[str, bytes], options: argparse.Namespace
+    ) -> None:
+        self._drive = drive
+        self._data = data
+        self._options = options
+        #: What the drive had, to be put back.
+        self._before = {key: drive.parameters.data[key] for key in data}
+        self._written: dict[str, Change] = {}
+
+    def run(self) -> None:
+        """Write all of it; if that fails, say what was written and what not, or put it back."""
+        try:
+            self._write('writing', self._data, self._written)
+        except (DriveError, Interrupted) as error:
+            doubtful = error.left if isinstance(error, ParameterError) else ()
+            self._tell_how_far(error)
+            stained = list(dict.fromkeys((*self._written, *doubtful)))
+            raise CliError(self._clean_up(stained)) from error
+
+    def _write(self, what: str, data: Mapping[str, bytes], written: dict[str, Change]) -> None:
+        """Write, and keep account of it; a signal ends it after the parameter on its way."""
+        with _signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
+
+            def wrote(change: Change) -> None:
+                written[change.key] = change
+                step()
+                if came() and len(written) < len(data):
+                    raise Interrupted
+
+            self._drive.parameters.write_each(data, wrote).result()
+
+    def _tell_how_far(self, error: Exception) -> None:
+        """Say what was written and what was not."""
+        left = [key for key in self._data if key not in self._written]
+        refused = error.key if isinstance(error, ParameterError) else ''
+        failed = [key for key in left if key == refused]
+        left = [key for key in left if key != refused]
+        remark(say(error))
+        if self._written:
+            remark(listed('written:', map(str, self._written.values())))
+        if failed:
+            remark(listed('tried in vain:', failed))
+        if left:
+            remark(listed('not written:', left))
+
+    def _clean_up(self, stained: list[str]) -> str:
+        """Put back what was written, if that is wanted; return what the drive has then."""
+        if not stained:
+            return 'not loaded: the drive is as it was'
+        if not self._options.put_back and not self._wants_it_back():
+            if self._written:
+                remark(f'to put it back:\n  {self._how_to_put_back()}')
+            return f'not loaded: {len(self._written)} of {len(self._data)} were written'
+        back: dict[str, Change] = {}
+        try:
+            self._write('putting back', {key: self._before[key] for key in stained}, back)
+        except (DriveError, Interrupted) as error:
+            if back:
+                remark(listed('put back:', map(str, back.values())))
+            lost = (key for key in stained if key not in back)
+            head = f'NOT all put back, {say(error)}; not as it was:'
+            return listed(head, map(self._state, lost))
+        return f'not loaded: all that was written is put back ({len(back)}), the drive is as it was'
+
+    def _wants_it_back(self) -> bool:
+        if self._options.keep or not (sys.stdin.isatty() and sys.stderr.isatty()):
+            return False
+        print('Put back what was written? [Y/n] ', end='', file=sys.stderr, flush=True)
+        try:
+            answer = sys.stdin.readline()
+        except KeyboardInterrupt:
+            answer = ''
+        # the end of the input is no answer
+        return answer.endswith('\n') and answer.strip().lower() in ('', 'y', 'yes')
+
+    def _state(self, key: str) -> str:
+        """Return what is known of a parameter that could not be put back."""
+        change = self._written.get(key)
+        if change is None:
+            return f'{key}, of which nothing is known'
+        return f'{key}: {shown(change.new, change.unit)}, was {shown(change.old, change.unit)}'
+
+    def _how_to_put_back(self) -> str:
+        words = [f'{key}={shown(change.old, "")}' for key, change in self._written.items()]
+        if not self._drive.model.communication.isdisjoint(self._written):
+            words.insert(0, '--allow-communication-changes')
+        return command_line(self._options, 'set', *words)
+
+
+@contextlib.contextmanager
+def _signals_noted() -> Iterator[Callable[[], bool]]:
+    """Let signals that end the program wait; what it yields tells whether one came."""
+    came = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield came.is_set
+        return
+    before = {number: signal.signal(number, lambda *_: came.set()) for number in _SIGNALS}
+    try:
+        yield came.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+_ABSENT = 'absent'
+
+
+@dataclass(frozen=True)
+class _Side:
+    """
+    One of the two that are compared.
+
+    :ivar address: of the drive, as text; ``''`` where it is not known.
+    """
+
+    name: str
+    values: Mapping[str, Value]
+    address: str = ''
+
+
+def diff(options: argparse.Namespace) -> int:
+    """Compare; 1 if there are differences, as diff(1) does."""
+    left, right = _sides(options)
+    differing = [
+        key
+        for key in (*left.values, *(key for key in right.values if key not in left.values))
+        if not same(left.values.get(key), right.values.get(key))
+    ]
+    model = load_family(options.model)
+    own = model.key(Role.BUS_ADDRESS)
+    if own in differing and left.address != right.address and left.address and right.address:
+        # two drives on one line cannot have the same
+        differing.remove(own)
+    if options.json:
+        table = {
+            key: {'left': left.values.get(key), 'right': right.values.get(key)} for key in differing
+        }
+        put(json.dumps(table, ensure_ascii=False, indent=2))
+    elif differing:
+        rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
+        for line in columns([('', left.name, right.name), *rows]):
+            put(line)
+    return int(bool(differing))
+
+
+def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
+    files, against = options.files, options.against
+    if len(files) == 2 and against is None:
+        one, other = (read_file(name) for name in files)
+        return _side(one), _side(other)
+    if len(files) == 1 and against is None:
+        return _with_drive(read_file(files[0]), options)
+    if not files and against is not None:
+        if against == options.address:
+            raise UsageError(f'--against {against}: that is the same drive')
+        with Session(options) as session:
+            return _read(session.drive()), _read(session.drive(against))
+    raise UsageError('diff takes one file, or two, or --against ADDRESS')
+
+
+def _with_drive(file: ParameterFile, options: argparse.Namespace) -> tuple[_Side, _Side]:
+    with Session(options) as session:
+        drive = _read(session.drive())
+    missing = [key for key in drive.values if key not in file.values]
+    if missing:
+        remark(f'{file.name} says nothing of {len(missing)} parameters of the drive')
+    values = {key: value for key, value in drive.values.items() if key in file.values}
+    return _side(file), _Side(drive.name, values, drive.address)
+
+
+def _side(file: ParameterFile) -> _Side:
+    return _Side(file.name, file.values, file.header.get('address', ''))
+
+
+def _read(drive: Remote) -> _Side:
+    drive.identify(thoroughly=False)
+    return _Side(f'address {drive.address}', drive.read(), str(drive.address))
+
+
+def _cell(side: _Side, key: str, model: Family) -> str:
+    if key not in side.values:
+        return _ABSENT
+    return shown(side.values[key], model[key].unit if key in model else '')

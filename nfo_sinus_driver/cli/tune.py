@@ -20,16 +20,16 @@ import argparse
 import json
 import time
 
-from nfo_sinus_driver.cli.confirm import require_yes
+from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import require_yes
+from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
 from nfo_sinus_driver.cli.control_session import ControlSession
 from nfo_sinus_driver.cli.control_session import Ended
+from nfo_sinus_driver.cli.control_session import Stopping
 from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.control_session import spoken
-from nfo_sinus_driver.cli.errors import CliError
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.cli.stopping import Stopping
-from nfo_sinus_driver.cli.wording import say
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Procedure

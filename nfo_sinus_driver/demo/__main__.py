@@ -38,7 +38,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from nfo_sinus_driver.demo.bench import Bench
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.demo.recording import Recorder
 from nfo_sinus_driver.demo.recording import RecordingError
 from nfo_sinus_driver.demo.sequence import HEADING

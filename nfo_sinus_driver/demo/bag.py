@@ -93,12 +93,7 @@ class Recording:
 
 
 def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
-    """
-    Read a bag.
-
-    :param drive: the node whose run it was.
-    :raises ValueError: the drive was never connected.
-    """
+    """Read the run of a drive from a bag; a ValueError if it was never connected."""
     heard: dict[str, list[tuple[int, Any]]] = {}
     with AnyReader([folder]) as reader:
         for connection, stamp, data in reader.messages():

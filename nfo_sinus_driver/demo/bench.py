@@ -11,14 +11,17 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """Starts a simulated drive and the driver for it: what ``make run`` and ``make demo`` share."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import contextlib
+import os
 from pathlib import Path
+import random
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -31,11 +34,7 @@ BAUD_RATE = 57600
 
 
 class Bench(contextlib.ExitStack):
-    """
-    A simulated drive on a pseudo-terminal and a driver for it, each a process of its own.
-
-    :param log: where both write what they say; ``None``: to our own output.
-    """
+    """A simulated drive on a pseudo-terminal and a driver for it, whose log is ours or a file."""
 
     def __init__(self, log: IO[bytes] | None = None) -> None:
         super().__init__()
@@ -45,12 +44,7 @@ class Bench(contextlib.ExitStack):
         self._processes: list[subprocess.Popen[bytes]] = []
 
     def start_simulator(self) -> str:
-        """
-        Start the simulated drive, and wait until it serves its port.
-
-        :returns: what it says of itself.
-        :raises RuntimeError: it does not start.
-        """
+        """Start the simulated drive, wait until it serves, and return what it says of itself."""
         arguments = ('--link', self.port, '--baud', str(BAUD_RATE), '--paced')
         process = self._start(*_SIMULATOR, *arguments, stdout=subprocess.PIPE)
         assert process.stdout is not None
@@ -101,3 +95,25 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+#: All that DDS has ports for on every system; 0 is everybody's.
+_DOMAINS = range(1, 102)
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """Have a ROS domain that nobody else has who asks here, and not that of the user."""
+    users = os.environ.get('ROS_DOMAIN_ID', '')
+    for number in random.sample(_DOMAINS, len(_DOMAINS)):
+        if str(number) == users:
+            continue
+        with socket.socket(socket.AF_UNIX) as claim:
+            # a name that only one on this machine can have, and that goes with its process
+            try:
+                claim.bind(f'\0nfo_sinus_driver/domain/{number}')
+            except OSError:
+                continue
+            yield number
+            return
+    raise RuntimeError('no ROS domain is free')

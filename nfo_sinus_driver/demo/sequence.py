@@ -59,12 +59,7 @@ class StepError(Exception):
 
 
 class DemoSequence(Node):
-    """
-    A client of the driver: publishes set-points, calls services, and prints what it sees.
-
-    It enables the drive, runs it forward and backward, lets a fault happen, acknowledges it,
-    enables again and stops.
-    """
+    """A client of the driver: it enables, runs, lets a fault happen, and prints what it sees."""
 
     def __init__(self) -> None:
         super().__init__('demo_sequence')
@@ -96,11 +91,7 @@ class DemoSequence(Node):
             )
 
     def run(self, bench: Bench) -> None:
-        """
-        Go through it.
-
-        :raises StepError: a step did not happen.
-        """
+        """Go through it, or a StepError."""
 
         def near(hertz: float) -> Callable[[], bool]:
             return lambda: abs(self._actual - hertz) < _NEAR
@@ -141,11 +132,7 @@ class DemoSequence(Node):
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
     def _wait_for(self, what: str, condition: Callable[[], object]) -> None:
-        """
-        Print what is seen until a condition holds.
-
-        :raises StepError: it does not.
-        """
+        """Print what is seen until a condition holds (StepError: it does not)."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if time.monotonic() > deadline:

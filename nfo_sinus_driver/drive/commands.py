@@ -28,19 +28,19 @@ from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import NotPossible
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Refusal
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import profile
+from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -84,7 +84,7 @@ async def carry_out(
             assert isinstance(refused.__cause__, Refused)
             raise refused.__cause__ from None
         except NotPossible as error:
-            raise DriveError(Report(Cause.NOT_POSSIBLE, why=str(error))) from error
+            raise DriveError(Cause.NOT_POSSIBLE, why=str(error)) from error
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
@@ -127,22 +127,15 @@ class Commands:
 
     Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
 
-    :param tell: told what is written to a memory that wears out.
-
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
     """
 
-    def __init__(
-        self,
-        settings: DriveSettings,
-        registers: ParameterAccess,
-        tell: Callable[[Severity, Report], None],
-    ) -> None:
-        method = registers.model.profile.methods[settings.method]
-        self._method = method(settings.reference, registers.reaches)
-        self._registers = registers
-        self._tell = tell
+    def __init__(self, inverter: DriveState) -> None:
+        method = inverter.model.profile.methods[inverter.settings.method]
+        self._method = method(inverter.settings.reference, inverter.registers.reaches)
+        self._registers = inverter.registers
+        self._tell = inverter.tell
 
     @property
     def coasts(self) -> bool:
@@ -197,26 +190,18 @@ class Commands:
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
     async def acknowledge(self, code: int, control_mode: str) -> str:
-        """
-        Acknowledge a fault, run command and set-point first where the bus has control.
-
-        :param code: the inverter status code that is shown.
-        :returns: what more the drive said of it; ``''`` if nothing.
-        """
+        """Acknowledge the fault shown, run command and set-point first; return its details."""
         shown = self._registers.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
         return await carry_out(steps, self._registers, Priority.SERVICE)
 
-    async def begin(
-        self, procedure: Procedure | Reset, require_wanted: Callable[[], None]
-    ) -> None:
+    async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """
         Have the drive begin a procedure; once, for nobody knows what happened before a second time.
 
-        It waits for its turn with the stops, so that one which comes later does not overtake it.
-
-        :param require_wanted: called when its turn has come; if it raises, nothing is written.
+        It waits for its turn with the stops, so that one which comes later does not overtake it; if
+        ``require_wanted`` raises then, nothing is written.
         """
         write = self._method.procedures[procedure]
         await self._registers.write(write, Priority.STOP, require_wanted)

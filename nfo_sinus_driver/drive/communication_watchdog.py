@@ -32,7 +32,7 @@ from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
 
 class CommunicationWatchdog:
     """
-    The time-out of one drive, and that it stops the motor then [C91]; used on the bus alone.
+    SioTot with AutoStop of one drive [C91], or why not in a :class:`DriveError`; on the bus alone.
 
     :param commanded: this driver may command the drive, and not only watch it.
     """
@@ -49,11 +49,8 @@ class CommunicationWatchdog:
         """
         Set it as the settings want it; later, if the drive takes nothing now.
 
-        That is so while a fault is active: who could not connect to such a drive could not
-        acknowledge its fault. Where settings need bus control [C100], it is so while others have
-        it.
-
-        :raises DriveError: it cannot be set.
+        That is so while a fault is active, which could not be acknowledged without a connection;
+        and, where settings need bus control [C100], while others have it.
         """
         self._due = True
         try:
@@ -63,33 +60,22 @@ class CommunicationWatchdog:
             barred = inverter.settings_need_control and seen is not None and not seen.from_bus
             if not barred and (seen is None or not seen.faulted):
                 raise
-            self._inverter.tell(
-                Severity.WARNING, Report(Cause.OWN_TIMEOUT_LATER, why=error.report)
-            )
+            self._inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
 
     async def require_set(self) -> None:
-        """
-        Set it if that could not be done before: nothing runs without it.
-
-        :raises DriveError: it cannot be set.
-        """
+        """Set it if that could not be done before: nothing runs without it."""
         if self._due:
             await self.set_now(self._inverter.settings.drive_timeout)
             self._due = False
 
     async def set_now(self, seconds: float) -> Sequence[Change]:
-        """
-        Set and verify it; 0 leaves it as it is.
-
-        :returns: what was changed.
-        :raises DriveError: nothing is written to this drive, or it has none.
-        """
+        """Set and verify it; 0 leaves it as it is. Tells what was changed."""
         if not self._commanded:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
+            raise DriveError(Cause.MONITOR_ONLY)
         if not seconds:
             return ()
         if not self._inverter.can_time_out:
-            raise DriveError(Report(Cause.OWN_TIMEOUT_IMPOSSIBLE))
+            raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
         key = self._inverter.model.key
         wanted: dict[str, Value] = {key(Role.COMMUNICATION_TIMEOUT): seconds}
         if key(Role.STOP_AT_TIMEOUT):

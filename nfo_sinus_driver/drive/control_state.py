@@ -89,10 +89,5 @@ TRANSITIONS = _read(_TABLE)
 
 #: Something that the driver has begun may drive the motor.
 COMMANDED = frozenset(
-    (
-        ControlState.ENABLING,
-        ControlState.ENABLED,
-        ControlState.PROCEDURE,
-        ControlState.ABORTING,
-    )
+    (ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE, ControlState.ABORTING)
 )

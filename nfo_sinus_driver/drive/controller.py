@@ -27,16 +27,14 @@ from collections.abc import Iterator
 import contextlib
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.drive import confirmation
 from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.confirmation import Confirmation
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
@@ -49,20 +47,15 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.sequences import StartSequence
+from nfo_sinus_driver.drive.sequences import StopSequence
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.start_sequence import StartSequence
-from nfo_sinus_driver.drive.stop_sequence import StopSequence
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 
 class ExclusiveAccess:
-    """
-    The drive in the hands of a procedure, such as a tuning.
-
-    :param what: its name.
-    """
+    """The drive in the hands of a procedure, such as a tuning, whose name is ``what``."""
 
     def __init__(self, what: str) -> None:
         self.what = what
@@ -78,24 +71,24 @@ class ExclusiveAccess:
         self._aborted = True
 
     def require_wanted(self) -> None:
-        """
-        See to it that nobody has stopped the procedure meanwhile.
-
-        :raises DriveError: somebody has.
-        """
+        """Raise a :class:`DriveError` if somebody has stopped the procedure meanwhile."""
         if self._aborted:
-            raise DriveError(Report(Cause.PROCEDURE_NOT_BEGUN, what=self.what))
+            raise DriveError(Cause.PROCEDURE_NOT_BEGUN, what=self.what)
 
 
 class Controller:
-    """Enables, stops and judges one drive."""
+    """
+    Enables, stops and judges one drive.
 
-    def __init__(
-        self, bus: Bus, inverter: DriveState, method: Commands, setpoint: Setpoint
-    ) -> None:
-        self._bus = bus
+    What a person asks for says in a :class:`DriveError` why it was not done. A stop that the drive
+    does not confirm is such an error, too; it is retried until it does.
+    """
+
+    def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
+        self._bus = inverter.bus
         self._inverter = inverter
-        self._method = method
+        #: How the drive is commanded, for a procedure too.
+        self.method = method
         self._setpoint = setpoint
         self._state = ControlState.OFFLINE
         #: When something happened last: what was read before says nothing of it.
@@ -103,9 +96,8 @@ class Controller:
         #: What enables, and who has the drive, while there is one.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
-        self._confirmation = Confirmation(bus, inverter)
-        self._starting = StartSequence(bus, inverter, method)
-        self._sequence = StopSequence(bus, inverter, method, self._happened)
+        self._starting = StartSequence(inverter, method)
+        self._sequence = StopSequence(inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
         #: It was lost while it may have followed us.
@@ -139,11 +131,6 @@ class Controller:
         return self._sequence.overdue
 
     @property
-    def method(self) -> Commands:
-        """How the drive is commanded, for a procedure."""
-        return self._method
-
-    @property
     def commanded(self) -> bool:
         """Something that the driver has begun may drive the motor."""
         return self._state in COMMANDED
@@ -172,7 +159,7 @@ class Controller:
         if before is ControlState.ENABLED:
             self._setpoint.disarm()
         gone = before is ControlState.ENABLING and self._state is not ControlState.ENABLED
-        if gone and self._enabling not in (None, self._bus.current_or_none):
+        if gone and self._enabling not in (None, self._bus.current):
             self._bus.cancel(self._enabling)
         if self._access is not None and self._state is not ControlState.PROCEDURE:
             self._access.abort()
@@ -191,11 +178,7 @@ class Controller:
             self._happened(ControlEvent.LOST)
 
     def _stop(self, *, anew: bool = False) -> None:
-        """
-        End whatever drives the motor, and remove the run command until that is confirmed.
-
-        :param anew: what attempts show that have begun counts no more.
-        """
+        """End what drives the motor; ``anew``: what attempts show that have begun counts not."""
         self._happened(ControlEvent.STOP)
         if anew:
             self._sequence.request_anew()
@@ -211,12 +194,7 @@ class Controller:
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for a procedure: whoever stops it ends the procedure, and its preparations.
-
-        :param what: its name.
-        :raises DriveError: somebody has the drive.
-        """
+        """Have the drive for a procedure: whoever stops it ends that, and its preparations."""
         self.require_idle(what)
         self._access = access = ExclusiveAccess(what)
         self._happened(ControlEvent.BEGIN)
@@ -227,44 +205,39 @@ class Controller:
             self._happened(ControlEvent.END)
 
     def require_idle(self, what: str) -> None:
-        """
-        See to it that a procedure may begin.
-
-        :raises DriveError: it may not, and why.
-        """
+        """See to it that a procedure may begin."""
         if (self._state, ControlEvent.BEGIN) in control_state.TRANSITIONS:
             return
         if self._access is not None:
             other = self._access.what
-            raise DriveError(Report(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other))
+            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
         if self.commanded:
-            raise DriveError(Report(Cause.MOTOR_ENABLED, what=what))
+            raise DriveError(Cause.MOTOR_ENABLED, what=what)
         if self._state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.ENDING))
+            raise DriveError(Cause.ENDING)
         if self.blocked_by_fault and self._inverter.seen is not None:
             require_no_fault(self._inverter, self._inverter.seen)
-        raise DriveError(Report(Cause.STOP_NOT_CONFIRMED_YET, what=what))
+        raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
     async def _require_enable(self) -> None:
         """
         See to it that an enable may begin.
 
-        :raises DriveError: it may not, and why; a stop that nobody has confirmed is one that who
-            enables may not know of.
+        A stop that nobody has confirmed forbids it: who enables may not know of that.
         """
         if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
             return
         if self._enabling is not None:
-            raise DriveError(Report(Cause.ENABLING_ALREADY))
+            raise DriveError(Cause.ENABLING_ALREADY)
         if self._access is not None:
-            raise DriveError(Report(Cause.PROCEDURE_GOES_ON, what=self._access.what))
+            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._access.what)
         if self._state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
+            raise DriveError(Cause.NOT_ACTIVE)
         if self.blocked_by_fault:
             seen = await self._inverter.look(Priority.SERVICE)
             self._explain_refusal(seen)
             require_no_fault(self._inverter, seen)
-        raise DriveError(Report(Cause.STOP_PENDING))
+        raise DriveError(Cause.STOP_PENDING)
 
     # --- what a person asks for ---------------------------------------------------------------
 
@@ -273,8 +246,6 @@ class Controller:
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
         :param prepare: does what has to be done before a run command, once the bus has control.
-        :returns: what was done.
-        :raises DriveError: it was not done, and why; the run command is removed then.
         """
         if self.enabled:
             return Report(Cause.ENABLED_ALREADY)
@@ -285,7 +256,7 @@ class Controller:
             control_mode = await self._check()
             await self._start(control_mode, prepare)
         except Cancelled:
-            raise DriveError(Report(Cause.STOPPED_WHILE_ENABLING)) from None
+            raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
             self._enabling = None
         if self._inverter.settings.follows_setpoints:
@@ -294,11 +265,7 @@ class Controller:
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
     async def _check(self) -> str:
-        """
-        See to it that nothing keeps the motor from being started; return the control mode.
-
-        :raises DriveError: something does; nothing was written.
-        """
+        """See to it that nothing keeps the motor from being started; return the control mode."""
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
@@ -308,11 +275,7 @@ class Controller:
             raise DriveError(report_of(error)) from error
 
     async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
-        """
-        Start the motor, and follow set-points from then on.
-
-        :raises DriveError: it does not run, and why; the run command is removed then.
-        """
+        """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._happened(ControlEvent.RUNNING)
@@ -327,11 +290,9 @@ class Controller:
 
     async def stop(self, patience: float | None = None) -> Report:
         """
-        Stop as the drive's StMode says; control is kept.
+        Stop as the drive's StMode says; control is kept. Tells whether it ramps or coasts [C97].
 
         :param patience: how long the drive may take to confirm it, s.
-        :returns: whether it ramps or coasts [C97].
-        :raises DriveError: the drive does not confirm the stop; it is retried until it does.
         """
         self._stop()
         await self._sequence.wait_confirmed(patience or None)
@@ -352,19 +313,11 @@ class Controller:
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
-        """
-        Put the drive under bus control for a procedure, with no run command standing.
-
-        :raises DriveError: it lets nobody take control.
-        """
+        """Put the drive under bus control for a procedure, with no run command standing."""
         await self._starting.take_control(control_mode)
 
     async def withdraw_run_command(self) -> None:
-        """
-        Remove what a procedure has commanded; control is kept.
-
-        :raises DriveError: the drive does not confirm that it stops; it is retried until it does.
-        """
+        """Remove what a procedure has commanded; control is kept."""
         self._sequence.request()
         await self._sequence.wait_confirmed()
 
@@ -373,23 +326,17 @@ class Controller:
         Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
         Where the drive has no way to do that, stop as usual [C96].
-
-        :raises DriveError: the drive does not confirm it; the stop is retried until it does.
         """
-        if not self._method.coasts:
+        if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
         may_run = self.may_run
         with self._stopped_by_itself():
             try:
-                may_run = may_run or await self._method.in_control(Priority.STOP)
+                may_run = may_run or await self.method.in_control(Priority.STOP)
                 may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
                 if may_run:
-                    await self._method.quick_stop(self._inverter.control_mode)
-                    await self._confirmation.wait(
-                        lambda seen: not seen.driven,
-                        Priority.STOP,
-                        confirmation.TIMEOUT,
-                    )
+                    await self.method.quick_stop(self._inverter.control_mode)
+                    await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP)
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()
@@ -409,18 +356,13 @@ class Controller:
             return Report(Cause.QUICK_STOPPED)
 
     async def acknowledge(self) -> Report:
-        """
-        Acknowledge a fault; run command and set-point are removed before, where the drive lets us.
-
-        :returns: what was acknowledged.
-        :raises DriveError: the fault is still active.
-        """
+        """Acknowledge a fault, run command and set-point first, where the drive lets us."""
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         fault = seen.listed
         if not seen.faulted and fault.kind is Kind.STATUS:
             return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
-        may_run = self.may_run or await self._method.in_control(Priority.SERVICE)
+        may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
         with self._stopped_by_itself():
             return await self._acknowledge(seen, may_run=may_run)
 
@@ -430,19 +372,17 @@ class Controller:
         if seen.state is State.FAULT_REACTION_ACTIVE:
             # what comes before FAULTED acknowledges nothing [M0 table 16]
             with contextlib.suppress(DriveError):
-                await self._confirmation.wait(
-                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE,
-                    Priority.SERVICE,
-                    confirmation.TIMEOUT,
+                await self._inverter.wait_until(
+                    lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
                 )
         try:
-            details = await self._method.acknowledge(seen.code, inverter.control_mode)
+            details = await self.method.acknowledge(seen.code, inverter.control_mode)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
                 self._sequence.request_anew()
         try:
-            await self._confirmation.wait(
+            await self._inverter.wait_until(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
             )
             await self._settle()
@@ -475,21 +415,21 @@ class Controller:
 
     async def _release(self, timeout: float, *, may_run: bool) -> Report:
         stopped = await self.stop() if may_run else None
-        if not await self._method.in_control(Priority.SERVICE):
+        if not await self.method.in_control(Priority.SERVICE):
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
             raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
         try:
-            await self._confirmation.wait(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
             if not self._inverter.sio_tot:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
-        await self._method.release()
-        if self._method.keeps_control:
-            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self._method.keeps_control)
+        await self.method.release()
+        if self.method.keeps_control:
+            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     def close(self) -> None:
@@ -504,7 +444,7 @@ class Controller:
     async def secure_found(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
         inverter, seen = self._inverter, self._inverter.seen
-        if await self._method.in_control(Priority.SERVICE):
+        if await self.method.in_control(Priority.SERVICE):
             if seen is not None and seen.runs_by_bus and not self.stopping:
                 inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)
@@ -529,7 +469,7 @@ class Controller:
         if self._refusal is not None:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
-            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPING_BECAUSE, why=reason))
+            self._inverter.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
         self._happened(ControlEvent.LOST)
         if self._lost_in_use:
             self._stop()
@@ -575,10 +515,9 @@ class Controller:
     def _tell_stopped(self, reason: Report) -> None:
         seen = self._inverter.seen
         if seen is not None and seen.faulted:
-            stopped = Report(Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
-            self._inverter.tell(Severity.ERROR, stopped)
+            self._inverter.tell(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
         else:
-            self._inverter.tell(Severity.WARNING, Report(Cause.STOPPED_BECAUSE, why=reason))
+            self._inverter.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 
     # --- how --------------------------------------------------------------------------------
 

@@ -25,7 +25,6 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LinkError
@@ -53,13 +52,13 @@ async def detect_model(bus: Bus, unit: int) -> str:
                 return model.name
             models = [other for other in models if other is not model]
     except Cancelled:
-        raise DriveError(Report(Cause.ENDING)) from None
+        raise DriveError(Cause.ENDING) from None
     except LinkError as error:
         raise DriveError(explain(error, unit, check=bus.protocol.check)) from error
     if len(models) == 1:
         return models[0].name
     names = ' or '.join(model.name for model in models)
-    raise DriveError(Report(Cause.SEVERAL_MODELS, address=unit, models=names))
+    raise DriveError(Cause.SEVERAL_MODELS, address=unit, models=names)
 
 
 def _speaks(model: Family, protocol: str) -> bool:

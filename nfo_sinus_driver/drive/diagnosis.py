@@ -11,19 +11,23 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""What a failed transaction or a status means."""
+"""What a failed transaction or a status means, and what of a status is told when it begins."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+import math
+
 from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import InverterStatus
+from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -48,6 +52,13 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
+def explain_failure(error: LinkError | DriveError, inverter: DriveState) -> Report:
+    """Return what went wrong with a drive that has answered before."""
+    if isinstance(error, DriveError):
+        return error.report
+    return explain(error, inverter.settings.address)
+
+
 def report_of(error: Exception) -> Report:
     """Return what an error says, as far as that is known."""
     if isinstance(error, DriveError):
@@ -63,24 +74,13 @@ def explain_fault(inverter: DriveState, seen: InverterStatus) -> Report:
 
 
 def require_no_fault(inverter: DriveState, seen: InverterStatus) -> None:
-    """
-    See to it that no fault is active before the motor is energised.
-
-    :raises DriveError: one is.
-    """
+    """Raise a :class:`DriveError` if a fault is active, before the motor is energised."""
     if seen.faulted:
         raise DriveError(inverter.report(Cause.FAULT_FORBIDS, fault=seen.listed))
 
 
-def explain_stop(
-    inverter: DriveState, seen: InverterStatus, control_mode: str
-) -> Report | None:
-    """
-    Return why the motor no longer follows us, before it is enabled again.
-
-    :param control_mode: the one in which it was enabled.
-    :returns: ``None`` if it does follow.
-    """
+def explain_stop(inverter: DriveState, seen: InverterStatus, control_mode: str) -> Report | None:
+    """Return why the motor no longer follows us, who enabled it in a control mode, if so."""
     if inverter.control_mode != control_mode:
         mode, unit = inverter.control_mode, inverter.unit
         return Report(Cause.CONTROL_MODE_CHANGED, mode=mode, unit=unit)
@@ -107,3 +107,44 @@ def _why_control_is_lost(inverter: DriveState, seen: InverterStatus) -> Cause:
         # the current limit, for one, shows instead of who runs it
         return Cause.OTHERS_IN_CONTROL
     return Cause.POWER_CYCLED if inverter.was_silent else Cause.CONTROL_LOST
+
+
+#: What comes and goes is told again only when it was away for so long, s.
+_AGAIN_AFTER = 10.0
+
+
+class Conditions:
+    """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
+
+    def __init__(self, inverter: DriveState) -> None:
+        self._inverter = inverter
+        #: When each was last there.
+        self._seen_at: dict[tuple[Cause, int], float] = {}
+        #: An alarm stood when it was last looked at, with a code that is no alarm's.
+        self._unnamed = False
+
+    def take(self, seen: InverterStatus) -> None:
+        """Tell what has begun."""
+        for severity, report in self._reports(seen):
+            # each alarm by its code
+            name = (report.cause, seen.code if report.cause is Cause.ALARM else 0)
+            before = self._seen_at.get(name, -math.inf)
+            self._seen_at[name] = seen.at
+            if seen.at - before > _AGAIN_AFTER:
+                self._inverter.tell(severity, report)
+        self._unnamed = seen.kind is Kind.ALARM and not seen.listed.remedy
+
+    def _reports(self, seen: InverterStatus) -> Iterator[tuple[Severity, Report]]:
+        by_code = seen.means(Meaning.CURRENT_LIMIT)
+        limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
+        if limited and not seen.faulted:
+            (limit,) = seen.model.codes(Meaning.CURRENT_LIMIT)
+            yield Severity.WARNING, self._inverter.report(Cause.CURRENT_LIMITED, limit=limit)
+        if seen.kind is Kind.ALARM and not by_code:
+            if seen.listed.remedy:
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM, alarm=seen.listed)
+            elif self._unnamed and not limited:
+                # once only, it came or went between the two readings
+                yield Severity.WARNING, self._inverter.report(Cause.ALARM_UNNAMED)
+        if Fact.SLEEPING in seen.facts:
+            yield Severity.INFO, self._inverter.report(Cause.ASLEEP)

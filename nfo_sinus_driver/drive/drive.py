@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Coroutine
@@ -31,11 +30,10 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
@@ -45,24 +43,23 @@ from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.drive_state import Identity
 from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log_monitor import ErrorLogMonitor
+from nfo_sinus_driver.drive.error_log import ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.picture import take_snapshot
+from nfo_sinus_driver.drive.parameters import on_bus
 from nfo_sinus_driver.drive.poller import Poller
+from nfo_sinus_driver.drive.poller import take_snapshot
+from nfo_sinus_driver.drive.poller import watch_telemetry
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.drive.snapshot import Snapshot
-from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
 from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.link import LinkError
@@ -84,47 +81,40 @@ class Drive:
     exception is a :class:`DriveError`, which says what is wrong.
 
     :param listener: told about every poll and event, on the worker of the bus.
+    :ivar model: what the catalog knows of its family.
+    :ivar inverter: what is known of it; its methods, and those of the following, are for coroutines
+        on the bus.
+    :ivar registers: its parameters.
+    :ivar setpoint: what it is to follow.
+    :ivar log: its error log.
+    :ivar parameters: its settings.
     """
 
     def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
         self._bus = bus
         self._unit = settings.address
-        self._listener = listener
-        model = load_family(settings.model)
-        self._registers = ParameterAccess(bus, self._unit, model, settings.retries)
-        self._inverter = DriveState(model, self._registers, listener, settings)
-        self._setpoint = Setpoint(
-            bus,
-            self._unit,
-            self._registers,
-            self._inverter,
+        self.inverter = DriveState(bus, settings, listener)
+        self.model, self.registers = self.inverter.model, self.inverter.registers
+        self.setpoint = Setpoint(
+            self.inverter,
             lambda reason: self._controller.refused(reason) if self._controller else None,
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
         if settings.method != 'monitor':
-            commands = Commands(settings, self._registers, self._inverter.tell)
-            self._controller = Controller(bus, self._inverter, commands, self._setpoint)
+            self._controller = Controller(self.inverter, Commands(self.inverter), self.setpoint)
         self._watch = Poller(
-            bus,
-            self._inverter,
-            self._registers,
-            self._setpoint,
-            self._controller,
-            listener,
-            lambda: self._connect(patient=False),
+            self.inverter, self.setpoint, self._controller, lambda: self._connect(patient=False)
         )
-        self._procedures = procedures = Procedures(bus, self._inverter, self._controller)
-        #: The settings of the drive.
-        self.parameters = Parameters(
-            bus, self._inverter, self._registers, procedures, self.run, self._take_parameters
-        )
+        self._procedures = procedures = Procedures(self.inverter, self._controller)
+        self.parameters = Parameters(self.inverter, procedures, self.run, self._take_parameters)
         self._watchdog = CommunicationWatchdog(
-            self._inverter, self.parameters, commanded=self._controller is not None
+            self.inverter, self.parameters, commanded=self._controller is not None
         )
-        self._error_log = ErrorLog(self._inverter, self._registers, procedures)
-        self._error_log_monitor = ErrorLogMonitor(bus, self._inverter, self._error_log, listener)
-        self._tuning = Tuning(bus, self._inverter, self._registers, self.parameters, procedures)
+        self.log = ErrorLog(self.inverter, procedures)
+        self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
+        self._tuning = Tuning(self.inverter, self.parameters, procedures)
+        #: What goes on while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
 
@@ -133,34 +123,14 @@ class Drive:
     @property
     def settings(self) -> DriveSettings:
         """How the drive is treated; address, model and control method never change."""
-        return self._inverter.settings
+        return self.inverter.settings
 
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
         for name in ('address', 'model', 'control_method', 'reference'):
             if getattr(settings, name) != getattr(self.settings, name):
                 raise ValueError(f'{name} cannot change within a session: make another Drive')
-        self._inverter.settings = settings
-
-    @property
-    def model(self) -> Family:
-        """What the catalog knows of its family."""
-        return self._inverter.model
-
-    @property
-    def inverter(self) -> DriveState:
-        """What is known of it; its methods are for coroutines on the bus."""
-        return self._inverter
-
-    @property
-    def registers(self) -> ParameterAccess:
-        """Its parameters, for coroutines on the bus."""
-        return self._registers
-
-    @property
-    def log(self) -> ErrorLog:
-        """Its error log, for coroutines on the bus."""
-        return self._error_log
+        self.inverter.settings = settings
 
     @property
     def snapshot(self) -> Snapshot:
@@ -170,7 +140,7 @@ class Drive:
     @property
     def identity(self) -> Identity | None:
         """Who answered, or ``None`` if nobody did yet."""
-        return self._inverter.identity
+        return self.inverter.identity
 
     @property
     def heard(self) -> bool:
@@ -180,12 +150,7 @@ class Drive:
     @property
     def armed(self) -> bool:
         """The motor follows set-points."""
-        return self._setpoint.armed
-
-    @property
-    def setpoint(self) -> Setpoint:
-        """What it is to follow, for coroutines on the bus."""
-        return self._setpoint
+        return self.setpoint.armed
 
     @property
     def last_error(self) -> LogEntry | None:
@@ -195,7 +160,7 @@ class Drive:
     @property
     def powered_since(self) -> float:
         """From this operating hour on the drive is known to have had power; NaN: not known."""
-        return self._error_log.clock.since
+        return self.log.clock.since
 
     @property
     def stop_unconfirmed(self) -> bool:
@@ -217,130 +182,23 @@ class Drive:
         """The counters and times of what is said to this drive."""
         return self._bus.statistics(self._unit)
 
-    def connect(self, *, patient: bool = True, parameters: bool = False) -> Future[Identity]:
-        """
-        Identify the drive, make sure that nothing runs unasked, and watch it from then on.
+    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
+        """Run a coroutine on the bus; what goes wrong on the line is explained."""
 
-        :param parameters: read all its parameters before, and watch them too.
-        :param patient: repeat the first request when there is no response; who tries again anyway
-            saves the other drives on the line that time.
-        """
-        return self.run(lambda: self._connect_first(patient, parameters))
+        async def explained() -> _T:
+            try:
+                return await command()
+            except LinkError as error:
+                check = None if self.inverter.identity else self._bus.protocol.check
+                raise DriveError(explain(error, self._unit, check=check)) from error
+            except Cancelled:
+                raise DriveError(Cause.ENDING) from None
 
-    def require_standing(self) -> Future[None]:
-        """
-        Make sure that another control method may follow: no motor may run by this one any more.
-
-        It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
-        """
-        return self.run(lambda: self._require_standing())
-
-    def disconnect(self, timeout: float) -> Future[Report]:
-        """
-        Stop the motor, give control back and leave the drive alone.
-
-        :param timeout: how long the motor may take to stand before it is left to its ramp, s.
-        """
-        return self.run(lambda: self._disconnect(timeout))
+        return self._bus.run(explained())
 
     def activate(self) -> None:
         """Poll at full rate and measure."""
         self._bus.call(lambda: self._set_active(True))
-
-    def deactivate(self) -> Future[Report | None]:
-        """
-        Stop the motor and only keep watch; it cannot be enabled until it is active again.
-
-        The result is ``None`` where there is nothing to stop.
-        """
-        return self.run(lambda: self._deactivate())
-
-    def stop_for_good(self, patience: float) -> Future[Report | None]:
-        """
-        Stop the motor as :meth:`deactivate` does; it can never be enabled again.
-
-        :param patience: how long the drive may take to confirm it, s.
-        """
-        return self.run(lambda: self._stop_for_good(patience))
-
-    def enable(self) -> Future[Report]:
-        """Take control and run at set-point 0, then follow set-points that come in."""
-        return self.run(lambda: self._enable())
-
-    def stop(self) -> Future[Report]:
-        """Stop as the drive's StMode says; control is kept."""
-        return self.run(lambda: self._command(lambda controller: controller.stop()))
-
-    def quick_stop(self) -> Future[Report]:
-        """Release the motor at once: it coasts."""
-        return self.run(lambda: self._command(lambda controller: controller.quick_stop()))
-
-    def acknowledge(self) -> Future[Report]:
-        """Acknowledge a fault."""
-        return self.run(
-            lambda: self._command(lambda controller: controller.acknowledge(), connected=True)
-        )
-
-    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        """Run a coroutine on the bus; what goes wrong on the line is explained."""
-        return self._bus.run(self._explained(command))
-
-    def identify(self, *, thoroughly: bool = True) -> Future[Identity]:
-        """
-        Find out who answers, without connecting to it: a motor that runs runs on.
-
-        :param thoroughly: also ask for model and serial number.
-        """
-
-        async def ask() -> Identity:
-            identity = await self._inverter.identify()
-            return await self._inverter.introduce() if thoroughly else identity
-
-        return self.run(ask)
-
-    def read_status(self) -> Future[InverterStatus]:
-        """Read the status, connected or not, without acknowledging anything."""
-        return self.run(lambda: self._inverter.look(Priority.SERVICE))
-
-    def measure(self, key: str) -> Future[Value]:
-        """Read one parameter, connected or not."""
-        return self.run(lambda: self._registers.read(key, Priority.SERVICE))
-
-    def method_in_charge(self) -> Future[str]:
-        """Return the control method by which the bus runs it, or would be able to stop it."""
-        steps = self.model.profile.in_charge(self._inverter.seen)
-        return self.run(lambda: carry_out(steps, self._registers, Priority.SERVICE))
-
-    def error_log(self, most: int = 0) -> Future[tuple[LogEntry, ...]]:
-        """Read the error log, newest entry first; at most so many entries, 0: all."""
-        return self.run(lambda: self._read_error_log(most))
-
-    def erase_error_log(self) -> Future[Report]:
-        """Erase the error log; the motor must stand."""
-        return self.run(lambda: self._unless_closed(self._error_log.erase_now))
-
-    def reset_energy(self) -> Future[Report]:
-        """Reset the kWh counter; the motor must stand."""
-        return self.run(lambda: self._unless_closed(self._error_log.reset_energy_now))
-
-    def tune(
-        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
-    ) -> Future[Tuned]:
-        """
-        Have the drive measure or calculate its motor; minutes may pass until the result.
-
-        :param progress: told on the bus what the drive says, and how long it takes already, s:
-            whenever the inverter status changes, and twice a second.
-        """
-        return self.run(lambda: self._tune(procedure, progress))
-
-    def cancel_tuning(self) -> Future[Report | None]:
-        """Stop a tuning; does nothing else, and nothing if there is none."""
-        return self.run(self._procedures.abort)
-
-    def set_drive_timeout(self, seconds: float) -> Future[Sequence[Change]]:
-        """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return self.run(lambda: self._watchdog.set_now(seconds))
 
     def set_setpoint(self, value: float) -> None:
         """
@@ -350,71 +208,20 @@ class Drive:
         :raises DriveError: the drive follows a reference of its own, and no set-points.
         """
         if not self.settings.follows_setpoints:
-            reference = self.settings.reference
-            raise DriveError(Report(Cause.OWN_REFERENCE, reference=reference))
-        self._setpoint.request(value)
+            raise DriveError(Cause.OWN_REFERENCE, reference=self.settings.reference)
+        self.setpoint.request(value)
 
-    # --- on the bus ---------------------------------------------------------------------------
+    # --- any thread, carried out on the bus ---------------------------------------------------
 
-    async def _explained(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> _T:
-        try:
-            return await command()
-        except LinkError as error:
-            raise DriveError(self._explain(error)) from error
-        except Cancelled:
-            raise DriveError(Report(Cause.ENDING)) from None
+    @on_bus
+    async def connect(self, *, patient: bool = True, parameters: bool = False) -> Identity:
+        """
+        Identify the drive, make sure that nothing runs unasked, and watch it from then on.
 
-    def _explain(self, error: LinkError) -> Report:
-        known = self._inverter.identity is not None
-        return explain(error, self._unit, check=None if known else self._bus.protocol.check)
-
-    async def _command(
-        self, command: Callable[[Controller], Awaitable[Report]], *, connected: bool = False
-    ) -> Report:
-        if self._controller is None:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
-        if connected:
-            self._require_connected()
-        return await command(self._controller)
-
-    def _require_connected(self) -> None:
-        if not self._inverter.connected:
-            raise DriveError(Report(Cause.NOT_CONNECTED, address=self._unit))
-
-    async def _enable(self) -> Report:
-        # looked at on the bus, where a deactivation cannot come between
-        if not self._watch.active:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
-        answer = await self._command(
-            lambda controller: controller.enable(self._watchdog.require_set), connected=True
-        )
-        self._watch.wake()
-        return answer
-
-    async def _read_error_log(self, most: int) -> tuple[LogEntry, ...]:
-        self._require_connected()
-        return await self._error_log.read_now(most)
-
-    async def _unless_closed(self, procedure: Callable[[], Awaitable[Report]]) -> Report:
-        # it would take control that nobody gives back any more
-        if self._controller is not None and self._controller.state is ControlState.CLOSED:
-            raise DriveError(Report(Cause.ENDING))
-        return await procedure()
-
-    async def _tune(
-        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None
-    ) -> Tuned:
-        # as with enable, the motor may turn
-        if not self._watch.active:
-            raise DriveError(Report(Cause.NOT_ACTIVE))
-
-        def tell(seen: InverterStatus, elapsed: float) -> None:
-            if progress is not None:
-                progress(take_snapshot(self._inverter, self._setpoint, seen), elapsed)
-
-        return await self._tuning.tune_now(procedure, tell)
-
-    async def _connect_first(self, patient: bool, parameters: bool) -> Identity:
+        :param parameters: read all its parameters before, and watch them too.
+        :param patient: repeat the first request when there is no response; who tries again anyway
+            saves the other drives on the line that time.
+        """
         if not self._watch.begun:
             await self._connect(patient)
             if parameters:
@@ -422,25 +229,179 @@ class Drive:
                     await self.parameters.read_now()
                 except BaseException:
                     # nobody watches it yet
-                    self._inverter.connected = False
-                    if self._controller is not None:
-                        self._controller.disconnected()
+                    self._set_disconnected()
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
             self._error_log_monitor.begin()
-        assert self._inverter.identity is not None
-        return self._inverter.identity
+        assert self.inverter.identity is not None
+        return self.inverter.identity
+
+    @on_bus
+    async def require_standing(self) -> None:
+        """
+        Make sure that no motor runs by this control method any more, so that another may follow.
+
+        It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
+        """
+        if self._controller is None or self.inverter.identity is None:
+            return
+        seen = await self.inverter.look(Priority.SERVICE)
+        if seen.driven and seen.from_bus:
+            method = self.settings.method
+            raise DriveError(self.inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
+
+    @on_bus
+    async def disconnect(self, timeout: float) -> Report:
+        """Stop the motor, wait so long, s, until it stands, and give control back."""
+        # nobody may enable it while it is awaited that the motor stands
+        self._set_active(False)
+        try:
+            if self._controller is None:
+                return Report(Cause.ONLY_WATCHED)
+            return await self._controller.release(timeout)
+        finally:
+            self._bus.cancel(self._parameters_task)
+            self._set_disconnected()
+            self._error_log_monitor.end()
+            self._watch.end()
+
+    @on_bus
+    async def deactivate(self) -> Report | None:
+        """Stop the motor, if it may run, and only keep watch until it is active again."""
+        return await self._deactivate()
+
+    @on_bus
+    async def stop_for_good(self, patience: float) -> Report | None:
+        """Stop the motor within so many s; it can never be enabled again."""
+        if self._controller is not None:
+            self._controller.close()
+        if not self.heard:
+            # it may not be there at all, or be just about to answer for the first time
+            patience = min(patience, _FIRST_ANSWER)
+        return await self._deactivate(patience)
+
+    @on_bus
+    async def enable(self) -> Report:
+        """Take control and run at set-point 0, then follow set-points that come in."""
+        self._require_active()
+        controller = self._procedures.controller
+        self._require_connected()
+        answer = await controller.enable(self._watchdog.require_set)
+        self._watch.wake()
+        return answer
+
+    @on_bus
+    async def stop(self) -> Report:
+        """Stop as the drive's StMode says; control is kept."""
+        return await self._procedures.controller.stop()
+
+    @on_bus
+    async def quick_stop(self) -> Report:
+        """Release the motor at once: it coasts."""
+        return await self._procedures.controller.quick_stop()
+
+    @on_bus
+    async def acknowledge(self) -> Report:
+        """Acknowledge a fault."""
+        controller = self._procedures.controller
+        self._require_connected()
+        return await controller.acknowledge()
+
+    @on_bus
+    async def identify(self, *, thoroughly: bool = True) -> Identity:
+        """Find out who answers, thoroughly with model and serial number; what runs runs on."""
+        identity = await self.inverter.identify()
+        return await self.inverter.introduce() if thoroughly else identity
+
+    @on_bus
+    async def read_status(self) -> InverterStatus:
+        """Read the status, connected or not, without acknowledging anything."""
+        return await self.inverter.look(Priority.SERVICE)
+
+    @on_bus
+    async def measure(self, key: str) -> Value:
+        """Read one parameter, connected or not."""
+        return await self.registers.read(key, Priority.SERVICE)
+
+    @on_bus
+    async def method_in_charge(self) -> str:
+        """Return the control method by which the bus runs it, or would be able to stop it."""
+        steps = self.model.profile.in_charge(self.inverter.seen)
+        return await carry_out(steps, self.registers, Priority.SERVICE)
+
+    @on_bus
+    async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:
+        """Read the error log, newest entry first; at most so many entries, 0: all."""
+        self._require_connected()
+        return await self.log.read_now(most)
+
+    @on_bus
+    async def erase_error_log(self) -> Report:
+        """Erase the error log; the motor must stand."""
+        self._require_open()
+        return await self.log.erase_now()
+
+    @on_bus
+    async def reset_energy(self) -> Report:
+        """Reset the kWh counter; the motor must stand."""
+        self._require_open()
+        return await self.log.reset_energy_now()
+
+    @on_bus
+    async def tune(
+        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
+    ) -> Tuned:
+        """
+        Have the drive measure or calculate its motor; minutes may pass until the result.
+
+        :param progress: told on the bus what the drive says, and how long it takes already, s:
+            whenever the inverter status changes, and twice a second.
+        """
+        # as with enable, the motor may turn
+        self._require_active()
+
+        def tell(seen: InverterStatus, elapsed: float) -> None:
+            if progress is not None:
+                progress(take_snapshot(self.inverter, self.setpoint, seen), elapsed)
+
+        return await self._tuning.tune_now(procedure, tell)
+
+    @on_bus
+    async def cancel_tuning(self) -> Report | None:
+        """Stop a tuning; does nothing else, and nothing if there is none."""
+        return await self._procedures.abort()
+
+    @on_bus
+    async def set_drive_timeout(self, seconds: float) -> Sequence[Change]:
+        """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
+        return await self._watchdog.set_now(seconds)
+
+    # --- on the bus ---------------------------------------------------------------------------
+
+    def _require_connected(self) -> None:
+        if not self.inverter.connected:
+            raise DriveError(Cause.NOT_CONNECTED, address=self._unit)
+
+    def _require_active(self) -> None:
+        # looked at on the bus, where a deactivation cannot come between
+        if not self._watch.active:
+            raise DriveError(Cause.NOT_ACTIVE)
+
+    def _require_open(self) -> None:
+        # a procedure would take control that nobody gives back any more
+        if self._controller is not None and self._controller.state is ControlState.CLOSED:
+            raise DriveError(Cause.ENDING)
 
     async def _connect(self, patient: bool) -> None:
-        inverter = self._inverter
+        inverter = self.inverter
         try:
             await inverter.identify(patient=patient)
         except Refused as error:
             if error.code == Refused.BUSY:
                 raise
             raise DriveError(
-                Report(Cause.OTHER_MODEL, error=str(error), model=inverter.model.name)
+                Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
             ) from error
         await inverter.read_control_mode()
         await inverter.read_timeout()
@@ -450,56 +411,29 @@ class Drive:
             await self._watchdog.prepare()
         identity = await inverter.introduce()
         self._watch.connected()
-        self._setpoint.connected()
+        self.setpoint.connected()
         inverter.connected = inverter.answering = True
         if self._controller is not None:
             self._controller.connected()
         name = '' if identity.model else inverter.model.name
         if identity.model and not inverter.model.profile.names_itself:
             title = inverter.model.profile.title
-            unexpected = Report(Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title)
-            inverter.tell(Severity.WARNING, unexpected)
+            inverter.tell(
+                Severity.WARNING, Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title
+            )
         told = ', '.join(part for part in (name, str(identity)) if part)
-        inverter.tell(Severity.INFO, Report(Cause.CONNECTED, drive=told))
+        inverter.tell(Severity.INFO, Cause.CONNECTED, drive=told)
         self._watchdog.warn_if_unfit()
 
-    async def _disconnect(self, timeout: float) -> Report:
-        # nobody may enable it while it is awaited that the motor stands
-        self._set_active(False)
-        try:
-            if self._controller is None:
-                return Report(Cause.ONLY_WATCHED)
-            return await self._controller.release(timeout)
-        finally:
-            if self._parameters_task is not None:
-                task, self._parameters_task = self._parameters_task, None
-                self._bus.cancel(task)
-            self._inverter.connected = False
-            if self._controller is not None:
-                self._controller.disconnected()
-            self._error_log_monitor.end()
-            self._watch.end()
-
-    async def _require_standing(self) -> None:
-        if self._controller is None or self._inverter.identity is None:
-            return
-        seen = await self._inverter.look(Priority.SERVICE)
-        if seen.driven and seen.from_bus:
-            method = self.settings.method
-            raise DriveError(self._inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
-
-    async def _stop_for_good(self, patience: float) -> Report | None:
+    def _set_disconnected(self) -> None:
+        self.inverter.connected = False
         if self._controller is not None:
-            self._controller.close()
-        return await self._deactivate(patience)
+            self._controller.disconnected()
 
     async def _deactivate(self, patience: float | None = None) -> Report | None:
         self._set_active(False)
         if self._controller is None or not self._controller.may_run:
             return None
-        if patience is not None and not self.heard:
-            # it may not be there at all, or be just about to answer for the first time
-            patience = min(patience, _FIRST_ANSWER)
         return await self._controller.stop(patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
@@ -507,23 +441,19 @@ class Drive:
         values, key = self.parameters.values, self.model.key
         timeout, stop = key(Role.COMMUNICATION_TIMEOUT), key(Role.STOP_AT_TIMEOUT)
         if timeout in keys:
-            self._inverter.sio_tot = float(values[timeout])
+            self.inverter.sio_tot = float(values[timeout])
         if stop in keys:
-            self._inverter.auto_stop = bool(values.get(stop))
+            self.inverter.auto_stop = bool(values.get(stop))
         if timeout in keys:
             # the drive may have to be kept alive more often from now on
             self._watch.wake()
         if any(key(role) in keys for role in _MODE_ROLES):
             self._watch.read_mode_soon()
-        self._listener.on_parameters(keys)
+        self.inverter.listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:
         self._watch.active = active
-        if self._telemetry_task is not None:
-            self._bus.cancel(self._telemetry_task)
-            self._telemetry_task = None
+        self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(
-                watch_telemetry(self._bus, self._inverter, self._listener)
-            )
+            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
             self._watch.wake()

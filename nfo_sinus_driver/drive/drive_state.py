@@ -25,24 +25,26 @@ import logging
 import math
 import time
 
+from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog.inverter_status import NEVER
+from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import NEVER
-from nfo_sinus_driver.drive.snapshot import NO_CODE
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.link import Refused
@@ -50,6 +52,10 @@ from nfo_sinus_driver.link import Reply
 
 _log = logging.getLogger(__name__)
 
+#: How long a drive may take to do what it was told, its start delay not counted, s.
+TIMEOUT = 2.0
+#: How often the status is read while something is awaited, s.
+LOOK_PERIOD = 0.02
 #: No start delay of a drive is longer, s.
 _LONGEST_START_DELAY = 3600.0
 #: A fault that is seen so long after the status before it came just now, s.
@@ -97,13 +103,15 @@ class Identity:
 class DriveState:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
-    def __init__(
-        self, model: Family, registers: ParameterAccess, listener: Listener, settings: DriveSettings
-    ) -> None:
-        self.model = model
+    def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
+        self.bus = bus
         self.settings = settings
-        self._registers = registers
-        self._listener = listener
+        #: What the catalog knows of its family.
+        self.model = load_family(settings.model)
+        #: Its parameters.
+        self.registers = ParameterAccess(bus, settings.address, self.model, settings.retries)
+        #: Who is told about every poll and event.
+        self.listener = listener
         self.connected = False
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
         self.answering = False
@@ -157,7 +165,7 @@ class DriveState:
             return await self._look_at_code(priority, once)
         before = self.seen
         if told is None:
-            word, at = await self._read_word(priority, once)
+            word, at = await self._read_int(self.word_key, priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
         code_of = self.model.profile.status_word.code
@@ -176,7 +184,7 @@ class DriveState:
         seen = InverterStatus(at, word, NO_CODE, self.model)
         alarmed = before is not None and word != before.word and alarming(seen)
         priority = Priority.STOP if alarmed else priority
-        code, code_at = await self._read_code(priority, once)
+        code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
         seen = replace(seen, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
@@ -191,9 +199,27 @@ class DriveState:
         if news and alarming(replace(seen, word=None)):
             differs, priority = True, Priority.STOP
         if differs:
-            word, at = await self._read_word(priority, once)
+            word, at = await self._read_int(self.word_key, priority, once)
             seen = replace(seen, word=word, at=at)
         return await self._with_frequency(seen, priority, once)
+
+    async def wait_until(
+        self,
+        wanted: Callable[[InverterStatus], bool],
+        priority: Priority = Priority.SERVICE,
+        timeout: float | None = None,
+    ) -> None:
+        """
+        Read the status until it is as wanted.
+
+        :param timeout: how long it may take, s; by default :data:`TIMEOUT`.
+        :raises DriveError: it takes longer.
+        """
+        deadline = time.monotonic() + (TIMEOUT if timeout is None else timeout)
+        while not wanted(await self.look(priority)):
+            if time.monotonic() > deadline:
+                raise DriveError(self.report(Cause.NOT_CONFIRMED))
+            await self.bus.sleep(LOOK_PERIOD)
 
     async def _with_frequency(
         self, seen: InverterStatus, priority: Priority, once: bool
@@ -213,9 +239,9 @@ class DriveState:
             fell = before.fell
         return self._saw(replace(seen, frequency=frequency, fell=fell))
 
-    async def _read_word(self, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self._registers.read_reply(self.word_key, priority, once=once)
-        return self.status_word(reply.data), reply.arrived
+    async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
+        reply = await self.registers.read_reply(key, priority, once=once)
+        return int(self.registers.number(key, reply.data)), reply.arrived
 
     @property
     def word_key(self) -> str:
@@ -224,17 +250,11 @@ class DriveState:
 
     def status_word(self, data: bytes) -> int:
         """Return the status word that bytes mean."""
-        return int(self._registers.number(self.word_key, data))
-
-    async def _read_code(self, priority: Priority, once: bool) -> tuple[int, float]:
-        key = self.model.key(Role.STATUS_CODE)
-        code, at = await self._registers.read_at(key, priority, once=once)
-        assert isinstance(code, int)
-        return code, at
+        return int(self.registers.number(self.word_key, data))
 
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
-        code, at = await self._read_code(priority, once)
+        code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
         seen = InverterStatus(at, None, code, self.model, code_at=at)
         return self._saw(await self._with_control(seen, priority, once))
 
@@ -259,10 +279,10 @@ class DriveState:
         same = before is not None and before.code == seen.code
         if same and seen.by_mode and seen.at - seen.by_mode_at < _BY_MODE_FOR:
             return seen
-        key = self.model.key(Role.CONTROL_SOURCE)
-        source, at = await self._registers.read_at(key, priority, once=once)
-        holder = self.model.profile.holders.get(source, Holder.UNKNOWN)
-        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=at)
+        source = self.model.key(Role.CONTROL_SOURCE)
+        reply = await self.registers.read_reply(source, priority, once=once)
+        holder = self.model.profile.holders.get(self.registers.value(source, reply.data))
+        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=reply.arrived)
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -273,7 +293,6 @@ class DriveState:
         return seen
 
     def _note_fault(self, before: InverterStatus | None) -> None:
-        """Take note of a fault that comes or goes."""
         seen = self.seen
         assert seen is not None
         if not seen.faulted:
@@ -290,9 +309,7 @@ class DriveState:
 
     async def measure(self, role: Role, priority: Priority) -> float:
         """
-        Read a measured value once; NaN if its family has none such.
-
-        NaN, too, if the drive says what cannot be, and that again.
+        Read a measured value once; NaN if there is none such, or if it cannot be, and that again.
 
         :raises LinkError: it does not answer, or refuses.
         """
@@ -305,17 +322,16 @@ class DriveState:
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self._registers.read_data(key, priority, once=once)
-        value = self._registers.number(key, data)
-        if not self._registers.is_odd(key):
+        data = await self.registers.read_data(key, priority, once=once)
+        value = self.registers.number(key, data)
+        if not self.registers.is_odd(key):
             turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
             return seen.signed(value) if turns and seen is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit
             shown = f'{value:g} {unit}'.rstrip()
-            impossible = Report(Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
-            self.tell(Severity.WARNING, impossible)
+            self.tell(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
 
     def last_polled(self, role: Role | None) -> Measured:
@@ -344,48 +360,49 @@ class DriveState:
         if not self.can_time_out:
             return
         timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
-        self.sio_tot = await self._registers.read_number(timeout, Priority.SERVICE)
+        self.sio_tot = await self.registers.read_number(timeout, Priority.SERVICE)
         stop = self.model.key(Role.STOP_AT_TIMEOUT)
         if not stop:
             # where nothing can keep it from that, it stops the motor
             self.auto_stop = True
             return
-        data = await self._registers.read_data(stop, Priority.SERVICE)
+        data = await self.registers.read_data(stop, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = data == self._registers.encode(stop, True)
+        self.auto_stop = data == self.registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """
         Find out whether somebody answers, and with which firmware.
 
         :param patient: ask again if nobody does; a silent drive costs its neighbours time-outs.
-        :raises LinkError: nobody does.
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self._registers.read(self.model.key_of_status, priority, once=not patient)
+        await self.registers.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
         self._older = dialect is not None and self.settings.classic_dialect == dialect.name
         firmware_key = self.model.key(Role.FIRMWARE)
-        if self._older or not self._registers.reaches(firmware_key):
+        if self._older or not self.registers.reaches(firmware_key):
             self.identity = Identity()
             return self.identity
         if dialect is not None and not await self._may_ask_firmware(dialect):
             if before is None:
                 # what the older firmware knows the newer one knows, too
                 self.identity, self._older = Identity(), True
-                not_asked = Report(
-                    Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
+                self.tell(
+                    Severity.WARNING,
+                    Cause.FIRMWARE_NOT_ASKED,
+                    before=dialect.before,
+                    dialect=dialect.name,
                 )
-                self.tell(Severity.WARNING, not_asked)
             else:
                 self._older = was_older
             return self.identity or Identity()
         try:
-            firmware = await self._registers.read_number(firmware_key, Priority.SERVICE)
+            firmware = await self.registers.read_number(firmware_key, Priority.SERVICE)
             motor_key = self.model.key(Role.MOTOR_FIRMWARE)
-            motor = await self._registers.read_number(motor_key, Priority.SERVICE)
+            motor = await self.registers.read_number(motor_key, Priority.SERVICE)
         except Refused:
             if dialect is None or self.settings.classic_dialect:
                 raise
@@ -398,9 +415,8 @@ class DriveState:
 
     @property
     def _dialect(self) -> OlderDialect | None:
-        """The older dialect that a drive of this model may have on this line."""
         dialect = self.model.profile.older
-        here = dialect is not None and dialect.protocol == self._registers.protocol
+        here = dialect is not None and dialect.protocol == self.registers.protocol
         return dialect if here else None
 
     async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
@@ -413,7 +429,7 @@ class DriveState:
         if self.settings.classic_dialect or (method is not None and not method.older):
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
-        source = await self._registers.read(key, Priority.SERVICE)
+        source = await self.registers.read(key, Priority.SERVICE)
         return self.model.profile.holders.get(source) in dialect.harmless
 
     @property
@@ -422,15 +438,9 @@ class DriveState:
         return self._older
 
     async def introduce(self) -> Identity:
-        """
-        Ask the drive who it is, beyond what :meth:`identify` has found.
-
-        Nothing depends on it: many drives do not tell [C57].
-
-        :raises PortError: the port is not open.
-        """
+        """Ask for more of who it is; nothing depends on that, for many do not tell [C57]."""
         assert self.identity is not None
-        told = await self._registers.identify(Priority.SERVICE)
+        told = await self.registers.identify(Priority.SERVICE)
         self.identity = replace(
             self.identity,
             vendor=told.vendor,
@@ -448,13 +458,14 @@ class DriveState:
         Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
-        if self._registers.reaches(key):
-            mode = await self.read_label(key, priority, once=once)
+        if self.registers.reaches(key):
+            mode = str(await self.registers.read(key, priority, once=once))
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
-            unit = await self.read_label(self.model.key(Role.PROCESS_UNIT), priority, once=once)
+            key = self.model.key(Role.PROCESS_UNIT)
+            unit = str(await self.registers.read(key, priority, once=once))
         # both at once: nobody is told of the one without the other
         self.control_mode, self.unit = mode, unit
         return mode
@@ -462,8 +473,8 @@ class DriveState:
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
         key = self.model.key(Role.STOP_MODE)
-        if self._registers.reaches(key):
-            return await self.read_label(key, Priority.STOP) == self.model.profile.releases
+        if self.registers.reaches(key):
+            return await self.registers.read(key, Priority.STOP) == self.model.profile.releases
         seen = self.seen
         told = seen is not None and Fact.STOP_MODE_BRAKE in seen.valid
         return told and seen is not None and Fact.STOP_MODE_BRAKE not in seen.facts
@@ -471,19 +482,9 @@ class DriveState:
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""
         key = self.model.key(Role.START_DELAY)
-        if self._registers.reaches(key):
-            return await self.read_number(key)
+        if self.registers.reaches(key):
+            return await self.registers.read_number(key, Priority.SERVICE)
         return _LONGEST_START_DELAY
-
-    async def read_label(
-        self, key: str, priority: Priority = Priority.SERVICE, *, once: bool = False
-    ) -> str:
-        """Read a parameter that is an enumeration."""
-        return str(await self._registers.read(key, priority, once=once))
-
-    async def read_number(self, key: str) -> float:
-        """Read a parameter that is a number."""
-        return await self._registers.read_number(key, Priority.SERVICE)
 
     @property
     def kind(self) -> Kind:
@@ -512,16 +513,17 @@ class DriveState:
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
-        if not self._registers.reaches(key) or (self._older and not self.model[key].older):
+        if not self.registers.reaches(key) or (self._older and not self.model[key].older):
             return False
         since = self.model[key].since
         firmware = self.identity.firmware if self.identity else math.nan
         return since is None or not firmware < float(since) - 0.001
 
-    def tell(self, severity: Severity, report: Report) -> None:
+    def tell(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
         """Tell the listener; what cannot be told keeps nothing from being done."""
+        report = what if isinstance(what, Report) else Report(what, **values)
         code = None if self.seen is None else self.seen.code
         try:
-            self._listener.on_event(Event(severity, report, code))
+            self.listener.on_event(Event(severity, report, code))
         except Exception:
             _log.exception('not told: %s', report)

@@ -11,60 +11,103 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-
-"""The error log of a drive and its kWh counter: read, erased, reset."""
+"""The error log of a drive and its kWh counter: read, watched, erased, reset."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import logging
 import math
 import time
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import ErrorLogArea
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Reset
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.log_entry import LogEntry
-from nfo_sinus_driver.drive.operating_clock import TICK
-from nfo_sinus_driver.drive.operating_clock import OperatingClock
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.procedure import Procedures
+from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
-#: The operating time of an entry [M2 §9].
-_TICKS = 0xFFFFFF
+_log = logging.getLogger(__name__)
+
+_HOUR = 3600.0
+#: By how much the clocks of drive and computer may drift apart, s for each s.
+_DRIFT = 1e-4
 #: Of how many entries it is remembered when they came.
 _REMEMBERED = 128
 #: How often the log is read anew when an entry came in meanwhile.
-_TRIES = 3
+_READINGS = 3
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
+#: How often it is looked whether a fault that nobody saw has left an entry, s.
+_PERIOD = 30.0
+#: How often it is looked whether the drive is there again, s.
+_WAIT = 1.0
+#: How often the entry of a fault that was seen is looked for, s, and how many times.
+_RETRY_PERIOD = 0.2
+_TRIES = 10
+#: An entry that was told so shortly before a poll saw its fault is that fault's, s.
+_SOON = 2.0
 
 
-def code_of(entry: int) -> int:
-    """Return the inverter status code of an entry as it stands in the drive."""
-    return entry >> 24
+class OperatingClock:
+    """
+    Maps operating time to the steady clock, as far back as the drive is known to have had power.
 
+    Every reading says within one tick when the drive's hours would have begun if it had had power
+    all the time. While it has power all readings agree, and together they are finer than a tick;
+    one that does not fit shows that it was off, and nothing from before can be mapped any more.
+    Operating times are in hours, moments in seconds of ``time.monotonic``.
+    """
 
-def hours_of(entry: int) -> float:
-    """Return the operating time of an entry as it stands in the drive, h."""
-    return (entry & _TICKS) * TICK
+    def __init__(self) -> None:
+        #: The moment of operating hour 0 is between these.
+        self._earliest, self._latest = -math.inf, math.inf
+        self._noted_at = math.nan
+        #: From this operating time on the drive is known to have had power.
+        self.since = math.nan
+
+    def note(self, hours: float, at: float) -> None:
+        """Take a reading of the operating time, and when that was."""
+        drift = 0.0 if math.isnan(self._noted_at) else _DRIFT * max(0.0, at - self._noted_at)
+        self._noted_at = at
+        latest = at - hours * _HOUR
+        earliest = latest - TICK * _HOUR
+        low = max(self._earliest - drift, earliest)
+        high = min(self._latest + drift, latest)
+        if math.isnan(self.since) or low > high:
+            low, high, self.since = earliest, latest, hours
+        self._earliest, self._latest = low, high
+
+    def moment(self, hours: float) -> float:
+        """Return when the operating time was so, to a tick or so; NaN if that is not known."""
+        # what is in the tick of the first reading may be from before the drive was switched on
+        if math.isnan(self.since) or hours < self.since + TICK / 2:
+            return math.nan
+        middle = (self._earliest + self._latest) / 2 + (hours + TICK / 2) * _HOUR
+        return min(middle, self._noted_at)
 
 
 class ErrorLog:
-    """The error log and the kWh counter of one drive; used on the bus alone."""
+    """
+    The error log and the kWh counter of one drive; used on the bus alone.
 
-    def __init__(
-        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
-    ) -> None:
+    :raises DriveError: a method cannot do it, or the model's log is not documented.
+    """
+
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._procedures = procedures
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
@@ -75,49 +118,55 @@ class ErrorLog:
         """A manual says where it stands."""
         return self._registers.protocol in self._inverter.model.error_logs
 
-    async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
-        """
-        Read the error log, newest entry first ([M0 §8.4], [M2 §9]).
+    @property
+    def timed(self) -> bool:
+        """It is documented, and tells when an error happened."""
+        return self.documented and self.area.timed
 
-        :param most: how many entries at most; 0 is all that every drive has, 32 [C4].
-        :raises DriveError: the model's is not documented, or it cannot be read.
-        """
-        area = self._area()
-        limit = min(most or area.entries, area.limit)
-        entries = await self._read(area, limit, 0, Priority.POLL)
+    async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
+        """Read it, newest first; at most so many entries, 0: all that every drive has, 32 [C4]."""
+        area = self.area
+        entries = await self._read(min(most or area.entries, area.limit), 0, Priority.POLL)
+        if not area.timed:
+            return tuple([await self._with_readings(*found) for found in enumerate(entries)])
         return self.understood(entries, await self.read_time(Priority.POLL))
+
+    async def _with_readings(self, number: int, entry: int) -> LogEntry:
+        """Return what an entry without a time says, and what the drive has kept of it."""
+        told: list[str] = []
+        for what, key in self.area.readings_of(number):
+            try:
+                value = await self._registers.read_number(key, Priority.POLL)
+            except (Refused, ValueError):
+                # what cannot be told, such as a temperature below 0, is left out
+                continue
+            told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
+        code = self.area.code(entry)
+        return LogEntry(code, self._inverter.text_of(code), readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
         Read the entries that are newer than one, as they stand in the drive, newest first.
 
         :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
-        :raises DriveError: the model's log is not documented, or it cannot be read.
         """
-        area = self._area()
-        if known is None:
-            return await self._read(area, 1, 0, priority)
-        return await self._read(area, area.entries, known, priority)
+        limit = 1 if known is None else self.area.entries
+        return await self._read(limit, known or 0, priority)
 
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, and have the clock follow it."""
-        once = priority > Priority.POLL
         key = self._inverter.model.key(Role.OPERATING_TIME)
-        hours, at = await self._registers.read_at(key, priority, once=once)
-        assert not isinstance(hours, str)
-        self.clock.note(float(hours), at)
-        return float(hours)
+        reply = await self._registers.read_reply(key, priority, once=priority > Priority.POLL)
+        hours = self._registers.number(key, reply.data)
+        self.clock.note(hours, reply.arrived)
+        return hours
 
     def note_sighting(self, entry: int, at: float) -> None:
         """Remember when an entry came, s of ``time.monotonic``."""
         self._sightings = [(entry, at), *self._sightings[: _REMEMBERED - 1]]
 
     def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
-        """
-        Return what entries say, newest first.
-
-        :param now: the operating time, h.
-        """
+        """Return what entries say, newest first, when the operating time is ``now``, h."""
         sightings = list(self._sightings)
         found: list[LogEntry] = []
         for entry in entries:
@@ -128,36 +177,26 @@ class ErrorLog:
         return tuple(found)
 
     async def erase_now(self) -> Report:
-        """
-        Erase the error log by SCMD [M0 table 18], and see that it is empty.
-
-        :raises DriveError: it was not erased, and why.
-        """
+        """Erase the error log by SCMD [M0 table 18], and see that it is empty."""
         with self._procedures.begun(Reset.ERROR_LOG) as access:
-            area = self._area()
+            area = self.area
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
-                if code_of(await self._entry(area, 0)):
-                    raise DriveError(Report(Cause.LOG_NOT_ERASED))
+                if area.code(await self._entry(area, 0, Priority.POLL)):
+                    raise DriveError(Cause.LOG_NOT_ERASED)
         return Report(Cause.LOG_ERASED)
 
     async def reset_energy_now(self) -> Report:
-        """
-        Reset the kWh counter E-Out by SCMD, from firmware 4.38 on [M0 table 18], and see it at 0.
-
-        :raises DriveError: it was not reset, and why.
-        """
+        """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and see it at 0."""
         energy = self._inverter.model.key(Role.ENERGY)
         self._procedures.require(Reset.ENERGY)
         if not self._inverter.has(energy):
             since, told = self._inverter.model[energy].since, self._inverter.identity
             raise DriveError(
-                Report(
-                    Cause.ENERGY_RESET_UNKNOWN,
-                    what=Reset.ENERGY.value,
-                    since=float(since or 0),
-                    firmware=told.versions if told else '',
-                )
+                Cause.ENERGY_RESET_UNKNOWN,
+                what=Reset.ENERGY.value,
+                since=float(since or 0),
+                firmware=told.versions if told else '',
             )
         with self._procedures.begun(Reset.ENERGY) as access:
             async with self._procedures.in_standby(access):
@@ -165,24 +204,25 @@ class ErrorLog:
                 await self._procedures.command(access, Reset.ENERGY)
                 after = await self._registers.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
-                    raise DriveError(Report(Cause.ENERGY_NOT_RESET, key=energy, energy=after))
+                    raise DriveError(Cause.ENERGY_NOT_RESET, key=energy, energy=after)
         return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
 
-    def _area(self) -> ErrorLogArea:
+    @property
+    def area(self) -> ErrorLogArea:
+        """Where it stands."""
         if not self.documented:
-            raise DriveError(Report(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name))
+            raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name)
         return self._inverter.model.error_logs[self._registers.protocol]
 
-    async def _read(
-        self, area: ErrorLogArea, limit: int, known: int, priority: Priority
-    ) -> list[int]:
+    async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
-        for _ in range(_TRIES):
+        area = self.area
+        for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
             if not entries or await self._entry(area, 0, priority) == entries[0]:
                 return entries
-        raise DriveError(Report(Cause.LOG_CHANGES))
+        raise DriveError(Cause.LOG_CHANGES)
 
     async def _read_down(
         self, area: ErrorLogArea, limit: int, known: int, priority: Priority
@@ -196,15 +236,12 @@ class ErrorLog:
                 if len(found) < area.entries:
                     raise
                 break
-            if not code_of(entry) or entry == known:
+            if not area.code(entry) or entry == known:
                 break
             found.append(entry)
         return found
 
-    async def _entry(
-        self, area: ErrorLogArea, number: int, priority: Priority = Priority.POLL
-    ) -> int:
-        """Read one entry as 32 bits; who waits for it goes by turns with the polls."""
+    async def _entry(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
         # nobody waits for what is read in the background, so it is not asked for again at once
         data = await self._registers.read_from(
             Address(*area.place(number)), priority, once=priority > Priority.POLL
@@ -212,13 +249,137 @@ class ErrorLog:
         return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
-        code, then = code_of(entry), hours_of(entry)
+        code, then = self.area.code(entry), self.area.hours(entry)
         # one tick of doubt, for the drive rounds
         age = at = latest = math.nan
         if now > then - TICK:
             age = max(0.0, now - then)
             at = self.clock.moment(then)
-            latest = time.monotonic() - max(0.0, age - TICK) * 3600
+            latest = time.monotonic() - max(0.0, age - TICK) * _HOUR
         if not math.isnan(sighted_at):
             at = sighted_at
         return LogEntry(code, self._inverter.text_of(code), round(then, 1), age, at, latest)
+
+
+class ErrorLogMonitor:
+    """
+    Watches the error log of one drive in the background; used on the bus alone.
+
+    It is read when a fault comes, and now and then: a fault that was acknowledged between two
+    polls, or while the drive was not reached, has left an entry too. Nothing is acknowledged by it.
+    """
+
+    def __init__(self, inverter: DriveState, log: ErrorLog) -> None:
+        self._bus = inverter.bus
+        self._inverter = inverter
+        self._error_log = log
+        self._task: Task | None = None
+        #: The newest entry, as it was read; ``None`` if there is none.
+        self.newest: LogEntry | None = None
+        #: The same as it stands in the drive, 0 if there is none; ``None`` before the first look.
+        self._known: int | None = None
+        self._looked_at = self._told_at = -math.inf
+        #: The fault whose entry is looked for, and how often yet.
+        self._fault: InverterStatus | None = None
+        self._tries = 0
+
+    def begin(self) -> None:
+        """
+        Watch from now on, where it is documented how to read the log.
+
+        Where entries have no time, nothing tells a new one from the same fault before.
+        """
+        if not self._error_log.timed:
+            return
+        self._known = None
+        self._looked_at = self._told_at = -math.inf
+        self._inverter.on_fault = self._expect
+        self._expect()
+        self._task = self._bus.spawn(self._watch_for_ever())
+
+    def end(self) -> None:
+        """Leave the log alone."""
+        self._inverter.on_fault = lambda: None
+        self._bus.cancel(self._task)
+
+    def _expect(self) -> None:
+        self._fault, self._tries = self._inverter.fault, _TRIES
+        self._bus.wake(self._task)
+
+    async def _watch_for_ever(self) -> None:
+        inverter = self._inverter
+        while True:
+            there = inverter.connected and inverter.answering
+            if there:
+                try:
+                    await self._look()
+                except Refused as error:
+                    if error.code != Refused.BUSY:
+                        # asked for what it does not have, a Classic drive may stop the motor
+                        inverter.tell(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
+                        return
+                except DriveError as error:
+                    _log.debug('%s', error)
+                except LinkError:
+                    # the poll says so if the drive is lost
+                    inverter.missed()
+            await self._bus.sleep(self._pause() if there else _WAIT)
+
+    def _pause(self) -> float:
+        if self._fault is not None and self._tries:
+            self._tries -= 1
+            return _RETRY_PERIOD
+        self._fault = None
+        return _PERIOD
+
+    async def _look(self) -> None:
+        log, known, began = self._error_log, self._known, time.monotonic()
+        news = await log.newer_than(known, Priority.TELEMETRY)
+        now = await log.read_time(Priority.TELEMETRY)
+        newest = self._known = news[0] if news else known or 0
+        fault = self._fault
+        if known is None:
+            self.newest = next(iter(log.understood(news, now)), None)
+            # what is older than this driver is no news, but for the fault that stands
+            code = fault and fault.code
+            news = [entry for entry in news if log.area.code(entry) == code]
+        elif not news and fault is not None and self._repeats(fault, newest, now):
+            news = [newest]
+        for entry in reversed(news):
+            at = self._moment(entry, began)
+            if not math.isnan(at):
+                log.note_sighting(entry, at)
+        self._looked_at = began
+        if news:
+            self._told_at = time.monotonic()
+            self._tell(log.understood(news, now))
+
+    def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
+        """Tell whether a fault has left the same entry as the one before, within one tick."""
+        area = self._error_log.area
+        same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
+        return same and self._told_at < fault.at - _SOON
+
+    def _moment(self, entry: int, began: float) -> float:
+        """Return when a new entry came, as far as that was seen; else NaN."""
+        fault = self._fault
+        code = self._error_log.area.code(entry)
+        if fault and fault.code == code and self._inverter.fault_is_fresh:
+            return fault.at
+        return began if began - self._looked_at < 2 * _PERIOD else math.nan
+
+    def _tell(self, entries: Sequence[LogEntry]) -> None:
+        self.newest = entries[0]
+        codes = {entry.code for entry in entries}
+        code = None
+        if self._fault is not None and self._fault.code in codes:
+            code, self._fault = self._fault.code, None
+        for entry in reversed(entries):
+            if entry.code == code:
+                self._inverter.tell(Severity.INFO, Cause.LOG_ENTRY, entry=entry)
+            else:
+                self._inverter.tell(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
+            try:
+                self._inverter.listener.on_log_entry(entry)
+            except Exception:
+                _log.exception('an entry of the error log could not be told')

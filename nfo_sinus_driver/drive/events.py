@@ -29,219 +29,56 @@ class Severity(enum.Enum):
     ERROR = 'error'
 
 
-class Cause(enum.Enum):
-    """What happened, what was done, or what went wrong; the wording has a sentence for each."""
-
-    # --- the line and who answers
-    CONNECTED = enum.auto()
-    DRIVER_ERROR = enum.auto()
-    #: What the link says needs nothing added.
-    LINE_FAILED = enum.auto()
-    #: The same of a drive that has answered before.
-    NOT_REACHED = enum.auto()
-    NO_RESPONSE = enum.auto()
-    NO_VALID_ANSWER = enum.auto()
-    #: The command takes longer than whoever gave it waits.
-    TOO_LATE = enum.auto()
-    LOST = enum.auto()
-    LOST_IN_USE = enum.auto()
-    #: It answers, but not as one of its model.
-    NOT_THE_MODEL = enum.auto()
-    #: It lacks a parameter that every drive of its model has.
-    OTHER_MODEL = enum.auto()
-    #: It says who it is, and no drive of its model does.
-    UNEXPECTED_IDENTITY = enum.auto()
-    SEVERAL_MODELS = enum.auto()
-    FIRMWARE_NOT_ASKED = enum.auto()
-
-    # --- why a command is not carried out
-    MONITOR_ONLY = enum.auto()
-    NOT_CONNECTED = enum.auto()
-    NOT_ACTIVE = enum.auto()
-    ENDING = enum.auto()
-    #: What the profile of the family says of it.
-    NOT_POSSIBLE = enum.auto()
-    ENABLING_ALREADY = enum.auto()
-    STOP_PENDING = enum.auto()
-    PROCEDURE_GOES_ON = enum.auto()
-    FAULT_FORBIDS = enum.auto()
-    OTHER_METHOD_RUNS = enum.auto()
-    WRONG_CONTROL_MODE = enum.auto()
-    NO_RUN_INPUT = enum.auto()
-    START_FAULTED = enum.auto()
-    NOT_STARTED = enum.auto()
-    STOPPED_WHILE_ENABLING = enum.auto()
-    #: The status does not become what it should.
-    NOT_CONFIRMED = enum.auto()
-
-    # --- enable, stop, acknowledge, release
-    ENABLED = enum.auto()
-    ENABLED_BY_OWN_REFERENCE = enum.auto()
-    ENABLED_ALREADY = enum.auto()
-    STOPPED = enum.auto()
-    STOPPED_BY_FAULT = enum.auto()
-    #: The same, and the drive takes no command until the fault is over.
-    STOP_BLOCKED = enum.auto()
-    STOPPING = enum.auto()
-    COASTING = enum.auto()
-    RAMPING = enum.auto()
-    QUICK_STOPPED = enum.auto()
-    NO_QUICK_STOP = enum.auto()
-    QUICK_STOP_UNCONFIRMED = enum.auto()
-    NO_CONTROL = enum.auto()
-    #: Others run the motor.
-    RUN_BY_OTHERS = enum.auto()
-    STOP_UNCONFIRMED = enum.auto()
-    STOP_UNCONFIRMED_AT_END = enum.auto()
-    CANNOT_STOP = enum.auto()
-    STOP_CONFIRMED_LATE = enum.auto()
-    NOTHING_TO_ACKNOWLEDGE = enum.auto()
-    ACKNOWLEDGED = enum.auto()
-    #: The drive has said more of the fault.
-    ACKNOWLEDGED_DETAILED = enum.auto()
-    STILL_FAULTED = enum.auto()
-    NEXT_FAULT = enum.auto()
-    NOT_IN_CONTROL = enum.auto()
-    CONTROL_RELEASED = enum.auto()
-    #: Instead of another stop, when control is released.
-    COASTED_FOR_TIMEOUT = enum.auto()
-    #: The motor stands, and the bus keeps control for a reason of the family's.
-    CONTROL_KEPT = enum.auto()
-    LEFT_TO_RAMP = enum.auto()
-    RELEASE_BLOCKED = enum.auto()
-    ONLY_WATCHED = enum.auto()
-
-    # --- what a stop that is not confirmed waits for
-    NO_ANSWER_YET = enum.auto()
-    TUNING_ENERGISES = enum.auto()
-    TUNING_REFUSES = enum.auto()
-    DRIVE_SAYS = enum.auto()
-
-    # --- the motor is stopped without a command, and why
-    STOPPED_BECAUSE = enum.auto()
-    STOPPED_BECAUSE_OF_FAULT = enum.auto()
-    #: Said before the drive is lost, so that no status can tell a better reason.
-    STOPPING_BECAUSE = enum.auto()
-    FAULT = enum.auto()
-    FAULT_APPEARED = enum.auto()
-    CONTROL_MODE_CHANGED = enum.auto()
-    DRIVE_STARTING = enum.auto()
-    RUN_INPUT_LOST = enum.auto()
-    STOPPED_BY_ITSELF = enum.auto()
-    TERMINALS_IN_CONTROL = enum.auto()
-    KEYPAD_IN_CONTROL = enum.auto()
-    OTHERS_IN_CONTROL = enum.auto()
-    POWER_CYCLED = enum.auto()
-    CONTROL_LOST = enum.auto()
-    CONTROL_LOST_WHILE_AWAY = enum.auto()
-    RUNS_UNASKED = enum.auto()
-    FOUND_RUNNING = enum.auto()
-    STARTED_AFTER_FAULT = enum.auto()
-
-    # --- set-points
-    SETPOINT_REFUSED = enum.auto()
-    OWN_REFERENCE = enum.auto()
-    SETPOINT_LIMITED = enum.auto()
-    SETPOINT_TIMED_OUT = enum.auto()
-    SETPOINTS_AGAIN = enum.auto()
-    BROADCAST_MISSED = enum.auto()
-    NO_BROADCAST = enum.auto()
-    MEMBER_MONITORED = enum.auto()
-    MEMBER_BY_OWN_REFERENCE = enum.auto()
-    MEMBER_NOT_ENABLED = enum.auto()
-    MEMBER_TAKES_SEVERAL_WRITES = enum.auto()
-    MEMBERS_DIFFER = enum.auto()
-    MEMBERS_WRITTEN_DIFFERENTLY = enum.auto()
-    SHARED_SETPOINT_LIMITED = enum.auto()
-
-    # --- what the drive says of itself
-    CURRENT_LIMITED = enum.auto()
-    ALARM = enum.auto()
-    ALARM_UNNAMED = enum.auto()
-    ASLEEP = enum.auto()
-    IMPOSSIBLE_VALUE = enum.auto()
-
-    # --- the time-out of the drive itself
-    NO_OWN_TIMEOUT = enum.auto()
-    OWN_TIMEOUT_OFF = enum.auto()
-    OWN_TIMEOUT_STOPS_NOTHING = enum.auto()
-    OWN_TIMEOUT_SHORT = enum.auto()
-    OWN_TIMEOUT_LATER = enum.auto()
-    OWN_TIMEOUT_IMPOSSIBLE = enum.auto()
-
-    # --- procedures
-    UNKNOWN_PROCEDURE = enum.auto()
-    OTHER_METHOD_NEEDED = enum.auto()
-    OTHER_PROCEDURE_GOES_ON = enum.auto()
-    MOTOR_ENABLED = enum.auto()
-    STOP_NOT_CONFIRMED_YET = enum.auto()
-    MOTOR_RUNS = enum.auto()
-    CONTROL_INHIBITED = enum.auto()
-    CONTROLLED_LOCALLY = enum.auto()
-    NO_STANDBY = enum.auto()
-    PROCEDURE_STOPPED = enum.auto()
-    PROCEDURE_NOT_BEGUN = enum.auto()
-    #: By a signal, before it was begun.
-    INTERRUPTED = enum.auto()
-    TUNING_BEGINS = enum.auto()
-    TUNING_NEEDS = enum.auto()
-    TUNED = enum.auto()
-    TUNING_FAILED = enum.auto()
-    TUNING_STOPPED = enum.auto()
-    TUNING_CUT_SHORT = enum.auto()
-    TUNING_DOES_NOT_BEGIN = enum.auto()
-    TUNING_ENDLESS = enum.auto()
-    TUNING_CHANGED = enum.auto()
-    LOG_ERASED = enum.auto()
-    LOG_NOT_ERASED = enum.auto()
-    ENERGY_RESET = enum.auto()
-    ENERGY_NOT_RESET = enum.auto()
-    ENERGY_RESET_UNKNOWN = enum.auto()
-
-    # --- the error log
-    LOG_ENTRY = enum.auto()
-    LOG_ENTRY_UNSEEN = enum.auto()
-    LOG_UNDOCUMENTED = enum.auto()
-    LOG_NOT_WATCHED = enum.auto()
-    LOG_CHANGES = enum.auto()
-
-    # --- the settings of the drive
-    SETTINGS_READ = enum.auto()
-    SETTINGS_BEING_READ = enum.auto()
-    SETTINGS_REFRESHED = enum.auto()
-    SETTING_UNREADABLE = enum.auto()
-    #: What the drive has means nothing, or it cannot have what was asked for.
-    BAD_VALUE = enum.auto()
-    CHANGED = enum.auto()
-    CHANGED_FOR_TIMEOUT = enum.auto()
-    #: By taking control, to a memory that wears out.
-    STORED = enum.auto()
-    CHANGED_AS_WANTED = enum.auto()
-    CHANGED_AT_DRIVE = enum.auto()
-    NOT_AS_WANTED = enum.auto()
-    WANTED_BUT_MISSING = enum.auto()
-    WANTED_BUT_REFUSED = enum.auto()
-    NO_SETTING = enum.auto()
-    #: One setting was not changed, for what reason.
-    NOT_CHANGED = enum.auto()
-    CHANGE_WHILE_TUNING = enum.auto()
-    COMMUNICATION_PROTECTED = enum.auto()
-    CODES_UNCERTAIN = enum.auto()
-    FOLLOW_THE_LINE = enum.auto()
-    STANDSTILL_NEEDED = enum.auto()
-    VALUE_NOT_ACCEPTED = enum.auto()
-    REFUSED_WHILE_RUNNING = enum.auto()
-    REFUSED_WHILE_FAULTED = enum.auto()
-    DRIVE_KEEPS = enum.auto()
-    DRIVE_KEEPS_OTHER = enum.auto()
-    AS_BEFORE = enum.auto()
-    PERHAPS_CHANGED = enum.auto()
-    PUT_BACK = enum.auto()
-    NOT_PUT_BACK = enum.auto()
-    NOT_TRIED_ANY_MORE = enum.auto()
-    ENDED_HALF_WAY = enum.auto()
-    #: Several reports, one after the other.
-    SEVERAL = enum.auto()
+#: What happened, what was done, or what went wrong; the wording has a sentence for each.
+Cause = enum.Enum(
+    'Cause',
+    # the line and who answers
+    'CONNECTED DRIVER_ERROR LINE_FAILED NOT_REACHED NO_RESPONSE NO_VALID_ANSWER TOO_LATE LOST '
+    'LOST_IN_USE NOT_THE_MODEL OTHER_MODEL UNEXPECTED_IDENTITY SEVERAL_MODELS FIRMWARE_NOT_ASKED '
+    # why a command is not carried out
+    'MONITOR_ONLY NOT_CONNECTED NOT_ACTIVE ENDING NOT_POSSIBLE ENABLING_ALREADY STOP_PENDING '
+    'PROCEDURE_GOES_ON FAULT_FORBIDS OTHER_METHOD_RUNS WRONG_CONTROL_MODE NO_RUN_INPUT '
+    'START_FAULTED NOT_STARTED STOPPED_WHILE_ENABLING NOT_CONFIRMED '
+    # enable, stop, acknowledge, release
+    'ENABLED ENABLED_BY_OWN_REFERENCE ENABLED_ALREADY STOPPED STOPPED_BY_FAULT STOP_BLOCKED '
+    'STOPPING COASTING RAMPING QUICK_STOPPED NO_QUICK_STOP QUICK_STOP_UNCONFIRMED NO_CONTROL '
+    'RUN_BY_OTHERS STOP_UNCONFIRMED STOP_UNCONFIRMED_AT_END CANNOT_STOP STOP_CONFIRMED_LATE '
+    'NOTHING_TO_ACKNOWLEDGE ACKNOWLEDGED ACKNOWLEDGED_DETAILED STILL_FAULTED NEXT_FAULT '
+    'NOT_IN_CONTROL CONTROL_RELEASED COASTED_FOR_TIMEOUT CONTROL_KEPT LEFT_TO_RAMP RELEASE_BLOCKED '
+    'ONLY_WATCHED '
+    # what a stop that is not confirmed waits for
+    'NO_ANSWER_YET TUNING_ENERGISES TUNING_REFUSES DRIVE_SAYS '
+    # the motor is stopped without a command, and why
+    'STOPPED_BECAUSE STOPPED_BECAUSE_OF_FAULT STOPPING_BECAUSE FAULT FAULT_APPEARED '
+    'CONTROL_MODE_CHANGED DRIVE_STARTING RUN_INPUT_LOST STOPPED_BY_ITSELF TERMINALS_IN_CONTROL '
+    'KEYPAD_IN_CONTROL OTHERS_IN_CONTROL POWER_CYCLED CONTROL_LOST CONTROL_LOST_WHILE_AWAY '
+    'RUNS_UNASKED FOUND_RUNNING STARTED_AFTER_FAULT '
+    # set-points
+    'SETPOINT_REFUSED OWN_REFERENCE SETPOINT_LIMITED SETPOINT_TIMED_OUT SETPOINTS_AGAIN '
+    'BROADCAST_MISSED NO_BROADCAST MEMBER_MONITORED MEMBER_BY_OWN_REFERENCE MEMBER_NOT_ENABLED '
+    'MEMBER_TAKES_SEVERAL_WRITES MEMBERS_DIFFER MEMBERS_WRITTEN_DIFFERENTLY '
+    'SHARED_SETPOINT_LIMITED '
+    # what the drive says of itself
+    'CURRENT_LIMITED ALARM ALARM_UNNAMED ASLEEP IMPOSSIBLE_VALUE '
+    # the time-out of the drive itself
+    'NO_OWN_TIMEOUT OWN_TIMEOUT_OFF OWN_TIMEOUT_STOPS_NOTHING OWN_TIMEOUT_SHORT OWN_TIMEOUT_LATER '
+    'OWN_TIMEOUT_IMPOSSIBLE '
+    # procedures
+    'UNKNOWN_PROCEDURE OTHER_METHOD_NEEDED OTHER_PROCEDURE_GOES_ON MOTOR_ENABLED '
+    'STOP_NOT_CONFIRMED_YET MOTOR_RUNS CONTROL_INHIBITED CONTROLLED_LOCALLY NO_STANDBY '
+    'PROCEDURE_STOPPED PROCEDURE_NOT_BEGUN INTERRUPTED TUNING_BEGINS TUNING_NEEDS TUNED '
+    'TUNING_FAILED TUNING_STOPPED TUNING_CUT_SHORT TUNING_DOES_NOT_BEGIN TUNING_ENDLESS '
+    'TUNING_CHANGED LOG_ERASED LOG_NOT_ERASED ENERGY_RESET ENERGY_NOT_RESET ENERGY_RESET_UNKNOWN '
+    # the error log
+    'LOG_ENTRY LOG_ENTRY_UNSEEN LOG_UNDOCUMENTED LOG_NOT_WATCHED LOG_CHANGES '
+    # the settings of the drive
+    'SETTINGS_READ SETTINGS_BEING_READ SETTINGS_REFRESHED SETTING_UNREADABLE OPTIONS_MISSING '
+    'BAD_VALUE CHANGED CHANGED_FOR_TIMEOUT STORED CHANGED_AS_WANTED CHANGED_AT_DRIVE NOT_AS_WANTED '
+    'WANTED_BUT_MISSING WANTED_BUT_REFUSED NO_SETTING NOT_CHANGED CHANGE_WHILE_TUNING '
+    'COMMUNICATION_PROTECTED CODES_UNCERTAIN FOLLOW_THE_LINE STANDSTILL_NEEDED VALUE_NOT_ACCEPTED '
+    'REFUSED_WHILE_RUNNING REFUSED_WHILE_FAULTED DRIVE_KEEPS DRIVE_KEEPS_OTHER AS_BEFORE '
+    'PERHAPS_CHANGED PUT_BACK NOT_PUT_BACK NOT_TRIED_ANY_MORE ENDED_HALF_WAY SEVERAL',
+)
 
 
 @dataclass(frozen=True, init=False)
@@ -266,11 +103,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Event:
-    """
-    A report on a drive that nobody has asked for.
-
-    :ivar code: the inverter status that the drive showed at last; ``None`` before it has any.
-    """
+    """A report nobody asked for, and the inverter status shown at last, if there was one."""
 
     severity: Severity
     report: Report
@@ -283,11 +116,11 @@ class Event:
 
 
 class DriveError(Exception):
-    """A command was not carried out."""
+    """A command was not carried out; made of a report, or of its cause and values."""
 
-    def __init__(self, report: Report) -> None:
-        super().__init__(report)
-        self.report = report
+    def __init__(self, why: Report | Cause, /, **values: object) -> None:
+        self.report = why if isinstance(why, Report) else Report(why, **values)
+        super().__init__(self.report)
 
     @property
     def cause(self) -> Cause:

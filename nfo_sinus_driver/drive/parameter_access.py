@@ -26,7 +26,6 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
@@ -48,7 +47,9 @@ class ParameterAccess:
     """
     The parameters of one drive, for coroutines on the bus.
 
-    :param retries: how often a request that nobody answered is sent again.
+    :param retries: how often a request that nobody answered is sent again, where ``once`` is false.
+    :raises LinkError: reading or writing fails, as the link does.
+    :raises ValueError: a value that the drive cannot have, or bytes that mean none.
     """
 
     def __init__(self, bus: Bus, unit: int, model: Family, retries: int) -> None:
@@ -78,11 +79,7 @@ class ParameterAccess:
         return self._bus.protocol.writes_and_reads and self.model.profile.writes_and_reads
 
     def encode(self, key: str, value: Value) -> bytes:
-        """
-        Return the bytes to write for a value.
-
-        :raises ValueError: out of range, between two steps, or an unknown label.
-        """
+        """Return the bytes to write for a value."""
         parameter = self.model[key]
         if parameter.never_negative and not isinstance(value, str) and value < 0:
             raise ValueError(f'{key}: {value:g} is out of range, at least 0 {parameter.unit}')
@@ -92,22 +89,14 @@ class ParameterAccess:
         return parameter.encode(value, self.protocol)
 
     def target(self, step: Write) -> tuple[Address, bytes]:
-        """
-        Return where a step of a profile is written, and what; a float as the drive's nearest step.
-
-        :raises ValueError: out of range, not finite, or an unknown label.
-        """
+        """Return where a step of a profile is written, and what: a float as the nearest step."""
         address = self.address(step.at if self.reaches(step.at) else step.key)
         if isinstance(step.value, float):
             return address, self.model[step.key].quantise(step.value, self.protocol)
         return address, self.encode(step.key, step.value)
 
     def value(self, key: str, data: bytes) -> Value:
-        """
-        Return what the drive means by bytes.
-
-        :raises ValueError: a code that the manual does not list, where the type has no room for it.
-        """
+        """Return what the drive means by bytes."""
         return self.model[key].decode(data, self.protocol)
 
     def reaches(self, key: str) -> bool:
@@ -136,20 +125,8 @@ class ParameterAccess:
         return float(value)
 
     async def read(self, key: str, priority: Priority, *, once: bool = False) -> Value:
-        """
-        Read a parameter.
-
-        :param once: do not repeat the request when there is no response.
-        :raises LinkError: as the link does.
-        """
-        return (await self.read_at(key, priority, once=once))[0]
-
-    async def read_at(
-        self, key: str, priority: Priority, *, once: bool = False
-    ) -> tuple[Value, float]:
-        """Read a parameter; also tell when the answer arrived (``time.monotonic``)."""
-        reply = await self.read_reply(key, priority, once=once)
-        return self.value(key, reply.data), reply.arrived
+        """Read a parameter."""
+        return self.value(key, await self.read_data(key, priority, once=once))
 
     async def read_data(self, key: str, priority: Priority, *, once: bool = False) -> bytes:
         """Read a parameter as it stands in the drive."""
@@ -157,16 +134,10 @@ class ParameterAccess:
 
     async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
         """Read a parameter that is a number."""
-        value = await self.read(key, priority, once=once)
-        assert not isinstance(value, str), key
-        return float(value)
+        return self.number(key, await self.read_data(key, priority, once=once))
 
     async def identify(self, priority: Priority) -> Identification:
-        """
-        Ask the drive who it is; what it does not tell stays empty.
-
-        :raises PortError: the port is not open.
-        """
+        """Ask the drive who it is; what it does not tell stays empty."""
         return await self._bus.identify(self._unit, priority)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
@@ -183,24 +154,13 @@ class ParameterAccess:
         """
         assert self.model[key].access is Access.ACKNOWLEDGE, key
         await self._bus.read_then_write(
-            self._unit,
-            self.address(key),
-            *self.target(step),
-            Priority.STOP,
+            self._unit, self.address(key), *self.target(step), Priority.STOP
         )
 
     async def write(
-        self,
-        step: Write,
-        priority: Priority,
-        require_wanted: Callable[[], None] = lambda: None,
+        self, step: Write, priority: Priority, require_wanted: Callable[[], None] = lambda: None
     ) -> None:
-        """
-        Write a parameter as a profile says.
-
-        :param require_wanted: called when its turn has come; if it raises, nothing is written.
-        :raises LinkError: as the link does.
-        """
+        """Write as a profile says, unless ``require_wanted`` raises when its turn has come."""
         address, data = self.target(step)
         priority = Priority.STOP if step.head else priority
         await self._ask(address, priority, data, step.once, require_wanted)
@@ -211,9 +171,7 @@ class ParameterAccess:
         """Write a parameter as it shall stand in the drive, whatever its range."""
         await self._ask(self.address(key), priority, data, once)
 
-    async def read_from(
-        self, address: Address, priority: Priority, *, once: bool = False
-    ) -> bytes:
+    async def read_from(self, address: Address, priority: Priority, *, once: bool = False) -> bytes:
         """Read what stands at an address."""
         return (await self._ask(address, priority, None, once)).data
 
@@ -224,7 +182,7 @@ class ParameterAccess:
     def can_be(self, key: str, data: bytes) -> bool:
         """Tell whether bytes mean a value that the manual knows of this parameter."""
         try:
-            return can_be(self.model, key, self.value(key, data))
+            return self.model.can_be(key, self.value(key, data))
         except ValueError:
             return False
 

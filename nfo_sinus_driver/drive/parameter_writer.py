@@ -11,11 +11,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""Writes parameters, all of them or none, and believes only what it reads back."""
+"""Writes parameters that may be written, all or none, and believes only what it reads back."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Mapping
@@ -25,18 +26,18 @@ from dataclasses import dataclass
 
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.write_access import Allow
-from nfo_sinus_driver.drive.write_access import WriteAccess
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -70,11 +71,7 @@ class _BadValue(ParameterError):
 
 @dataclass(frozen=True)
 class Change:
-    """
-    A parameter that was written.
-
-    :ivar old: the value before, or the bytes as text where they had no meaning.
-    """
+    """A parameter that was written; bytes that mean nothing stand for a value as text."""
 
     key: str
     old: Value
@@ -112,24 +109,18 @@ def not_changed(key: str, why: Report) -> ParameterError:
 
 
 class ParameterWriter:
-    """Changes parameters of one drive, for coroutines on the bus."""
+    """Changes parameters of one drive, on the bus; if not, a ParameterError says why."""
 
-    def __init__(
-        self, inverter: DriveState, registers: ParameterAccess, procedures: Procedures
-    ) -> None:
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._access = WriteAccess(inverter, procedures)
 
     async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
         """
-        Write what differs from what the drive has; all of it or nothing.
+        Write what differs, all of it or nothing: after an error what was written is put back.
 
         Values that bound each other, such as I-magn and I-limt [C34], may come in any order.
-
-        :returns: what was changed.
-        :raises ParameterError: something was not taken; what had been written is put back, and
-            the message names what could not be.
         """
         done: list[Written] = []
         async with self._access.granted() as allow:
@@ -143,20 +134,14 @@ class ParameterWriter:
             except Cancelled:
                 if done:
                     changes = tuple(self.describe(entry) for entry in done)
-                    ended = Report(Cause.ENDED_HALF_WAY, changes=changes)
-                    self._inverter.tell(Severity.WARNING, ended)
+                    self._inverter.tell(Severity.WARNING, Cause.ENDED_HALF_WAY, changes=changes)
                 raise
         return tuple(self.describe(entry) for entry in done)
 
     async def write_each(
         self, wanted: Mapping[str, bytes], wrote: Callable[[Written], None]
     ) -> None:
-        """
-        Write what differs, one after the other; what was written before a refusal stays.
-
-        :param wrote: told of each that was written; what it raises ends the writing.
-        :raises ParameterError: something was not taken.
-        """
+        """Write what differs, telling of each; what was written before a refusal stays."""
         async with self._access.granted() as allow:
             await self._write_all(wanted, wrote, allow)
 
@@ -177,18 +162,14 @@ class ParameterWriter:
             waiting = list(refused)
 
     async def require_standstill(self, keys: Iterable[str]) -> None:
-        """
-        Refuse what only a standing motor allows; a drive that is lax about it is not trusted.
-
-        :raises ParameterError: the motor runs, or there is no response.
-        """
+        """Refuse what only a standing motor allows; a drive lax about it is not trusted."""
         stopped = ', '.join(key for key in keys if self._registers.model[key].stopped)
         if not stopped:
             return
         try:
             seen = await self._inverter.look(_SERVICE)
         except LinkError as error:
-            raise not_changed(stopped, self.explain(error)) from error
+            raise not_changed(stopped, explain_failure(error, self._inverter)) from error
         if seen.driven:
             raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
 
@@ -204,20 +185,17 @@ class ParameterWriter:
         return key in model.communication, not model[key].stopped
 
     async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
-        """Write one parameter if it differs; return what was written."""
         try:
             # between any two parameters, everybody who polls has a turn
             before = await self._registers.read_data(key, Priority.POLL)
         except LinkError as error:
-            raise not_changed(key, self.explain(error)) from error
+            raise not_changed(key, explain_failure(error, self._inverter)) from error
         if before == data:
             return ()
         try:
             await allow()
-        except LinkError as error:
-            raise not_changed(key, self.explain(error)) from error
-        except DriveError as error:
-            raise not_changed(key, error.report) from error
+        except (LinkError, DriveError) as error:
+            raise not_changed(key, explain_failure(error, self._inverter)) from error
         failure = await self._send(key, data)
         kept: bytes | None = None
         try:
@@ -250,13 +228,7 @@ class ParameterWriter:
         return None
 
     async def _restore(self, key: str, before: bytes, allow: Allow) -> Report | None:
-        """
-        See to it that a parameter is as it was; return why it is not.
-
-        Tried again when the drive refuses, for it had the value once.
-
-        :raises LinkError: there is no response.
-        """
+        """See to it that a parameter is as it was, for it was once; return why it is not."""
         trouble: Report | None = None
         for _ in range(_TRIES):
             try:
@@ -272,7 +244,7 @@ class ParameterWriter:
             if kept == before:
                 return None
             keeps = Report(Cause.DRIVE_KEEPS, value=self._show(key, kept))
-            trouble = self.explain(error) if error else keeps
+            trouble = explain_failure(error, self._inverter) if error else keeps
         return trouble
 
     async def _put_back(
@@ -288,7 +260,7 @@ class ParameterWriter:
                     trouble = await self._restore(entry.key, entry.before, allow)
                 except LinkError as error:
                     # two time-outs are enough for the others on the line
-                    trouble = self.explain(error)
+                    trouble = explain_failure(error, self._inverter)
                     silence = Report(Cause.NOT_TRIED_ANY_MORE)
             if trouble is not None:
                 stuck[entry.key] = Report(
@@ -312,18 +284,13 @@ class ParameterWriter:
         unit = self._registers.model[key].unit
         return f'{show(self.value(key, data))} {unit}'.rstrip()
 
-    def explain(self, error: LinkError) -> Report:
-        """Return what a failed transaction means."""
-        return explain(error, self._inverter.settings.address)
-
     async def _why(
         self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
     ) -> Report:
-        """Return why a parameter was not changed."""
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)
         if error is not None:
-            return self.explain(error)
+            return explain_failure(error, self._inverter)
         assert kept is not None
         value, written = self._show(key, kept), self._show(key, data)
         return Report(Cause.DRIVE_KEEPS_OTHER, value=value, written=written)
@@ -344,3 +311,84 @@ class ParameterWriter:
         if seen is not None and seen.faulted:
             return inverter.report(Cause.REFUSED_WHILE_FAULTED, why=why)
         return why
+
+
+#: Awaited before each write of a setting; raises DriveError if the drive would not take it.
+Allow = Callable[[], Awaitable[None]]
+
+_WHAT = 'changing settings'
+
+
+class WriteAccess:
+    """
+    Has one drive take settings; used on the bus alone.
+
+    Firmware of the v5.0 dialect takes them only while the bus has control. Where nobody has it, it
+    is taken while the motor stands, with no run command and set-point 0, and given back. Everything
+    else takes settings at any time.
+    """
+
+    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
+        self._inverter = inverter
+        self._procedures = procedures
+
+    @contextlib.asynccontextmanager
+    async def granted(self) -> AsyncIterator[Allow]:
+        """Give control back at the end, if what this yields had to take it."""
+        async with contextlib.AsyncExitStack() as stack:
+            access = ExclusiveAccess(_WHAT)
+
+            async def allow() -> None:
+                nonlocal access
+                if not self._inverter.settings_need_control:
+                    return
+                if await self._procedures.controller.method.in_control(Priority.SERVICE):
+                    return
+                # what was had was lost: to somebody who stopped it, or by a serial fault that a
+                # refused write has caused
+                if access.aborted:
+                    raise DriveError(Cause.PROCEDURE_STOPPED, what=_WHAT)
+                await stack.aclose()
+                access = stack.enter_context(self._procedures.controller.exclusive(_WHAT))
+                await stack.enter_async_context(self._procedures.in_standby(access))
+
+            yield allow
+
+
+#: The driver's own setting that goes with each setting of the line.
+_FOLLOWERS = {
+    Role.BUS_PROTOCOL: 'protocol',
+    Role.BUS_ADDRESS: 'address',
+    Role.BAUD_RATE: 'baud_rate',
+    Role.CHARACTER_FORMAT: 'char_format',
+}
+
+
+def followers(model: Family) -> Mapping[str, str]:
+    """Return the driver's own setting that goes with each setting of the line."""
+    named = {model.key(role): setting for role, setting in _FOLLOWERS.items()}
+    return {key: setting for key, setting in named.items() if key}
+
+
+def why_not(key: str, inverter: DriveState) -> Report | None:
+    """Return why a setting may not be changed, ``None`` if it may."""
+    settings = inverter.settings
+    if settings.method == 'monitor':
+        return Report(Cause.MONITOR_ONLY)
+    if inverter.tuning:
+        return Report(Cause.CHANGE_WHILE_TUNING)
+    if key not in inverter.model.communication:
+        return None
+    if not settings.allow_communication_changes:
+        return Report(Cause.COMMUNICATION_PROTECTED)
+    firmware = inverter.identity.firmware if inverter.identity else 0.0
+    if firmware < inverter.model.profile.uncertain.get(key, 0.0):
+        return Report(Cause.CODES_UNCERTAIN, firmware=firmware)
+    return None
+
+
+def after_change(changed: Mapping[str, Value], model: Family) -> Report | None:
+    """Return how to follow a drive to new settings of the line, ``None`` if none was changed."""
+    settings = followers(model)
+    follow = [f'{settings[key]} ({value})' for key, value in changed.items() if key in settings]
+    return Report(Cause.FOLLOW_THE_LINE, settings=' and '.join(follow)) if follow else None

@@ -11,11 +11,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The settings of one drive: read once, watched for ever, changed on request."""
+"""The settings of one drive: read once, watched for ever, changed on request, as wanted or not."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import AsyncIterator
 from collections.abc import Awaitable
 from collections.abc import Callable
@@ -25,29 +25,33 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
+import functools
 import logging
 import time
 from typing import Any
+from typing import Concatenate
+from typing import ParamSpec
+from typing import Protocol
+from typing import TypeVar
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.desired_config import DesiredConfig
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.lock import Lock
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
 from nfo_sinus_driver.drive.parameter_writer import Written
+from nfo_sinus_driver.drive.parameter_writer import after_change
+from nfo_sinus_driver.drive.parameter_writer import followers
 from nfo_sinus_driver.drive.parameter_writer import not_changed
+from nfo_sinus_driver.drive.parameter_writer import show
+from nfo_sinus_driver.drive.parameter_writer import why_not
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.write_rules import after_change
-from nfo_sinus_driver.drive.write_rules import followers
-from nfo_sinus_driver.drive.write_rules import why_not
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
@@ -64,7 +68,30 @@ _PROGRESS = 5.0
 #: After how many rounds that brought nothing a parameter is not there.
 _REFUSALS = 2
 
-Run = Callable[[Callable[[], Coroutine[Any, Any, Any]]], 'Future[Any]']
+_T = TypeVar('_T')
+_P = ParamSpec('_P')
+
+
+class OnBus(Protocol):
+    """Something of a drive that any thread may have to do with."""
+
+    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
+        """Run a coroutine on the bus; what goes wrong on the line is explained."""
+
+
+_Self = TypeVar('_Self', bound=OnBus)
+
+
+def on_bus(
+    method: Callable[Concatenate[_Self, _P], Coroutine[Any, Any, _T]],
+) -> Callable[Concatenate[_Self, _P], Future[_T]]:
+    """Have a method run on the bus: who calls it, from any thread, is given a future."""
+
+    @functools.wraps(method)
+    def run(me: _Self, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
+        return me.run(lambda: method(me, *args, **kwargs))
+
+    return run
 
 
 class Parameters:
@@ -76,28 +103,28 @@ class Parameters:
 
     :param run: runs a coroutine on the bus; its errors are for people.
     :param told: called on the bus with the keys of parameters whose value is new.
+    :raises LinkError: the drive does not answer.
+    :raises ParameterError: a value is not taken, and why.
     """
 
     def __init__(
         self,
-        bus: Bus,
         inverter: DriveState,
-        registers: ParameterAccess,
         procedures: Procedures,
-        run: Run,
+        run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
         told: Callable[[Collection[str]], None],
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
         self._inverter = inverter
-        self._registers = registers
-        self._run = run
+        self._registers = inverter.registers
+        self.run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, registers, procedures)
+        self._writer = ParameterWriter(inverter, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
         self._wanted = DesiredConfig(self, inverter)
-        self._turn = Lock(bus)
+        self._turn = Lock(inverter.bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()
         self._rounds = 0
@@ -134,11 +161,7 @@ class Parameters:
         return Change(key, before, self._writer.value(key, data), unit)
 
     def exact(self, key: str, value: Value) -> Value:
-        """
-        Return a value as the drive would show it.
-
-        :raises ParameterError: it cannot have it.
-        """
+        """Return a value as the drive would show it."""
         known = self._values.get(key)
         if known is not None and type(known) is type(value) and known == value:
             # it has it, also where no manual says that it can [C19]
@@ -169,53 +192,17 @@ class Parameters:
         ]
 
     def admit(self, key: str, value: Value) -> Value:
-        """
-        Return a value as the drive will show it; nothing is asked of the drive.
-
-        :raises ParameterError: the drive cannot have this value, or it may not be changed.
-        """
+        """Return the same of one that may be set; nothing is asked of the drive."""
         exact = self.exact(key, value)
         reason = why_not(key, self._inverter)
         if reason is not None and self._values.get(key) != exact:
             raise not_changed(key, reason)
         return exact
 
-    def read(self, only: Collection[str] | None = None) -> Future[None]:
-        """Read every setting that the drive has, or only some."""
-        return self._run(lambda: self.read_now(only))
-
-    def change(self, wanted: Mapping[str, Value]) -> Future[tuple[Change, ...]]:
-        """Do as :meth:`change_now`."""
-        return self._run(lambda: self.change_now(wanted))
-
-    def write_each(
-        self, wanted: Mapping[str, bytes], wrote: Callable[[Change], None]
-    ) -> Future[None]:
-        """Do as :meth:`write_each_now`."""
-        return self._run(lambda: self.write_each_now(wanted, wrote))
-
-    def refresh(self) -> Future[Report]:
-        """Read every parameter again; the answer says which have changed."""
-        return self._run(self._refresh)
-
-    def apply(self, wanted: Mapping[str, Value], *, write: bool) -> Future[None]:
-        """
-        Take a state as the wanted one, bring the drive into it, and report what drifts later.
-
-        What cannot be written is logged, and stays reported as drift.
-
-        :param write: false to report only.
-        """
-        return self._run(lambda: self._wanted.apply_now(wanted, write=write))
-
     # --- on the bus ---------------------------------------------------------------------------
 
     async def read_now(self, only: Collection[str] | None = None) -> None:
-        """
-        Read every setting that the drive has, or only some.
-
-        :raises LinkError: the drive does not answer.
-        """
+        """Read every setting that the drive has, or only some."""
         inverter = self._inverter
         self._keys = ()
         self._data, self._values = {}, {}
@@ -232,8 +219,7 @@ class Parameters:
         self._keys = tuple(key for key in keys if key in self._data)
         if keys:
             took = time.monotonic() - started
-            report = Report(Cause.SETTINGS_READ, progress=self.progress, seconds=took)
-            inverter.tell(Severity.INFO, report)
+            inverter.tell(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
@@ -252,13 +238,27 @@ class Parameters:
                 if time.monotonic() > tell_at:
                     pause *= 2
                     tell_at = time.monotonic() + pause
-                    progress = Report(Cause.SETTINGS_BEING_READ, progress=self.progress)
-                    self._inverter.tell(Severity.INFO, progress)
+                    self._inverter.tell(
+                        Severity.INFO, Cause.SETTINGS_BEING_READ, progress=self.progress
+                    )
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
-        for key in keys:
-            report = Report(Cause.SETTING_UNREADABLE, key=key, error=str(refused[key]))
-            self._inverter.tell(Severity.WARNING, report)
+        self._tell_unreadable({key: refused[key] for key in keys})
+
+    def _tell_unreadable(self, refused: Mapping[str, Refused]) -> None:
+        cards: list[str] = []
+        for key, error in refused.items():
+            if option := self._inverter.model[key].option:
+                cards.append(option)
+            else:
+                self._inverter.tell(
+                    Severity.WARNING, Cause.SETTING_UNREADABLE, key=key, error=str(error)
+                )
+        if cards:
+            options = ', '.join(dict.fromkeys(cards))
+            self._inverter.tell(
+                Severity.INFO, Cause.OPTIONS_MISSING, count=len(cards), options=options
+            )
 
     async def watch_now(self) -> None:
         """Read the settings one after the other, again and again, for ever."""
@@ -307,12 +307,10 @@ class Parameters:
         self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
     ) -> tuple[Change, ...]:
         """
-        Write what differs, all of it or nothing, and read it back.
+        Write what differs, all of it or nothing, and read it back; return what was changed.
 
         :param guarded: false for what the driver sets itself.
         :param told_as: as what each change is reported.
-        :returns: what was changed.
-        :raises ParameterError: why not.
         """
         take = self.admit if guarded else self.exact
         exact = {key: take(key, value) for key, value in wanted.items()}
@@ -347,7 +345,6 @@ class Parameters:
         Write what differs, one after the other; what was written before a refusal stays.
 
         :param wrote: told of each on the bus; what it raises ends the writing.
-        :raises ParameterError: something may not be changed, or was not taken.
         """
         for key in wanted:
             reason = why_not(key, self._inverter)
@@ -366,12 +363,7 @@ class Parameters:
     async def left_to_the_drive(
         self, keys: Collection[str]
     ) -> AsyncIterator[Callable[[], Awaitable[tuple[Change, ...]]]]:
-        """
-        Let the drive change parameters itself while nobody else does.
-
-        :returns: what reads them again, and returns what has changed.
-        :raises LinkError: they cannot be read.
-        """
+        """Let the drive change parameters alone; yields what reads which of them it changed."""
         before = {key: await self._registers.read_data(key, Priority.SERVICE) for key in keys}
 
         async def changes() -> tuple[Change, ...]:
@@ -392,6 +384,11 @@ class Parameters:
             finally:
                 self._inverter.tuning = False
 
+    #: The same for any thread.
+    read = on_bus(read_now)
+    change = on_bus(change_now)
+    write_each = on_bus(write_each_now)
+
     @contextlib.asynccontextmanager
     async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:
         """Change parameters while nobody else does; they are no news before it is done."""
@@ -411,7 +408,14 @@ class Parameters:
         new = [key for key, wanted in data.items() if self._data.get(key) != wanted]
         await self._writer.require_standstill(new)
 
-    async def _refresh(self) -> Report:
+    @on_bus
+    async def apply(self, wanted: Mapping[str, Value], *, write: bool) -> None:
+        """Take a state as the wanted one, and report what drifts later; write it only if told."""
+        await self._wanted.apply_now(wanted, write=write)
+
+    @on_bus
+    async def refresh(self) -> Report:
+        """Read every parameter again; the answer says which have changed."""
         before = self._values
         keys = [key for key in self._keys if self._inverter.has(key)]
         for key in keys:
@@ -421,14 +425,7 @@ class Parameters:
         changed = [key for key in keys if before.get(key) != self._values.get(key)]
         return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
 
-    async def _read(
-        self, key: str, *, once: bool, priority: Priority = Priority.REFRESH
-    ) -> None:
-        """
-        Read one parameter.
-
-        :raises LinkError: it cannot be read.
-        """
+    async def _read(self, key: str, *, once: bool, priority: Priority = Priority.REFRESH) -> None:
         data = await self._registers.read_data(key, priority, once=once)
         if key not in self._changing or key not in self._data:
             self._learn(key, data)
@@ -445,7 +442,7 @@ class Parameters:
             values[key] = self._registers.value(key, data)
         except ValueError as error:
             # and nobody may rely on what it was before
-            self._inverter.tell(Severity.WARNING, Report(Cause.BAD_VALUE, error=str(error)))
+            self._inverter.tell(Severity.WARNING, Cause.BAD_VALUE, error=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
             self._tell_news(Change(key, before, values[key], self._inverter.model[key].unit))
@@ -455,6 +452,101 @@ class Parameters:
             _log.exception('a new value of %s could not be told', key)
 
     def _tell_news(self, change: Change) -> None:
-        """Say that somebody else changed a parameter."""
         if not self._wanted.tell_drift(change.key):
-            self._inverter.tell(Severity.INFO, Report(Cause.CHANGED_AT_DRIVE, change=change))
+            self._inverter.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
+
+
+class DesiredConfig:
+    """What the settings of one drive shall be; used on the bus, readable from anywhere."""
+
+    def __init__(self, parameters: Parameters, inverter: DriveState) -> None:
+        self._parameters = parameters
+        self._inverter = inverter
+        self._values: dict[str, Value] = {}
+
+    @property
+    def drift(self) -> tuple[Change, ...]:
+        """What the drive has otherwise than it was wanted, as wanted -> what it has."""
+        data, values = self._parameters.data, self._parameters.values
+        return tuple(
+            self._parameters.describe(key, wanted, data[key])
+            for key, wanted in self._values.items()
+            if key in data and values.get(key) != wanted
+        )
+
+    def follow(self, changed: Mapping[str, Value]) -> None:
+        """Want what a person has set since, where a state is wanted at all."""
+        self._values.update((key, changed[key]) for key in changed if key in self._values)
+
+    def tell_drift(self, key: str) -> bool:
+        """Say that a parameter is not as wanted; false if it is."""
+        for drift in self.drift:
+            if drift.key == key:
+                self._inverter.tell(Severity.WARNING, _not_as_wanted(drift))
+                return True
+        return False
+
+    async def apply_now(self, wanted: Mapping[str, Value], *, write: bool) -> None:
+        """
+        Take a state as the wanted one and bring the drive into it, or only report how it differs.
+
+        What cannot be written is logged, and stays reported as drift.
+        """
+        inverter = self._inverter
+        here = {key: value for key, value in wanted.items() if key in self._parameters.data}
+        self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
+        missing = [key for key in wanted if key not in here]
+        if missing:
+            inverter.tell(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))
+        drifts = self.drift
+        while drifts:
+            refused: list[ParameterError] = []
+            for drift in drifts:
+                if not write:
+                    inverter.tell(Severity.WARNING, _not_as_wanted(drift))
+                    continue
+                try:
+                    await self._parameters.change_now(
+                        {drift.key: drift.old}, told_as=Cause.CHANGED_AS_WANTED
+                    )
+                except ParameterError as error:
+                    refused.append(error)
+            if len(refused) == len(drifts):
+                for refusal in refused:
+                    why = refusal.report
+                    inverter.tell(Severity.ERROR, Cause.WANTED_BUT_REFUSED, why=why)
+            # values that bound each other may stand in any order
+            drifts = self.drift if write and len(refused) < len(drifts) else ()
+
+
+def _not_as_wanted(drift: Change) -> Report:
+    has = f'{show(drift.new)} {drift.unit}'.rstrip()
+    return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
+
+
+#: Nobody has to look: who leaves wakes the next one, s.
+_LONG = 60.0
+
+
+class Lock:
+    """Lets one coroutine on the bus at a time in, in the order in which they came."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        #: Who is in, and behind it who waits.
+        self._tasks: deque[Task | None] = deque()
+
+    async def __aenter__(self) -> None:
+        task = self._bus.current
+        self._tasks.append(task)
+        try:
+            while self._tasks[0] is not task:
+                await self._bus.sleep(_LONG)
+        except BaseException:
+            self._tasks.remove(task)
+            raise
+
+    async def __aexit__(self, *_: object) -> None:
+        self._tasks.popleft()
+        if self._tasks:
+            self._bus.wake(self._tasks[0])

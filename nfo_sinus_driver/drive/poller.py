@@ -11,40 +11,40 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The watch over one drive: polls it, judges what it sees, notices when it is lost."""
+"""The watch over one drive: polls and measures, judges what it sees, notices when it is lost."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
+from dataclasses import replace
 import logging
 import math
 import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive.conditions import Conditions
 from nfo_sinus_driver.drive.controller import Controller
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import Conditions
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.drive.picture import take_snapshot
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import InverterStatus
-from nfo_sinus_driver.drive.snapshot import Listener
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Measured
+from nfo_sinus_driver.drive.snapshot import Snapshot
+from nfo_sinus_driver.drive.snapshot import Telemetry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -100,20 +100,17 @@ class Poller:
 
     def __init__(
         self,
-        bus: Bus,
         inverter: DriveState,
-        registers: ParameterAccess,
         setpoint: Setpoint,
         controller: Controller | None,
-        listener: Listener,
         connect: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
+        self._unit = inverter.settings.address
         self._inverter = inverter
-        self._registers = registers
+        self._registers = inverter.registers
         self._setpoint = setpoint
         self._controller = controller
-        self._listener = listener
         self._connect = connect
         self._task: Task | None = None
         #: Poll at full rate.
@@ -151,7 +148,7 @@ class Poller:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
-        self._bus.recorder.forget_cycle(self._inverter.settings.address)
+        self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
     def told(self, reply: Reply) -> None:
@@ -164,7 +161,7 @@ class Poller:
         if self._task is None or not inverter.connected or not reply.data:
             return
         place = registers.address(inverter.word_key)
-        if self._bus.answer(self._task, inverter.settings.address, place, reply):
+        if self._bus.answer(self._task, self._unit, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
         if not registers.can_be(inverter.word_key, reply.data):
@@ -190,7 +187,7 @@ class Poller:
 
     def connected(self) -> None:
         """Begin anew to count what goes wrong: the drive has been found."""
-        self._bus.recorder.connected(self._inverter.settings.address)
+        self._bus.recorder.connected(self._unit)
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = None
@@ -214,10 +211,10 @@ class Poller:
                 self._failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
-                self._failed(DriveError(Report(Cause.DRIVER_ERROR, error=repr(error))))
+                self._failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
                 if self._inverter.connected and self.active and polled_at > 0:
-                    self._bus.recorder.cycle(self._inverter.settings.address, started - polled_at)
+                    self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
             await self._bus.sleep(self._pause(polled_at))
 
@@ -227,7 +224,8 @@ class Poller:
         if not inverter.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
-            strikes_in = self._heard_at + inverter.sio_tot - time.monotonic()
+            heard_at = self._bus.silences.heard_at(self._unit)
+            strikes_in = heard_at + inverter.sio_tot - time.monotonic()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
@@ -240,7 +238,6 @@ class Poller:
 
     @property
     def _period(self) -> float:
-        """The time from one poll to the next, s."""
         settings = self._inverter.settings
         rate = settings.poll_rate
         if settings.idle_poll_rate and self._is_idle:
@@ -263,14 +260,9 @@ class Poller:
         return not any(abs(value) > 0 for value in (self._inverter.frequency, self._inverter.speed))
 
     @property
-    def _heard_at(self) -> float:
-        """When the drive said anything, s."""
-        return self._bus.silences.heard_at(self._inverter.settings.address)
-
-    @property
     def _silent_for_long(self) -> bool:
         """It has answered nobody for so long that it is lost."""
-        silent = self._bus.silences.lasts(self._inverter.settings.address, time.monotonic())
+        silent = self._bus.silences.lasts(self._unit, time.monotonic())
         return silent >= self._inverter.settings.lost_after
 
     @property
@@ -298,7 +290,6 @@ class Poller:
         return self._slow_period
 
     async def _look(self) -> InverterStatus:
-        """Read the status and judge it."""
         inverter = self._inverter
         alarming = self._controller.alarmed_by if self._controller is not None else lambda _: False
 
@@ -308,11 +299,7 @@ class Poller:
                 # somebody else has looked since
                 told = None
             return await inverter.look(
-                Priority.POLL,
-                once=True,
-                alarming=alarming,
-                told=told,
-                code_for=self._code_holds,
+                Priority.POLL, once=True, alarming=alarming, told=told, code_for=self._code_holds
             )
 
         # both words of a status are of one moment, so they are repeated together
@@ -332,9 +319,7 @@ class Poller:
         if self._mode_is_due:
             self._mode_read_at = time.monotonic()
             before = inverter.control_mode
-            mode = await self._insist(
-                lambda: inverter.read_control_mode(Priority.POLL, once=True)
-            )
+            mode = await self._insist(lambda: inverter.read_control_mode(Priority.POLL, once=True))
             if mode != before and self._controller:
                 # before it is told: a set-point never has the unit of another mode
                 self._controller.judge(seen)
@@ -354,7 +339,7 @@ class Poller:
         code = seen.code if seen.faulted else 0
         if code and code != self._told_fault and not told:
             fault = explain_fault(self._inverter, seen)
-            self._inverter.tell(Severity.ERROR, Report(Cause.FAULT_APPEARED, fault=fault))
+            self._inverter.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
         self._told_fault = code
 
     async def _measure(self, role: Role) -> float:
@@ -402,20 +387,21 @@ class Poller:
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
                 if self._silent_for_long or in_vain:
                     raise
-                self._bus.recorder.retry(self._inverter.settings.address)
+                self._bus.recorder.retry(self._unit)
             else:
                 self._inverter.answering = True
                 self._setpoint.answered()
                 return answer
 
     def _failed(self, error: LinkError | DriveError) -> None:
-        """Judge a poll that failed, or an attempt to connect."""
         inverter, now = self._inverter, time.monotonic()
         inverter.answering = False
         if not inverter.connected:
             self._failures += 1
-            if isinstance(error, DriveError):
-                self._complain(error.report)
+            if isinstance(error, DriveError) and error.report != self._complaint:
+                # what keeps the drive from being used is said once
+                self._complaint = error.report
+                inverter.tell(Severity.ERROR, error.report)
             return
         self._failing_since = min(self._failing_since, now)
         # one that answers, but tells no status, cannot be watched either
@@ -427,31 +413,131 @@ class Poller:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
         inverter.connected = False
-        why = self._explain(error)
-        self._bus.recorder.forget_cycle(inverter.settings.address)
+        why = explain_failure(error, inverter)
+        self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost()
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
-        inverter.tell(Severity.ERROR, Report(cause, why=why))
+        inverter.tell(Severity.ERROR, cause, why=why)
         try:
             self._publish(None)
         except Exception:
             # a mistake of who listens must not end the watch
             _log.exception('the loss of the drive could not be told')
 
-    def _complain(self, report: Report) -> None:
-        """Say what keeps the drive from being used, once."""
-        if report != self._complaint:
-            self._complaint = report
-            self._inverter.tell(Severity.ERROR, report)
-
     def _publish(self, seen: InverterStatus | None) -> None:
         inverter = self._inverter
         frequency, speed = (inverter.last_polled(role) for role in _BASIC)
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
-        self._listener.on_snapshot(self.snapshot)
+        inverter.listener.on_snapshot(self.snapshot)
 
-    def _explain(self, error: LinkError | DriveError) -> Report:
-        if isinstance(error, DriveError):
-            return error.report
-        return explain(error, self._inverter.settings.address)
+
+def take_snapshot(
+    inverter: DriveState,
+    setpoint: Setpoint,
+    seen: InverterStatus | None,
+    frequency: Measured = NOT_MEASURED,
+    speed: Measured = NOT_MEASURED,
+    actual: float = NAN,
+) -> Snapshot:
+    """Return the snapshot of a poll; without a status while the drive is not connected."""
+    method = inverter.settings.method
+    snapshot = Snapshot(time.monotonic(), inverter.connected, setpoint.armed, method)
+    if seen is None:
+        return snapshot
+    code = seen.listed
+    return replace(
+        snapshot,
+        at=seen.at,
+        status=seen,
+        control_mode=inverter.control_mode,
+        unit=inverter.unit,
+        setpoint=setpoint.commanded,
+        setpoint_age=setpoint.age,
+        setpoint_clamped=setpoint.clamped,
+        text=inverter.text_of(seen.code),
+        description=code.description,
+        remedy=code.remedy,
+        kind=seen.kind,
+        requires_ack=code.requires_ack,
+        frequency=frequency.value,
+        frequency_at=frequency.at,
+        speed=speed.value,
+        speed_at=speed.at,
+        actual=actual,
+    )
+
+
+#: Read every time.
+FAST = (
+    Role.OUTPUT_VOLTAGE,
+    Role.OUTPUT_CURRENT,
+    Role.OUTPUT_POWER,
+    Role.POWER_FACTOR,
+    Role.DC_LINK_VOLTAGE,
+    Role.ACTUAL_TORQUE,
+)
+#: Read one after the other, one each time, for they change slowly.
+SLOW = (
+    Role.MOTOR_TEMPERATURE,
+    Role.PT1000_TEMPERATURE,
+    Role.OPERATING_TIME,
+    Role.RUNNING_TIME,
+    Role.BRAKE_TIME,
+    Role.ENERGY,
+    Role.TOTAL_ENERGY,
+)
+
+#: What a drive answers that does not have a parameter, and how often until it is believed.
+_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
+_DENIALS = 3
+#: How often the settings are looked at while telemetry is turned off, s.
+_OFF_PERIOD = 0.5
+
+
+async def watch_telemetry(inverter: DriveState) -> None:
+    """
+    Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
+
+    One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
+    """
+    values = dict.fromkeys((*FAST, *SLOW), NAN)
+    #: How often in a row the drive said that it has none of them.
+    denied = dict.fromkeys(values, 0)
+    # the first time all are read, so that the first message is whole
+    due = deque(SLOW)
+    first = True
+
+    async def measure(role: Role) -> None:
+        # which firmware it has may be known only later
+        if denied[role] >= _DENIALS or not inverter.has(inverter.model.key(role)):
+            return
+        try:
+            values[role] = await inverter.measure(role, Priority.TELEMETRY)
+            denied[role] = 0
+        except Refused as error:
+            values[role] = NAN
+            # over Classic it says so of everything while it tunes
+            denied[role] += error.code in _NONE_SUCH and not inverter.tuning
+
+    while True:
+        started = time.monotonic()
+        rate = inverter.settings.telemetry_rate
+        if rate and inverter.connected and inverter.answering:
+            try:
+                for role in (*FAST, *due) if first else (*FAST, due[0]):
+                    await measure(role)
+                due.rotate(-1)
+                first = False
+                # these two are polled anyway
+                polled = {
+                    Role.ACTUAL_FREQUENCY: inverter.frequency,
+                    Role.ACTUAL_SPEED: inverter.speed,
+                }
+                inverter.listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
+            except LinkError:
+                # the poll says so if the drive is lost
+                inverter.missed()
+                values.update(dict.fromkeys(FAST, NAN))
+        period = 1 / rate if rate else _OFF_PERIOD
+        await inverter.bus.sleep(period - (time.monotonic() - started))

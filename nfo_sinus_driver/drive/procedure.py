@@ -22,13 +22,12 @@ from collections.abc import Iterator
 import contextlib
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
@@ -46,14 +45,10 @@ _LONGEST_BUSY = 0.5
 
 
 def require_known(procedure: Procedure | Reset, model: Family) -> None:
-    """
-    See to it that a model has a procedure.
-
-    :raises DriveError: it has no command for it.
-    """
+    """Raise a :class:`DriveError` if a model has no command for a procedure."""
     if not model.profile.methods_with(procedure):
         what = procedure.value
-        raise DriveError(Report(Cause.UNKNOWN_PROCEDURE, what=what, model=model.name))
+        raise DriveError(Cause.UNKNOWN_PROCEDURE, what=what, model=model.name)
 
 
 class Procedures:
@@ -61,81 +56,51 @@ class Procedures:
     Has one drive carry out procedures; used on the bus alone.
 
     :param controller: who commands the drive else; ``None`` if this driver only reads.
+    :raises DriveError: the drive cannot be had, has no such procedure, or does not confirm.
     """
 
-    def __init__(self, bus: Bus, inverter: DriveState, controller: Controller | None) -> None:
-        self._bus = bus
+    def __init__(self, inverter: DriveState, controller: Controller | None) -> None:
+        self._bus = inverter.bus
         self._inverter = inverter
         self._controller = controller
 
     @property
-    def _commands(self) -> Controller:
+    def controller(self) -> Controller:
+        """Who commands the drive else; a :class:`DriveError` if this driver only reads."""
         if self._controller is None:
-            raise DriveError(Report(Cause.MONITOR_ONLY))
+            raise DriveError(Cause.MONITOR_ONLY)
         return self._controller
 
     def require(self, procedure: Procedure | Reset) -> None:
-        """
-        See to it that a procedure may begin.
-
-        :raises DriveError: the drive has no such procedure, or its control method is another; or
-            somebody has the drive.
-        """
-        controller, inverter = self._commands, self._inverter
+        """See to it that a procedure may begin."""
+        controller, inverter = self.controller, self._inverter
         if not inverter.connected:
-            raise DriveError(Report(Cause.NOT_CONNECTED, address=inverter.settings.address))
+            raise DriveError(Cause.NOT_CONNECTED, address=inverter.settings.address)
         require_known(procedure, inverter.model)
         profile = inverter.model.profile
         have = profile.methods_with(procedure)
         if inverter.settings.method not in have:
             raise DriveError(
-                Report(
-                    Cause.OTHER_METHOD_NEEDED,
-                    what=procedure.value,
-                    means=profile.methods[have[0]].means,
-                    method=have[0],
-                )
+                Cause.OTHER_METHOD_NEEDED,
+                what=procedure.value,
+                means=profile.methods[have[0]].means,
+                method=have[0],
             )
         controller.require_idle(procedure.value)
 
     @contextlib.contextmanager
     def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for a procedure, from its first preparations on.
-
-        :raises DriveError: it cannot be had, and why.
-        """
+        """Have the drive for a procedure, from its first preparations on."""
         self.require(procedure)
-        with self.exclusive(procedure.value) as access:
+        with self.controller.exclusive(procedure.value) as access:
             yield access
-
-    @contextlib.contextmanager
-    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """
-        Have the drive for what every control method may do, also while connecting.
-
-        :raises DriveError: somebody has the drive.
-        """
-        with self._commands.exclusive(what) as access:
-            yield access
-
-    async def in_control(self, priority: Priority) -> bool:
-        """
-        Tell whether the bus has control of the drive.
-
-        :raises DriveError: this driver only reads.
-        """
-        return await self._commands.method.in_control(priority)
 
     @contextlib.asynccontextmanager
     async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
-        A drive that its keypad or terminals control is not taken: giving it back to them could
-        start the motor [C43].
-
-        :raises DriveError: it cannot be had, and why.
+        Not from keypad or terminals: giving it back to them could start the motor [C43].
         """
         found = await self._take(access)
         try:
@@ -148,11 +113,7 @@ class Procedures:
         await self._give_back(found)
 
     async def abort(self) -> Report | None:
-        """
-        End the procedure that has the drive; anything else goes on.
-
-        :raises DriveError: the drive does not confirm it; it is retried until it does.
-        """
+        """End the procedure that has the drive; anything else goes on."""
         controller = self._controller
         procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
         if controller is None or controller.state not in procedure:
@@ -163,16 +124,13 @@ class Procedures:
         """
         Have the drive begin; once, for nobody knows what has happened before a second time.
 
-        It waits for its turn with the stops, so that one which comes later does not overtake it,
-        and keeps it off the line if it was asked for before its turn. Only a drive that is busy is
-        told again for a while, for it has done nothing.
-
-        :raises DriveError: it was stopped meanwhile.
+        It waits for its turn with the stops, so that none that comes later overtakes it. Only a
+        drive that is busy is told again for a while, for it has done nothing.
         """
         deadline = time.monotonic() + _LONGEST_BUSY
         while True:
             try:
-                await self._commands.method.begin(procedure, access.require_wanted)
+                await self.controller.method.begin(procedure, access.require_wanted)
                 return
             except Refused as error:
                 if error.code != Refused.BUSY or time.monotonic() >= deadline:
@@ -180,7 +138,7 @@ class Procedures:
             await self._bus.sleep(_BUSY_PERIOD)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
-        controller, inverter, what = self._commands, self._inverter, access.what
+        controller, inverter, what = self.controller, self._inverter, access.what
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
         found = await controller.method.holder(Priority.SERVICE)
@@ -193,7 +151,7 @@ class Procedures:
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
-        deadline = time.monotonic() + confirmation.TIMEOUT
+        deadline = time.monotonic() + drive_state.TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
             if time.monotonic() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
@@ -201,12 +159,12 @@ class Procedures:
                 raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
-            await self._bus.sleep(confirmation.LOOK_PERIOD)
+            await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 
     async def _give_back(self, found: Holder) -> None:
         """Remove the command, and give control back where nobody had it; not while faulted."""
-        controller = self._commands
+        controller = self.controller
         await controller.withdraw_run_command()
         if found is Holder.NOBODY and not controller.blocked_by_fault:
             await controller.method.release()

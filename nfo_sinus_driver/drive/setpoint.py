@@ -24,7 +24,6 @@ import math
 import time
 from typing import NamedTuple
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
@@ -34,7 +33,6 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
@@ -93,17 +91,11 @@ class Setpoint:
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        unit: int,
-        registers: ParameterAccess,
-        inverter: DriveState,
-        refused: Callable[[Report], None],
-        told: Callable[[Reply], None] = lambda reply: None,
+        self, inverter: DriveState, refused: Callable[[Report], None], told: Callable[[Reply], None]
     ) -> None:
-        self._bus = bus
-        self._unit = unit
-        self._registers = registers
+        self._bus = inverter.bus
+        self._unit = inverter.settings.address
+        self._registers = inverter.registers
         self._inverter = inverter
         self._refused = refused
         self._slot = LatestValue(self._make, self._done, told)
@@ -134,11 +126,7 @@ class Setpoint:
         self.clamped = False
 
     def request(self, value: float) -> None:
-        """
-        Ask for a set-point, from any thread; it counts only if the drive is armed.
-
-        :raises ValueError: not finite.
-        """
+        """Ask for a set-point, from any thread; it must be finite, and counts only while armed."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
         self._own = Request(value, time.monotonic())
@@ -222,11 +210,7 @@ class Setpoint:
     # --- together with the other drives of the line, on the bus -------------------------------
 
     def why_not_shared(self, name: str) -> Report | None:
-        """
-        Return why it cannot follow a set-point that is told to all drives; ``None`` if it can.
-
-        :param name: of the drive.
-        """
+        """Return why the drive, of this name, cannot follow a set-point told to all, if so."""
         settings = self._inverter.settings
         if settings.method == 'monitor':
             return Report(Cause.MEMBER_MONITORED, name=name)
@@ -316,8 +300,9 @@ class Setpoint:
             return
         if not self._told_missed:
             self._told_missed = True
-            missed = Report(Cause.BROADCAST_MISSED, value=self._meant({address: kept}))
-            self._inverter.tell(Severity.WARNING, missed)
+            self._inverter.tell(
+                Severity.WARNING, Cause.BROADCAST_MISSED, value=self._meant({address: kept})
+            )
         self._written = {}
         self._bus.request(self._slot)
 
@@ -335,7 +320,7 @@ class Setpoint:
         self._expired = False
         if self._warned:
             self._warned = False
-            self._inverter.tell(Severity.INFO, Report(Cause.SETPOINTS_AGAIN))
+            self._inverter.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
     def _make(self) -> Transfer | None:
@@ -348,8 +333,7 @@ class Setpoint:
         limited = self._accept(request)
         if self.clamped and not self._clamp_told:
             self._inverter.tell(
-                Severity.WARNING,
-                Report(Cause.SETPOINT_LIMITED, value=request.value, limited=limited),
+                Severity.WARNING, Cause.SETPOINT_LIMITED, value=request.value, limited=limited
             )
         self._clamp_told = self.clamped
         due = self.due(request)
@@ -383,7 +367,6 @@ class Setpoint:
             self.was_missed(error)
 
     def _take_note(self, address: Address, data: bytes) -> None:
-        """Take note that these bytes stand in the drive now."""
         self._busy_since = math.inf
         self._written[address] = data, time.monotonic()
         if len(self._written) == len(self._keys):
@@ -440,20 +423,17 @@ class Setpoint:
 
     async def _watch_age(self) -> None:
         try:
-            await self._watch_age_for_ever()
+            while True:
+                timeout = self._inverter.settings.setpoint_timeout
+                last = max(self._request.at, self._armed_at)
+                left = last + timeout - time.monotonic() if timeout else math.inf
+                if left > 0 or self._expired:
+                    await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
+                else:
+                    await self._expire(timeout)
         except Exception as error:
             # a set-point that nobody watches must not be followed
             self._refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
-
-    async def _watch_age_for_ever(self) -> None:
-        while True:
-            timeout = self._inverter.settings.setpoint_timeout
-            last = max(self._request.at, self._armed_at)
-            left = last + timeout - time.monotonic() if timeout else math.inf
-            if left > 0 or self._expired:
-                await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
-            else:
-                await self._expire(timeout)
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
@@ -461,9 +441,7 @@ class Setpoint:
         if self._standing != dict(map(self._registers.target, zero)):
             if not self._warned:
                 self._warned = True
-                self._inverter.tell(
-                    Severity.WARNING, Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
-                )
+                self._inverter.tell(Severity.WARNING, Cause.SETPOINT_TIMED_OUT, timeout=timeout)
             before = self._request
             for step in zero:
                 if self._request is not before:

@@ -11,12 +11,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""One set-point for all drives of a Classic line, by one broadcast [M0 §6.1.4]."""
+"""One set-point, or a stop, for all drives of a Classic line by one broadcast [M0 §6.1.4]."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterable
 from collections.abc import Mapping
 import dataclasses
 import math
@@ -26,21 +26,18 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.setpoint import Request
 from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LinkError
 
 
 @dataclasses.dataclass(frozen=True)
 class Told:
-    """
-    What an operator should know of set-points for all; ``None`` if there is nothing to say.
-
-    :ivar refused: why nobody follows them.
-    :ivar limited: that they are limited, and why.
-    """
+    """What to say of set-points for all: why nobody follows them, or that they are limited."""
 
     refused: Report | None = None
     limited: Report | None = None
@@ -72,11 +69,7 @@ class SetpointAll:
         self._request = Request(math.nan, -math.inf)
 
     def request(self, value: float) -> None:
-        """
-        Ask for a set-point, from any thread.
-
-        :raises ValueError: not finite.
-        """
+        """Ask for a set-point, from any thread; a :class:`ValueError` if it is not finite."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
         self._request = Request(value, time.monotonic())
@@ -136,6 +129,18 @@ def _limited(request: Request, name: str) -> Report | None:
     if abs(request.value) <= request.most:
         return None
     limited = math.copysign(request.most, request.value)
-    return Report(
-        Cause.SHARED_SETPOINT_LIMITED, value=request.value, limited=limited, name=name
-    )
+    return Report(Cause.SHARED_SETPOINT_LIMITED, value=request.value, limited=limited, name=name)
+
+
+async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
+    """Release the motors of all drives of a line with a broadcast; nobody confirms it."""
+    everybody = bus.protocol.broadcast
+    assert everybody is not None, 'the protocol has a broadcast'
+    addressing = bus.protocol.addressing
+    for model in dict.fromkeys(models):
+        stop = model.profile.broadcast_stop
+        if stop is not None:
+            parameter = model[stop.key]
+            address = Address(*parameter.at(addressing).place)
+            data = parameter.encode(stop.value, addressing)
+            await bus.write(everybody, address, data, Priority.STOP)

@@ -71,6 +71,7 @@ _LONGEST_DRIVE_TIMEOUT = 25.0
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
 
+
 @dataclass(frozen=True)
 class DriveSettings:
     """
@@ -166,19 +167,12 @@ class DriveSettings:
             )
 
     def _require_known_method(self) -> None:
-        """
-        See to it that firmware of the chosen dialect has the control method.
-
-        :raises ValueError: it does not, and which it has.
-        """
         for profile in _profiles(self.model):
             method = profile.methods.get(self.method)
             dialect = profile.older.name if profile.older is not None else ''
             if dialect and dialect == self.classic_dialect and method and not method.older:
                 others = ' or '.join(name for name, one in profile.methods.items() if one.older)
-                raise ValueError(
-                    f'classic_dialect {dialect} has no {method.means}: use {others}'
-                )
+                raise ValueError(f'classic_dialect {dialect} has no {method.means}: use {others}')
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -11,41 +11,24 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """What a drive tells the outside: immutable pictures of one moment."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-import functools
+from datetime import datetime
 import math
+import time
 from typing import NamedTuple
 from typing import Protocol
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import StatusCode
 from nfo_sinus_driver.drive.events import Event
-from nfo_sinus_driver.drive.log_entry import LogEntry
 
 NAN = math.nan
-#: A frequency that was seen to fall, and has not risen since, counts as falling so long, s: the
-#: steps of a slow ramp come seldom.
-_FALLS_FOR = 2.0
-#: Of what has not happened: when it began, and when it was over.
-NEVER = (-math.inf, -math.inf)
-#: Stands for an inverter status that has not been read; no drive has it.
-NO_CODE = -1
-
-#: States in which the output stage drives the motor [M0 table 16].
-_DRIVEN = frozenset(
-    (State.OPERATION_ENABLED, State.STOPPING, State.QUICK_STOP, State.FAULT_REACTION_ACTIVE)
-)
 
 
 class Measured(NamedTuple):
@@ -60,184 +43,6 @@ class Measured(NamedTuple):
 
 
 NOT_MEASURED = Measured()
-
-
-@dataclass(frozen=True)
-class InverterStatus:
-    """
-    What the drive's status word and its inverter status say at one moment.
-
-    :ivar at: when the answer arrived, s of ``time.monotonic``; that of the word, if there is one.
-    :ivar word: the status word; ``None`` if the drive has none [C21].
-    :ivar code: the inverter status code, read without acknowledging.
-    :ivar code_at: when that arrived, likewise.
-    :ivar model: whose words these are.
-    :ivar by_mode: where neither word nor code says who controls: the control source, such as MODE,
-        says that the bus does.
-    :ivar by_mode_at: when it said so, likewise.
-    :ivar frequency: Hz, read with it where the family's status word tells no stop; NaN elsewhere,
-        and where the drive refuses to tell it.
-    :ivar fell: when the last two statuses in a row were between which the frequency fell; minus
-        infinity if it has not, or has risen since.
-    """
-
-    at: float
-    word: int | None
-    code: int
-    model: Family
-    by_mode: bool = False
-    by_mode_at: float = -math.inf
-    code_at: float = -math.inf
-    frequency: float = NAN
-    fell: tuple[float, float] = NEVER
-
-    @functools.cached_property
-    def listed(self) -> StatusCode:
-        """What the model's table says of the code."""
-        return self.model.status_code(self.code)
-
-    def means(self, *meanings: Meaning) -> bool:
-        """Tell whether the code means one of these."""
-        return not self.listed.meanings.isdisjoint(meanings)
-
-    @property
-    def shown_word(self) -> int:
-        """What is published of the status word; 0 if the drive has none."""
-        return (self.word or 0) & self.model.profile.status_word.shown
-
-    @functools.cached_property
-    def facts(self) -> Fact:
-        """What the drive says of itself; only those in :attr:`valid` count."""
-        if self.word is not None:
-            return self.model.profile.status_word.facts(self.word, self.listed.kind)
-        facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
-        if self._from_bus_by_code:
-            facts |= Fact.NETWORK_CONTROL
-        if self.kind is Kind.ALARM:
-            facts |= Fact.ALARM
-        return facts | Fact.FAULT if self.kind is Kind.FAULT else facts
-
-    @property
-    def valid(self) -> Fact:
-        """What the drive can say of itself at all."""
-        if self.word is not None:
-            return self.model.profile.status_word.valid
-        return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
-
-    @functools.cached_property
-    def kind(self) -> Kind:
-        """How grave the code is; the bits have the last word ([C50], [C95])."""
-        if self.word is None:
-            return self.listed.kind
-        return self.model.profile.status_word.kind(self.word, self.listed.kind)
-
-    @functools.cached_property
-    def state(self) -> State:
-        """The state of the generic state machine."""
-        if self.word is None:
-            return State.UNKNOWN
-        return self.model.profile.status_word.state(self.word)
-
-    @property
-    def faulted(self) -> bool:
-        """A fault is active, or waits for being acknowledged [M0 table 15]."""
-        return Fact.FAULT in self.facts
-
-    @property
-    def standby(self) -> bool:
-        """It waits for a command over the bus."""
-        return self.means(Meaning.BUS_STANDBY)
-
-    @property
-    def from_bus(self) -> bool:
-        """The bus has control."""
-        return self._from_bus_by_code or Fact.NETWORK_CONTROL in self.facts
-
-    @property
-    def runs(self) -> bool:
-        """The motor is driven and not on its way to a stop."""
-        if self.state is State.UNKNOWN:
-            return self._driven_by_code
-        return self.state is State.OPERATION_ENABLED
-
-    @property
-    def runs_by_bus(self) -> bool:
-        """The motor is driven on a command that came over the bus."""
-        return self.runs and self.from_bus
-
-    @property
-    def keeps_running(self) -> bool:
-        """It runs on a command from the bus, and may not be on its way to a stop."""
-        # without a status word nothing tells a stop from a lower reference
-        may_stop = self.word is None and self.means(Meaning.SLOWING)
-        falls = self.fell[1] >= self.at - _FALLS_FOR
-        slows = self.by_frequency and (self.frequency == 0 or falls)
-        return self.runs_by_bus and not may_stop and not slows
-
-    def keeps_running_since(self, told: float) -> bool:
-        """
-        Tell whether it keeps running, although it was told to stop.
-
-        :param told: when, s of ``time.monotonic``: a frequency that fell before says nothing.
-        """
-        if not self.by_frequency:
-            return self.keeps_running
-        stands = self.at > told and self.frequency == 0
-        return self.runs_by_bus and not stands and not self.fell[0] > told
-
-    @property
-    def by_frequency(self) -> bool:
-        """Its word goes on saying that the motor runs while that ramps to a stop."""
-        return self.model.profile.status_word.by_frequency
-
-    def signed(self, size: float) -> float:
-        """Return a measured frequency or speed with its sign, where the word has to tell that."""
-        tells_sign = self.model.profile.status_word.tells_sign
-        # standstill has no direction
-        return 0.0 - size if tells_sign and Fact.REVERSE in self.facts else size
-
-    @property
-    def tuning(self) -> bool:
-        """It measures the motor, which is energised then, whatever else the status says."""
-        return self.means(Meaning.TUNING)
-
-    @property
-    def plain(self) -> bool:
-        """
-        The motor stands or runs, without alarm or fault, and nothing is on its way.
-
-        As long as the status word stays as it is then, the code can only change to another that
-        makes nobody do anything: speeding up, at the reference, slowing down, the brake chopper,
-        standing by for keypad or terminals [M0 tables 15, 16 and 19].
-        """
-        if self.kind is not Kind.STATUS or self.means(Meaning.TUNING, Meaning.START_DELAY):
-            return False
-        # and both say the same
-        return self.driven == self.runs == self._driven_by_code
-
-    @property
-    def local(self) -> bool:
-        """The code says that keypad or terminals have control, and no word that the bus has."""
-        told = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
-        return told and not self.means(Meaning.ANONYMOUS) and not self.from_bus
-
-    @property
-    def driven(self) -> bool:
-        """The output stage drives the motor, be it only to a stop."""
-        if self.state is State.UNKNOWN or self.tuning:
-            return self.tuning or self._driven_by_code
-        stands = self.by_frequency and self.frequency == 0
-        return self.state in _DRIVEN and not stands
-
-    @property
-    def _from_bus_by_code(self) -> bool:
-        if self.means(Meaning.ANONYMOUS):
-            return self.by_mode
-        return self.means(Meaning.BUS_RUNNING, Meaning.BUS_STANDBY)
-
-    @property
-    def _driven_by_code(self) -> bool:
-        return self.means(Meaning.BUS_RUNNING, Meaning.LOCAL_RUNNING, Meaning.RUNNING)
 
 
 @dataclass(frozen=True)
@@ -281,11 +86,7 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Telemetry:
-    """
-    Measured values by their roles, NaN where the drive has none, and when the last one arrived.
-
-    :ivar at: s of ``time.monotonic``.
-    """
+    """Measured values by role, NaN where there is none; the last arrived at ``at``, s."""
 
     at: float
     values: dict[Role, float]
@@ -308,3 +109,56 @@ class Listener(Protocol):
 
     def on_event(self, event: Event) -> None:
         """Take what an operator should know."""
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """
+    One entry of the error log.
+
+    :ivar code: as the inverter status has it.
+    :ivar text: as on the display.
+    :ivar operating_time: the drive's operating time when it happened, h; NaN if it does not tell.
+    :ivar age: operating hours ago; NaN if the drive does not tell.
+    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
+        to come, or the drive is known to have had power ever since; else NaN.
+    :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
+    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
+    """
+
+    code: int
+    text: str
+    operating_time: float = math.nan
+    age: float = math.nan
+    at: float = math.nan
+    latest: float = math.nan
+    readings: tuple[str, ...] = ()
+
+    @property
+    def wall_time(self) -> str:
+        """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
+        if not math.isnan(self.at):
+            return _local(self.at)
+        latest = '' if math.isnan(self.latest) else _local(self.latest)
+        return f'{latest} or before' if latest else ''
+
+    @property
+    def full_text(self) -> str:
+        """The text, and what the drive has kept of that moment."""
+        return f'{self.text} ({", ".join(self.readings)})' if self.readings else self.text
+
+    def __str__(self) -> str:
+        if math.isnan(self.operating_time):
+            return f'{self.code} {self.full_text}'
+        age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
+        wall_time = f' ({self.wall_time})' if self.wall_time else ''
+        return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
+
+
+def _local(at: float) -> str:
+    try:
+        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
+    except (ValueError, OverflowError, OSError):
+        # no calendar goes back so far: the drive tells nonsense
+        return ''
+    return moment.isoformat(' ', 'minutes')

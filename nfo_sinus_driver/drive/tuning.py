@@ -21,23 +21,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
@@ -85,16 +83,9 @@ class Tuning:
     """Has one drive tune; used on the bus alone."""
 
     def __init__(
-        self,
-        bus: Bus,
-        inverter: DriveState,
-        registers: ParameterAccess,
-        parameters: Parameters,
-        procedures: Procedures,
+        self, inverter: DriveState, parameters: Parameters, procedures: Procedures
     ) -> None:
-        self._bus = bus
         self._inverter = inverter
-        self._registers = registers
         self._parameters = parameters
         self._procedures = procedures
 
@@ -115,7 +106,7 @@ class Tuning:
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
                 async with self._procedures.in_standby(access):
-                    self._inverter.tell(Severity.INFO, Report(Cause.TUNING_BEGINS, what=what))
+                    self._inverter.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
                     how = await self._outcome(what, access, progress)
                 result = Tuned(how.cause is Cause.TUNED, how, await changes())
@@ -125,13 +116,10 @@ class Tuning:
     async def _require_motor_plate(self, what: str) -> None:
         for role in _PLATE:
             key = self._inverter.model.key(role)
-            if not await self._registers.read_number(key, Priority.SERVICE) > 0:
-                raise DriveError(Report(Cause.TUNING_NEEDS, what=what, key=key))
+            if not await self._inverter.registers.read_number(key, Priority.SERVICE) > 0:
+                raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
-    async def _outcome(
-        self, what: str, access: ExclusiveAccess, progress: Progress
-    ) -> Report:
-        """Wait until the drive says how it ended."""
+    async def _outcome(self, what: str, access: ExclusiveAccess, progress: Progress) -> Report:
         inverter = self._inverter
         started = time.monotonic()
         begun = False
@@ -152,8 +140,8 @@ class Tuning:
                 return inverter.report(Cause.TUNING_STOPPED, what=what)
             elif begun:
                 return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
-            elif elapsed > confirmation.TIMEOUT:
+            elif elapsed > drive_state.TIMEOUT:
                 return inverter.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
             if elapsed > _LONGEST:
                 raise DriveError(inverter.report(Cause.TUNING_ENDLESS, what=what))
-            await self._bus.sleep(_LOOK_PERIOD)
+            await self._inverter.bus.sleep(_LOOK_PERIOD)

@@ -14,25 +14,25 @@
 
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import GatewaySilent
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NoPath
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import GatewaySilent
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NoPath
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.protocols import PROTOCOLS
 from nfo_sinus_driver.link.protocols import line_settings
 from nfo_sinus_driver.link.protocols import open_link
 from nfo_sinus_driver.link.reconnect import Reconnect
-from nfo_sinus_driver.link.settings import LineSettings
 
 __all__ = [
     'PROTOCOLS',

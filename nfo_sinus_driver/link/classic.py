@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-Messages of the Classic protocol of NFO, without I/O [M0 §6.1.3], [M2 §5].
+Messages of the Classic protocol of NFO, without I/O, and why one refuses [M0 §6.1], [M2 §5].
 
 :func:`encode` makes a message; a :class:`Reader` finds messages in whatever bytes come in, in any
 pieces, among noise and the remains of others. Hexadecimal digits are sent in upper case and read
@@ -26,6 +25,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from functools import reduce
 from operator import xor
+
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import Refused
 
 #: The address at which a drive answers whatever its own is; for a drive alone on the line.
 POINT_TO_POINT = 0
@@ -114,11 +116,7 @@ def answers(message: Message, request: Request) -> bool:
 
 @lru_cache(PREPARED)
 def encode(message: Message) -> bytes:
-    """
-    Return the bytes of a message.
-
-    :raises ValueError: an address, a parameter or a value that the protocol cannot express.
-    """
+    """Return the bytes of a message; a ValueError if the protocol cannot express it."""
     if not 0 <= message.unit <= BROADCAST:
         raise ValueError(f'address {message.unit}: Classic has 0 to {BROADCAST}')
     address = bytes((_FIRST_ADDRESS + message.unit,))
@@ -233,3 +231,68 @@ def _decode(frame: bytearray) -> Message | None:
         return None
     number, word = int(body[1:5], 16), int(body[6:10], 16)
     return Select(unit, number, word) if is_request else Value(unit, number, word)
+
+
+#: The parameters that the protocol itself needs; both firmwares have them.
+INV_ST = 0x00E9  #: inverter status, without acknowledging
+SIO_ERR = 0x00AC  #: serial fault flags; reading clears them and the serial fault
+MODE = 0x0029  #: who controls the drive
+
+#: The inverter status of a serial fault [M0 table 19].
+SIO_FAIL = 14
+#: The inverter status codes that are faults; the rest are what the drive does.
+_FAULTS = range(1, 24)
+
+_VALUE_BIT = 10
+#: Prefix, unknown, unreadable, not to be written.
+_ADDRESS_BITS = (5, 7, 8, 9)
+#: SioErr, bit by bit [M2 table 4].
+FLAGS = {
+    0: 'the inverter is blocked by an alarm',
+    1: 'wrong parity',
+    2: 'wrong check sum',
+    3: 'wrong message structure',
+    4: 'time-out of the serial communication',
+    5: 'wrong parameter prefix',
+    6: 'not permitted in the current mode',
+    7: 'unknown parameter',
+    8: 'the parameter cannot be read',
+    9: 'the parameter cannot be written',
+    10: 'the value is out of range',
+    14: 'receive buffer overrun',
+}
+
+
+def flag_names(word: int) -> list[str]:
+    """Return what the serial fault flags say, in words."""
+    bits = (bit for bit in range(16) if word >> bit & 1)
+    return [FLAGS.get(bit, f'flag {bit}') for bit in bits]
+
+
+def refused_by_status(inv_st: int) -> Refused:
+    """Return what the inverter status says of a NAK, where the flags are not read."""
+    if inv_st == SIO_FAIL:
+        text = 'a serial fault (Sio Fail) is active: until it is acknowledged nothing can be done'
+        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
+    if inv_st in _FAULTS:
+        text = f'a fault is active (InvSt {inv_st}): until it is acknowledged nothing can be done'
+        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
+    text = 'the drive does not accept this value, or not in its present state'
+    return Refused(Refused.ILLEGAL_VALUE, f'{text} (NAK, InvSt {inv_st})')
+
+
+def refused_by_flags(word: int) -> Refused:
+    """Return what the serial fault flags say of the NAK that raised them; they are clear now."""
+    code = Refused.DEVICE_FAILURE
+    if word >> _VALUE_BIT & 1:
+        code = Refused.ILLEGAL_VALUE
+    elif any(word >> bit & 1 for bit in _ADDRESS_BITS):
+        code = Refused.ILLEGAL_ADDRESS
+    why = ', '.join(flag_names(word)) or 'it does not say why'
+    text = f'the drive refused: {why}; its serial fault (Sio Fail) by this is cleared (NAK)'
+    return Refused(code, text)
+
+
+def refused_unknown(error: LinkError) -> Refused:
+    """Return what to say of a NAK whose reason could not be found out."""
+    return Refused(Refused.DEVICE_FAILURE, f'the drive refused (NAK); why is not known: {error}')

@@ -23,8 +23,11 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import classic_refusal
 from nfo_sinus_driver.link.classic import BROADCAST
+from nfo_sinus_driver.link.classic import INV_ST
+from nfo_sinus_driver.link.classic import MODE
+from nfo_sinus_driver.link.classic import SIO_ERR
+from nfo_sinus_driver.link.classic import SIO_FAIL
 from nfo_sinus_driver.link.classic import Enquiry
 from nfo_sinus_driver.link.classic import Kind
 from nfo_sinus_driver.link.classic import Message
@@ -33,23 +36,19 @@ from nfo_sinus_driver.link.classic import Request
 from nfo_sinus_driver.link.classic import Select
 from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
-from nfo_sinus_driver.link.classic_refusal import INV_ST
-from nfo_sinus_driver.link.classic_refusal import MODE
-from nfo_sinus_driver.link.classic_refusal import SIO_ERR
-from nfo_sinus_driver.link.classic_refusal import SIO_FAIL
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NothingToAsk
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.settings import LineSettings
 
 #: What a message carries.
 _WORD = struct.Struct('>H')
@@ -182,16 +181,12 @@ class ClassicLink:
         (word,) = _WORD.unpack(data)
         return Reply(b'', self._select(Select(unit, address.index, word)))
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter, then read another; in as many transactions as that takes."""
         self.write(unit, address, data)
         return self.read(unit, source)
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
@@ -276,12 +271,12 @@ class ClassicLink:
         try:
             inv_st, _ = self._enquire(unit, INV_ST)
             if inv_st != SIO_FAIL or not ours:
-                return classic_refusal.by_status(inv_st)
-            return classic_refusal.by_flags(self._enquire(unit, SIO_ERR)[0])
+                return classic.refused_by_status(inv_st)
+            return classic.refused_by_flags(self._enquire(unit, SIO_ERR)[0])
         except PortError:
             raise
         except LinkError as error:
-            return classic_refusal.unknown(error)
+            return classic.refused_unknown(error)
 
     def _settle(self, unit: int) -> None:
         """Read something, so that the next answer is believed again; if not, then not."""

@@ -11,18 +11,19 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The one interface of every link: read or write one parameter of one unit."""
+"""The one interface of every link: how it is set, what it does, and what can go wrong on it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import functools
+import re
 from typing import NamedTuple
 from typing import Protocol
 
-from nfo_sinus_driver.link.settings import BAUD_RATES
-
+BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
+_FORMAT = re.compile(r'([78])([EON])([12])')
 #: Most protocols are for drives that leave the factory set to another one [C93].
 _CHECK = (
     'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc for '
@@ -152,9 +153,7 @@ class LineProtocol:
         """
         if address not in self.units:
             name = self.addressing.title()
-            raise ValueError(
-                f'address {address}: {name} has {self.units[0]} to {self.units[-1]}'
-            )
+            raise ValueError(f'address {address}: {name} has {self.units[0]} to {self.units[-1]}')
 
     def require_baud_rate(self, baud_rate: int) -> None:
         """
@@ -191,11 +190,7 @@ class Link(Protocol):
     protocol: LineProtocol
 
     def open(self) -> None:
-        """
-        Open the port.
-
-        :raises PortError: it cannot be opened; the message says what to do.
-        """
+        """Open the port (PortError: it cannot be opened; the message says what to do)."""
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -211,15 +206,9 @@ class Link(Protocol):
         """
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """
-        Write one parameter.
+        """Write one parameter (LinkError: as its subclasses say)."""
 
-        :raises LinkError: as its subclasses say.
-        """
-
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """
         Write one parameter and read another, in one transaction.
 
@@ -228,9 +217,7 @@ class Link(Protocol):
         :raises LinkError: as its subclasses say.
         """
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
@@ -251,3 +238,152 @@ class Link(Protocol):
 
         After a doubtful answer one of them tells whether the line can be believed again.
         """
+
+
+class LinkError(Exception):
+    """
+    A transaction failed.
+
+    :ivar maybe_done: the drive may have carried the request out. False only where it cannot have.
+    """
+
+    maybe_done = False
+    #: The unit answered a question before, for the sake of this one: it is there.
+    heard = False
+
+
+class PortError(LinkError):
+    """The port cannot be opened or was lost; the message says what to do."""
+
+
+class NoAnswer(LinkError):
+    """Nobody answered in time."""
+
+    maybe_done = True
+
+
+class GatewaySilent(NoAnswer):
+    """The gateway itself said nothing in time, not even that the drive is silent."""
+
+
+class NoPath(LinkError):
+    """A gateway does not know where the drive is; the message says what to do."""
+
+
+class DamagedAnswer(LinkError):
+    """Something came, but no answer to this request: noise, a collision or wrong line settings."""
+
+    maybe_done = True
+
+
+class NeverSilent(DamagedAnswer):
+    """Somebody talks all the time, so nothing was sent."""
+
+    maybe_done = False
+
+
+class Refused(LinkError):
+    """
+    The drive answered that it will not.
+
+    :ivar code: the Modbus exception code, or on other protocols the one that means the same.
+    """
+
+    ILLEGAL_FUNCTION = 1
+    ILLEGAL_ADDRESS = 2
+    ILLEGAL_VALUE = 3
+    DEVICE_FAILURE = 4
+    BUSY = 6
+    NO_PATH = 10
+    NO_ANSWER = 11
+
+    def __init__(self, code: int, reason: str = '') -> None:
+        self.code = code
+        #: What a person may look up, to stand behind a sentence.
+        self.behind = f': {reason}' if reason else f' (exception {code})'
+        text = _REFUSALS.get(code, 'the drive refused')
+        super().__init__(reason or f'{text} (exception {code})')
+
+
+_REFUSALS = {
+    Refused.ILLEGAL_FUNCTION: 'the drive does not know this function',
+    Refused.ILLEGAL_ADDRESS: 'the drive has no such parameter',
+    Refused.ILLEGAL_VALUE: 'the drive does not accept this value',
+    Refused.DEVICE_FAILURE: 'the drive cannot do this in its present state',
+    5: 'the drive needs more time',
+    Refused.BUSY: 'the drive is busy',
+    8: 'the drive found a memory error',
+    Refused.NO_PATH: 'the gateway has no path to the drive',
+    Refused.NO_ANSWER: 'the gateway got no answer from the drive',
+}
+
+
+class NotReady(LinkError):
+    """
+    This unit must be left alone for a while, lest a late answer be taken for the right one.
+
+    Nothing was sent.
+
+    :ivar until: when it may be asked again, in seconds of ``time.monotonic``.
+    """
+
+    def __init__(self, until: float) -> None:
+        self.until = until
+        super().__init__('answers to earlier requests may still be on their way')
+
+
+@dataclass(frozen=True)
+class LineSettings:
+    """
+    How a serial line is set.
+
+    :ivar baud_rate: bit/s, one of :data:`BAUD_RATES`; 19200 is the drive's default for Modbus
+        [M0 §6.2.2].
+    :ivar char_format: data bits, parity and stop bits, such as ``8E1``.
+    :ivar response_timeout: from the last byte sent to the first byte of the answer, s.
+    :ivar rs485: let the port itself switch the transmitter, where it can.
+    :raises ValueError: a setting that no drive has; the message says which there are.
+    """
+
+    baud_rate: int = 19200
+    char_format: str = '8E1'
+    response_timeout: float = 0.2
+    rs485: bool = False
+
+    def __post_init__(self) -> None:
+        if self.baud_rate not in BAUD_RATES:
+            rates = ', '.join(str(rate) for rate in BAUD_RATES)
+            raise ValueError(f'baud_rate {self.baud_rate}: the drive knows {rates}')
+        if not _FORMAT.fullmatch(self.char_format):
+            raise ValueError(
+                f'char_format {self.char_format!r}: write data bits, parity and stop bits, '
+                'such as 8E1, 8O1 or 8N2'
+            )
+        if not 0.01 <= self.response_timeout <= 10:
+            raise ValueError(f'response_timeout {self.response_timeout}: 0.01 to 10 s')
+
+    @property
+    def data_bits(self) -> int:
+        """7 or 8."""
+        return int(self.char_format[0])
+
+    @property
+    def parity(self) -> str:
+        """``E``, ``O`` or ``N``."""
+        return self.char_format[1]
+
+    @property
+    def stop_bits(self) -> int:
+        """1 or 2."""
+        return int(self.char_format[2])
+
+    @functools.cached_property
+    def char_time(self) -> float:
+        """The time of one character on the wire, s."""
+        bits = 1 + self.data_bits + (self.parity != 'N') + self.stop_bits
+        return bits / self.baud_rate
+
+    @property
+    def frame_gap(self) -> float:
+        """The silence between two Modbus RTU frames, t3.5, s; fixed above 19200 bit/s."""
+        return 0.00175 if self.baud_rate > 19200 else 3.5 * 11 / self.baud_rate

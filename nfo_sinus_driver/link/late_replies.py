@@ -28,7 +28,7 @@ from typing import Generic
 from typing import Protocol
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import NotReady
+from nfo_sinus_driver.link.interface import NotReady
 
 #: How late a reply may come, in time-outs, before it counts as lost for good.
 LATEST_REPLY = 4

@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-Modbus ASCII frames of a master, without I/O.
+Modbus ASCII of a master: frames, without I/O, and the link over one serial line.
 
 A frame is ``:``, the message and its check sum in hexadecimal characters, carriage return and line
 feed (MODBUS over Serial Line V1.02 §2.5.2). Upper case is sent, both are read. A colon always
@@ -25,11 +24,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 import functools
 import re
+from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.answer_reader import AnswerReader
+from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How long a pause between two characters of a frame may last, s.
 INTER_BYTE_TIMEOUT = 1.0
@@ -60,11 +63,7 @@ def length(message_length: int) -> int:
 
 
 class AsciiReader(AnswerReader[_T]):
-    """
-    Finds an answer in ASCII frames.
-
-    :param inter_byte_timeout: how long a frame that has begun may pause, s.
-    """
+    """Finds an answer in ASCII frames; one that has begun may pause so long, s."""
 
     def __init__(
         self, request: Request[_T], inter_byte_timeout: float = INTER_BYTE_TIMEOUT
@@ -105,3 +104,41 @@ class AsciiReader(AnswerReader[_T]):
         digits = begun[1].upper()
         fits = any(digits.startswith(head[: len(digits)]) for head in self._heads)
         return begun if fits else None
+
+
+#: Frames need no silence between them, but transmitters take a moment to switch, characters.
+_SWITCHING = 2
+
+
+class AsciiLink(SerialLink):
+    """
+    A Modbus ASCII master.
+
+    The standard allows a pause of a second between two characters. An answer whose end was lost
+    would leave the line unused for that, so no pause may be longer than it may take to begin one.
+    """
+
+    protocol = LineProtocol(
+        name='modbus_ascii',
+        addressing='modbus',
+        units=UNITS,
+        baud_rate=19200,
+        char_format='7E1',
+        char_formats=('7E1', '7O1', '7N2', '7N1', '7E2', '7O2'),
+        identifies=True,
+        writes_and_reads=True,
+    )
+
+    @property
+    def _gap(self) -> float:
+        return _SWITCHING * self._settings.char_time
+
+    def _encode(self, request: Request[Any]) -> bytes:
+        return encode(request)
+
+    def _reader(self, request: Request[_T]) -> AsciiReader[_T]:
+        timeout = min(INTER_BYTE_TIMEOUT, self._settings.response_timeout)
+        return AsciiReader(request, timeout)
+
+    def _frame_length(self, message_length: int) -> int:
+        return length(message_length)

@@ -11,20 +11,23 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""What every Modbus link does: turn what is asked for into requests."""
+"""What every Modbus link does: ask for what is wanted, and who a unit says it is [M0 §6.2.4]."""
 
 from __future__ import annotations
 
 from abc import ABC
 from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+import re
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import read_of
@@ -53,15 +56,11 @@ class ModbusLink(ABC):
         """Write one parameter (function 06 for one register, 16 for several)."""
         return Reply(*self._ask(Write(unit, address.index, data)))
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter and read another, in one transaction (function 23)."""
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
@@ -84,8 +83,175 @@ class ModbusLink(ABC):
 
     @abstractmethod
     def _ask_unheard(self, request: Request[object]) -> None:
-        """
-        Send a request at once and wait for its answer, whatever that is and says.
+        """Send a request at once and wait for its answer, whatever that is and says."""
 
-        :raises LinkError: it was not sent.
-        """
+
+REPORT_SLAVE_ID = 17
+ENCAPSULATED_INTERFACE = 43
+#: The MEI type of Read Device Identification.
+_DEVICE_IDENTIFICATION = 14
+
+#: Read device ID codes: the first three objects, all that are standard, one by its number.
+BASIC, REGULAR, SPECIFIC = 1, 2, 4
+
+#: The longest message there is.
+_LONGEST = 254
+#: Where the objects begin in an answer: behind unit, function, MEI type, code, conformity level,
+#: more follows, next object and number of objects.
+_OBJECTS_AT = 8
+_MORE_FOLLOWS = {0x00: False, 0xFF: True}
+
+#: What the objects with these numbers say.
+_FIELDS = ('vendor', 'product_code', 'revision', 'url', 'product', 'model', 'application')
+_TEXT = re.compile(rb'[ -~]+')
+
+
+@dataclass(frozen=True)
+class DeviceObjects:
+    """An answer of function 43/14: contents by number, and where to go on, if there is more."""
+
+    objects: tuple[tuple[int, bytes], ...]
+    next_object: int | None = None
+
+
+@dataclass(frozen=True)
+class ReadDevice:
+    """Read what a unit says about itself, from an object on; the G2 has the three codes above."""
+
+    unit: int
+    code: int = REGULAR
+    first: int = 0
+
+    function = ENCAPSULATED_INTERFACE
+    answer_length = _LONGEST
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        return bytes((_DEVICE_IDENTIFICATION, self.code, self.first))
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function, _DEVICE_IDENTIFICATION, self.code))
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of an answer that begins like this; the least there can be."""
+        at = _OBJECTS_AT
+        if len(beginning) >= at:
+            for _ in range(beginning[at - 1]):
+                # number, length, content; of what has not come, number and length at least
+                at += 2 + (beginning[at + 1] if len(beginning) > at + 1 else 0)
+        return at
+
+    def decode(self, message: bytes) -> DeviceObjects | None:
+        """Return what a whole message says; ``None`` if it is no answer after all."""
+        more = _MORE_FOLLOWS.get(message[5])
+        objects = []
+        at = _OBJECTS_AT
+        for _ in range(message[at - 1]):
+            end = at + 2 + message[at + 1]
+            objects.append((message[at], message[at + 2 : end]))
+            at = end
+        if more is None:
+            return None
+        if self.code == SPECIFIC and [number for number, _ in objects] != [self.first]:
+            return None
+        return DeviceObjects(tuple(objects), message[6] if more else None)
+
+
+@dataclass(frozen=True)
+class ReportSlaveId:
+    """Read what a unit reports of itself, whatever that is (function 17)."""
+
+    unit: int
+
+    function = REPORT_SLAVE_ID
+    answer_length = _LONGEST
+    body = b''
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function))
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of an answer that begins like this; the least there can be."""
+        return 3 + (beginning[2] if len(beginning) > 2 else 0)
+
+    def decode(self, message: bytes) -> bytes:
+        """Return the data, without their count."""
+        return message[3:]
+
+
+def text(data: bytes) -> str:
+    """Return what is printable ASCII, for nothing else may come into a log."""
+    return ' '.join(part.decode('ascii').strip() for part in _TEXT.findall(data)).strip()
+
+
+def revision(data: bytes) -> str:
+    """Return a revision such as ``4.30 / 4018``, however it is padded [C45]."""
+    parts = (part.strip() for part in text(data).split('/'))
+    return ' / '.join(part for part in parts if part)
+
+
+def serial_number(report: bytes) -> str:
+    """
+    Return the serial number in the answer of function 17.
+
+    A G2 reports 16 characters and nothing else; the standard has an id, a run indicator (00 or
+    FF) and whatever the maker adds, so the longest text is taken [C94].
+    """
+    return max((part.strip() for part in _TEXT.findall(report)), key=len, default=b'').decode()
+
+
+class ModbusInquiry:
+    """
+    The questions by which a unit tells who it is.
+
+    All objects that fit into one answer are asked for at once, then the serial number. A question
+    that is refused or not answered is never asked again: many devices do not know it [C57].
+
+    :param ask: sends a request; returns its answer and when that came.
+    """
+
+    def __init__(self, unit: int, ask: Callable[[Request[object]], tuple[object, float]]):
+        self._unit = unit
+        self._ask = ask
+        self._questions: list[Request[object]] = [ReadDevice(unit), ReportSlaveId(unit)]
+        self._told: dict[str, str] = {}
+
+    @property
+    def done(self) -> bool:
+        """There is nothing left to ask."""
+        return not self._questions
+
+    @property
+    def found(self) -> Identification:
+        """What it has told so far."""
+        return Identification(**self._told)
+
+    def ask(self) -> Reply:
+        """Ask the next question: one transaction (LinkError: as its subclasses say)."""
+        question = self._questions.pop(0)
+        try:
+            answer, arrived = self._ask(question)
+        except NotReady:
+            self._questions.insert(0, question)
+            raise
+        if isinstance(answer, DeviceObjects):
+            assert isinstance(question, ReadDevice)
+            self._take(answer)
+            following = answer.next_object
+            # only forward, lest a unit that always has more is asked for ever
+            if following is not None and question.first < following < len(_FIELDS):
+                self._questions.insert(0, ReadDevice(self._unit, REGULAR, following))
+        elif isinstance(answer, bytes):
+            self._told['serial'] = serial_number(answer)
+        return Reply(b'', arrived)
+
+    def _take(self, answer: DeviceObjects) -> None:
+        for number, content in answer.objects:
+            if number < len(_FIELDS):
+                name = _FIELDS[number]
+                self._told[name] = revision(content) if name == 'revision' else text(content)

@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-What a Modbus master asks and is answered, however it is packed [M0 §6.2.3].
+What a Modbus master asks and is answered, and how that is found among bytes [M0 §6.2.3].
 
 A *message* is unit, function and data: what RTU, ASCII and TCP have in common. Each of them packs
 it into frames of its own.
@@ -21,14 +20,18 @@ it into frames of its own.
 
 from __future__ import annotations
 
+from abc import ABC
+from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 import functools
 import struct
+from typing import Generic
 from typing import Protocol
 from typing import TypeVar
 
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Refused
 
 READ_HOLDING_REGISTERS = 3
 WRITE_SINGLE_REGISTER = 6
@@ -213,10 +216,8 @@ def refusal_head(request: Request[object]) -> bytes:
 
 def understand(request: Request[_T], message: bytes) -> _T | None:
     """
-    Return what a whole message says as the answer to a request.
+    Return what a whole message says as the answer to a request; ``None``: to something else.
 
-    :returns: the bytes read, ``b''`` for a write done, or what else the request's ``decode`` makes
-        of it; ``None`` if it is the answer to something else.
     :raises Refused: the unit answered with an exception.
     """
     if len(message) == REFUSAL_LENGTH and message.startswith(refusal_head(request)):
@@ -226,3 +227,71 @@ def understand(request: Request[_T], message: bytes) -> _T | None:
     if not request.measure(message) == len(message) <= request.answer_length:
         return None
     return request.decode(message)
+
+
+class AnswerReader(ABC, Generic[_T]):
+    """
+    Finds the answer to one request in the bytes that come in.
+
+    An answer counts only when unit, function, length and check sum are right, and for a write
+    register and value too. Everything else is passed over: it can be noise, or the answer of
+    somebody else. A read answer does not name its register, so the caller has to make sure that
+    no answer to an earlier request of the same shape can still come.
+
+    :ivar frame: the bytes of the answer or refusal found last.
+    :ivar passed_over: what came before it.
+    """
+
+    def __init__(self, request: Request[_T]) -> None:
+        self._request = request
+        self._buffer = b''
+        self.frame = b''
+        self.passed_over = b''
+
+    @property
+    def received(self) -> int:
+        """How many bytes have come since, or at all."""
+        return len(self._buffer)
+
+    @property
+    def other(self) -> bytes:
+        """All that came and is no answer."""
+        return self.passed_over + self._buffer
+
+    @property
+    @abstractmethod
+    def bytes_needed(self) -> int:
+        """How many bytes have to come yet, at least, as far as those that came tell."""
+
+    @property
+    @abstractmethod
+    def inter_byte_timeout(self) -> float:
+        """How long a pause may last before the next byte comes, s."""
+
+    def feed(self, data: bytes) -> _T | None:
+        """
+        Take bytes that came in; return what the request's ``decode`` makes of its answer, if any.
+
+        :raises Refused: the unit answered with an exception; feeding may go on after it.
+        """
+        self._buffer += data
+        for start, end, message in self._messages():
+            try:
+                answer = understand(self._request, message)
+            except Refused:
+                self._take(start, end)
+                raise
+            if answer is not None:
+                self._take(start, end)
+                return answer
+        return None
+
+    @abstractmethod
+    def _messages(self) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the messages of the frames that may be answers; where each begins and ends."""
+
+    def _take(self, start: int, end: int) -> None:
+        # a refusal found before was not believed
+        self.passed_over += self.frame + self._buffer[:start]
+        self.frame = self._buffer[start:end]
+        self._buffer = self._buffer[end:]

@@ -23,15 +23,15 @@ import time
 
 from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import movitrac_refusal
-from nfo_sinus_driver.link.echo import Echo
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NeverSilent
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NothingToAsk
+from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.movitrac import Answer
@@ -44,7 +44,7 @@ from nfo_sinus_driver.link.movitrac import Request
 from nfo_sinus_driver.link.movitrac import Select
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.serial_link import Echo
 from nfo_sinus_driver.link.silence import NEVER_SILENT
 from nfo_sinus_driver.link.silence import await_silence
 
@@ -177,16 +177,12 @@ class MovitracLink:
             raise movitrac_refusal.refusal(answer.code)
         return Reply(b'', arrived)
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter, then read another; in as many transactions as that takes."""
         self.write(unit, address, data)
         return self.read(unit, source)
 
-    def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes
-    ) -> Reply:
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
         Read a parameter whose value nobody needs, then write another; nothing is sent between.
 
@@ -266,11 +262,7 @@ class MovitracLink:
         )
 
     def _listen(self, request: Request, until: float) -> None:
-        """
-        Wait as long as the right answer may take, if this was none.
-
-        :raises DamagedAnswer: it came.
-        """
+        """Wait as long as the right answer may take, if this was none (DamagedAnswer: it came)."""
         while (now := time.monotonic()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
@@ -332,9 +324,7 @@ class MovitracLink:
         self._heard_unasked(reader.rest)
         return answer, arrived
 
-    def _receive(
-        self, request: Request, reader: Reader, due: float
-    ) -> tuple[Answer, float]:
+    def _receive(self, request: Request, reader: Reader, due: float) -> tuple[Answer, float]:
         """
         Return the answer, and when it came.
 

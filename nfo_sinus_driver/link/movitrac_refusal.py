@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 
 
 class ReturnCode(NamedTuple):

@@ -18,19 +18,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nfo_sinus_driver.link.ascii_link import AsciiLink
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.modbus_ascii import AsciiLink
+from nfo_sinus_driver.link.modbus_tcp import TcpLink
 from nfo_sinus_driver.link.movitrac_link import MovitracLink
-from nfo_sinus_driver.link.rtu_link import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
-from nfo_sinus_driver.link.tcp_link import TcpLink
+from nfo_sinus_driver.link.rtu import RtuLink
 
 #: A new protocol is a file of this folder, and its link stands here.
 _LINKS = {
-    link.protocol.name: link
-    for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
+    link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
 }
 #: What the driver's ``protocol`` parameter takes, and what each is.
 PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}

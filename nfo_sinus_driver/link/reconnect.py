@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import logging
 
-from nfo_sinus_driver.link.errors import PortError
 from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.interface import PortError
 
 _log = logging.getLogger(__name__)
 
@@ -40,12 +40,7 @@ class Reconnect:
         self.reopen_at = 0.0
 
     def open(self, reopen_at: float) -> bool:
-        """
-        Try to open the link.
-
-        :param reopen_at: when to try again if it cannot be opened.
-        :returns: whether it is open.
-        """
+        """Try to open the link; if that fails, again at ``reopen_at``. Tells whether it is open."""
         try:
             self._link.open()
         except PortError as error:

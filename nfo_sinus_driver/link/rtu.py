@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-Modbus RTU frames of a master, without I/O [M0 §6.2.3].
+Modbus RTU of a master: frames, without I/O [M0 §6.2.3], and the link over one serial line.
 
 :func:`encode` makes a request; an :class:`RtuReader` finds its answer in whatever bytes come in,
 in any pieces, among noise and the answers to other requests.
@@ -23,11 +22,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import functools
+from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.answer_reader import AnswerReader
+from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How many bytes the check sum has.
 CRC_LENGTH = 2
@@ -90,3 +93,31 @@ def _crc_entry(byte: int) -> int:
 
 
 _CRC_TABLE = tuple(_crc_entry(byte) for byte in range(256))
+
+
+class RtuLink(SerialLink):
+    """A Modbus RTU master; between frames the line is silent for t3.5."""
+
+    protocol = LineProtocol(
+        name='modbus_rtu',
+        addressing='modbus',
+        units=UNITS,
+        baud_rate=19200,
+        char_format='8E1',
+        char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
+        identifies=True,
+        writes_and_reads=True,
+    )
+
+    @property
+    def _gap(self) -> float:
+        return self._settings.frame_gap
+
+    def _encode(self, request: Request[Any]) -> bytes:
+        return encode(request)
+
+    def _reader(self, request: Request[_T]) -> RtuReader[_T]:
+        return RtuReader(request)
+
+    def _frame_length(self, message_length: int) -> int:
+        return message_length + CRC_LENGTH

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """Modbus over one serial line: exact time, and no belief in a doubtful answer."""
 
 from __future__ import annotations
@@ -24,29 +23,30 @@ import time
 from typing import Any
 from typing import TypeVar
 
-from nfo_sinus_driver.link.answer_reader import AnswerReader
-from nfo_sinus_driver.link.echo import Echo
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NeverSilent
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import Doubt
 from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.modbus_link import SPECIFIC
 from nfo_sinus_driver.link.modbus_link import ModbusLink
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.modbus_pdu import refusal_head
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.resync_reads import answer_kinds
-from nfo_sinus_driver.link.resync_reads import resync_reads
-from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.link.silence import NEVER_SILENT
 from nfo_sinus_driver.link.silence import await_silence
 
@@ -116,9 +116,7 @@ class SerialLink(ModbusLink):
         """Name parameters of different sizes that are safe to read at any time."""
         self._resync_addresses[unit] = tuple(addresses)
 
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address
-    ) -> Reply:
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """
         Write one parameter and read another (function 23), or only write it.
 
@@ -181,12 +179,7 @@ class SerialLink(ModbusLink):
             self._late.expect(request, time.monotonic())
 
     def _make_certain(self, request: Request[Any]) -> bool:
-        """
-        Have the unit answer something else, if its answer to this could be confused with another.
-
-        :returns: whether it was asked, and answered.
-        :raises NotReady: that cannot be told from others either.
-        """
+        """Have the unit answer something else first, if needed; tells whether it was asked."""
         unit, now = request.unit, time.monotonic()
         if request.answer_head not in self._late.quarantined(unit, now):
             return False
@@ -213,11 +206,7 @@ class SerialLink(ModbusLink):
             self._transact(read)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
-        """
-        Make sure that the answer is not the one before, told twice.
-
-        :param names_it: the answer says itself what it is about.
-        """
+        """Make sure that the answer, if it ``names_it`` not itself, is not the one before again."""
         if self._late.repeated is None:
             return
         now = time.monotonic()
@@ -231,12 +220,7 @@ class SerialLink(ModbusLink):
             self._resync(request)
 
     def _resync(self, request: Request[Any]) -> None:
-        """
-        Have a unit answer something else: had another answer to the request come, it would show.
-
-        :raises DamagedAnswer: it did, or nothing that tells could be asked.
-        :raises NoAnswer: the unit does not answer.
-        """
+        """Have a unit answer something else: had another answer come, it would show."""
         stray = self._stray
         self._confirming = True
         try:
@@ -256,11 +240,7 @@ class SerialLink(ModbusLink):
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _listen(self, request: Request[Any]) -> None:
-        """
-        Wait as long as the right answer may take, if this was the one before, told twice.
-
-        :raises DamagedAnswer: it came.
-        """
+        """Wait as long as the right answer may take, if this was the one before, told twice."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
         while (now := time.monotonic()) < until:
@@ -390,3 +370,74 @@ def _feed(reader: AnswerReader[_T], data: bytes, refusals: list[Refused] | None)
                 raise
             refusals.append(refusal)
             data = b''
+
+
+class Echo:
+    """
+    Tells an echo of a request from its answer.
+
+    Who finds the request itself among the bytes that come sets ``present``; from then on every
+    request has to come back before anything else counts. That matters most where the answer is
+    the same as the request: function 06.
+
+    :ivar present: every request comes back.
+    :ivar before: what came between the request and its echo.
+    """
+
+    def __init__(self) -> None:
+        self.present = False
+        self.before = b''
+        self._awaited = b''
+        self._held = b''
+
+    def sent(self, frame: bytes) -> None:
+        """Expect a request to come back, if they do."""
+        self._awaited = frame if self.present else b''
+        self._held = self.before = b''
+
+    @property
+    def bytes_needed(self) -> int:
+        """How many bytes of the echo have to come yet."""
+        return max(0, len(self._awaited) - len(self._held))
+
+    def strip(self, data: bytes) -> bytes:
+        """Return what of the bytes that came is no echo, nor came before it."""
+        if not self._awaited:
+            return data
+        self._held += data
+        before, echo, rest = self._held.partition(self._awaited)
+        if echo:
+            self.before = before
+            self._awaited = self._held = b''
+        return rest
+
+    def give_up(self) -> bytes:
+        """Return what came instead of the echo."""
+        held, self._held, self._awaited = self._held, b'', b''
+        return held
+
+
+#: The object of function 43/14 whose text is empty, so its answer is the shortest [M0 §6.2.4].
+_PRODUCT_CODE = 1
+
+
+def answer_kinds(request: Request[Any]) -> tuple[bytes, bytes]:
+    """Return what tells the answer to a request from others, and what its refusal."""
+    return request.answer_head, refusal_head(request)
+
+
+def resync_reads(
+    unit: int, addresses: Sequence[Address]
+) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
+    """
+    Yield requests that do nothing, the quickest first, each with what has to tell its answer.
+
+    First the parameters that the drive is known to have. Then functions 17 and 43/14, which only
+    identify a drive [M0 §6.2.4]: one that does not have them [C57] refuses, and a refusal names
+    the function, so that tells as much.
+    """
+    for address in addresses:
+        read = read_of(unit, address)
+        yield read, (read.answer_head,)
+    for request in (ReportSlaveId(unit), ReadDevice(unit, SPECIFIC, _PRODUCT_CODE)):
+        yield request, answer_kinds(request)

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """A serial port as a raw descriptor: opened for us alone, set as asked, read without delay."""
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ import array
 import errno
 import fcntl
 import os
+from pathlib import Path
 import select
 import struct
 import termios
 import time
 
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.port_holders import holders
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import PortError
 
 # Linux ioctls that Python's termios module does not name
 _TIOCGSERIAL = 0x541E
@@ -83,11 +82,7 @@ class SerialPort:
             os.close(fd)
 
     def write(self, data: bytes) -> None:
-        """
-        Hand all bytes to the port.
-
-        :raises PortError: the port is gone.
-        """
+        """Hand all bytes to the port (PortError: the port is gone)."""
         fd = self._descriptor()
         deadline = time.monotonic() + 1.0
         try:
@@ -100,12 +95,7 @@ class SerialPort:
             raise self._lost(error) from error
 
     def read(self, until: float) -> bytes:
-        """
-        Return what has come; wait for the first byte until ``until`` (``time.monotonic``).
-
-        :returns: at least one byte, or none when the time is over.
-        :raises PortError: the port is gone.
-        """
+        """Return what has come, or nothing; wait for the first byte until a moment."""
         fd = self._descriptor()
         wait = max(0.0, until - time.monotonic())
         try:
@@ -180,8 +170,7 @@ def _open_device(path: str) -> int:
         whole = path.startswith('/')
         remedy = 'is the adapter plugged in?' if whole else f'should it be /dev/{path}?'
         raise PortError(
-            f'{path} does not exist: {remedy} '
-            f'Ports there are: {", ".join(_ports()) or "none"}'
+            f'{path} does not exist: {remedy} Ports there are: {", ".join(_ports()) or "none"}'
         ) from None
     except PermissionError:
         raise PortError(
@@ -237,3 +226,45 @@ def _switch_transmitter_by_port(fd: int) -> None:
     except OSError:
         # best effort: most adapters switch by themselves and do not know it
         return
+
+
+def holders(path: str) -> list[str]:
+    """Return the other processes that have a device open, ``name (pid 123)``, as far as visible."""
+    try:
+        device = os.stat(path).st_rdev
+    except OSError:
+        return []
+    found = []
+    for process in Path('/proc').iterdir():
+        other = process.name.isdigit() and int(process.name) != os.getpid()
+        if other and _has_open(process, device):
+            found.append(f'{_name(process)} (pid {process.name})')
+    return sorted(found)
+
+
+def _has_open(process: Path, device: int) -> bool:
+    try:
+        descriptors = list((process / 'fd').iterdir())
+    except OSError:
+        # ended meanwhile, or not ours to look into
+        return False
+    return any(_device(descriptor) == device for descriptor in descriptors)
+
+
+def _device(descriptor: Path) -> int | None:
+    try:
+        return descriptor.stat().st_rdev or None
+    except OSError:
+        return None
+
+
+def _name(process: Path) -> str:
+    """Return the command without its folder; of a script, the script and not its interpreter."""
+    try:
+        words = (process / 'cmdline').read_bytes().split(b'\0')
+    except OSError:
+        return 'a process'
+    names = [os.path.basename(word.decode(errors='replace')) for word in words if word]
+    if len(names) > 1 and names[0].startswith('python') and not names[1].startswith('-'):
+        return names[1]
+    return names[0] if names else 'a process'

@@ -27,7 +27,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive.broadcast import broadcast_stop
+from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -41,12 +41,7 @@ _Command = Callable[[ManagedDrive], Future[Report]]
 
 
 class AllDrives:
-    """
-    Offers ``~/stop_all``, ``~/enable_all`` and ``~/disable_all`` on the bus node.
-
-    Drives that are only monitored are left alone. The answer has a part for each of the others,
-    those that failed in front.
-    """
+    """Offers ``~/stop_all`` and its like on the bus node, for all drives but monitored ones."""
 
     def __init__(self, node: Node, context: BusContext) -> None:
         self._node = node

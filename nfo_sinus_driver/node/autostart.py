@@ -29,19 +29,15 @@ _LONGEST_REST = 4.0
 
 class Autostart:
     """
-    Tries to start one drive, on a thread that ends when the drive has started.
+    Tries, by ``attempt``, to start one drive, on a thread that ends when the drive has started.
 
     A try waits for the bus; so every drive has a thread, and all of them are looked for at once.
-
-    :param attempt: tries once; returns whether the drive has started.
     """
 
     def __init__(self, name: str, attempt: Callable[[], bool]) -> None:
         self._attempt = attempt
         self._over = threading.Event()
-        self._thread = threading.Thread(
-            target=self._work, name=f'autostart of {name}', daemon=True
-        )
+        self._thread = threading.Thread(target=self._work, name=f'autostart of {name}', daemon=True)
 
     def start(self) -> None:
         """Begin to try."""

@@ -34,11 +34,7 @@ _LONGEST_GATHERING = 0.1
 
 @dataclass
 class BusContext:
-    """
-    One bus and the drives on it.
-
-    :ivar retries: how often a request that nobody answered is repeated.
-    """
+    """One bus and the drives on it; a request without an answer is repeated ``retries`` times."""
 
     bus: Bus
     retries: int

@@ -41,12 +41,7 @@ NAME = 'nfo_sinus_bus'
 
 
 class BusNode(Node):
-    """
-    The node of one bus.
-
-    :param overrides: settings that overrule what was given to the node.
-    :raises ValueError: a setting makes no sense; the message says what would.
-    """
+    """The node of one bus; a ValueError says which settings make no sense."""
 
     def __init__(self, overrides: Sequence[Parameter] = ()) -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))

@@ -11,27 +11,45 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The services of one drive."""
+"""The services of one drive, those of its error log and kWh counter too."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import contextlib
+import math
+import queue
+import threading
 from typing import Any
 from typing import TypeVar
 
+from builtin_interfaces.msg import Time
+from nfo_sinus_msgs.action import Tune
+from nfo_sinus_msgs.srv import GetErrorLog
+from rclpy.action import ActionServer
+from rclpy.action import CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import CallbackGroup
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.node.bounded_group import BoundedCallbackGroup
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import inv_st
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
 
@@ -48,11 +66,7 @@ _T = TypeVar('_T')
 
 
 class Commands:
-    """
-    Takes commands for the drive of a node.
-
-    Each kind has a callback group of its own, so that none waits for another.
-    """
+    """Takes commands for the drive of a node, each kind in a callback group of its own."""
 
     def __init__(self, node: Node, managed: ManagedDrive) -> None:
         self._node = node
@@ -70,22 +84,16 @@ class Commands:
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(
-        self, name: str, command: Callable[[Drive], Future[Report]], timeout: float
-    ) -> None:
+    def offer(self, name: str, command: Callable[[Drive], Future[Report]], timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             return self._answer(response, lambda: command(self._managed.drive), timeout)
 
         group = MutuallyExclusiveCallbackGroup()
-        self._node.create_service(
-            Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
-        )
+        self._node.create_service(Trigger, name, answer, qos_profile=COMMANDS, callback_group=group)
 
-    def _answer(
-        self, response: Any, command: Callable[[], Future[Report]], timeout: float
-    ) -> Any:
+    def _answer(self, response: Any, command: Callable[[], Future[Report]], timeout: float) -> Any:
         return self.answer(response, command, timeout, self._managed.wording.say)
 
     def answer(
@@ -95,12 +103,7 @@ class Commands:
         timeout: float,
         describe: Callable[[_T], str],
     ) -> Any:
-        """
-        Give a command, and fill in the answer to who asked for it.
-
-        :param timeout: how long the command may take, s.
-        :param describe: makes a message of its result.
-        """
+        """Give a command that may take so long, s, and describe its result to who asked for it."""
         try:
             response.message = describe(command().result(timeout))
             response.success = True
@@ -114,11 +117,184 @@ class Commands:
             response.message = f'error in the driver: {error}'
         return response
 
-    def _on_enable(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if not request.data:
             return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
         return self._answer(
             response, lambda: self._managed.require_active().enable(), _LONGEST_COMMAND
         )
+
+
+class BoundedCallbackGroup(CallbackGroup):
+    """Lets a number of callbacks run at once; what comes then waits in its queue."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._most = most
+        self._running = 0
+        self._lock = threading.Lock()
+
+    def can_execute(self, entity: object) -> bool:
+        """Tell whether one more may run."""
+        return self._running < self._most
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Let one begin, if it may."""
+        with self._lock:
+            begins = self._running < self._most
+            self._running += begins
+            return begins
+
+    def ending_execution(self, entity: object) -> None:
+        """Take note that one has ended."""
+        with self._lock:
+            self._running -= 1
+
+
+#: A busy line has many other things to do, s.
+_LONGEST = 60.0
+
+
+class ErrorLogServices:
+    """Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``."""
+
+    def __init__(
+        self, node: Node, managed: ManagedDrive, commands: Commands, stamp: Callable[[float], Time]
+    ) -> None:
+        self._managed = managed
+        self._commands = commands
+        self._stamp = stamp
+        node.create_service(
+            GetErrorLog,
+            '~/get_error_log',
+            self._on_get,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        commands.offer('~/erase_error_log', Drive.erase_error_log, _LONGEST)
+        commands.offer('~/reset_energy', Drive.reset_energy, _LONGEST)
+
+    def _on_get(
+        self, request: GetErrorLog.Request, response: GetErrorLog.Response
+    ) -> GetErrorLog.Response:
+        def fill_in(entries: Sequence[LogEntry]) -> str:
+            response.entries = [
+                messages.error_log_entry(entry, self._stamp(entry.at)) for entry in entries
+            ]
+            return self._summary(entries)
+
+        return self._commands.answer(
+            response, lambda: self._managed.drive.error_log(request.max_entries), _LONGEST, fill_in
+        )
+
+    def _summary(self, entries: Sequence[LogEntry]) -> str:
+        undated = sum(math.isnan(entry.at) for entry in entries)
+        if not undated:
+            return f'{len(entries)} entries'
+        if all(math.isnan(entry.operating_time) for entry in entries):
+            return f'{len(entries)} entries; the drive does not tell when they came'
+        since = self._managed.drive.powered_since
+        return (
+            f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
+            f'since the driver has seen the drive with power, from operating hour {since:.1f} on'
+        )
+
+
+_SERVICES = {
+    '~/tune_full': Procedure.FULL,
+    '~/tune_basic': Procedure.BASIC,
+    '~/measure_rs': Procedure.STATOR_RESISTANCE,
+    '~/calculate_parameters': Procedure.CALCULATE,
+}
+#: By the codes of the action.
+_PROCEDURES = {
+    Tune.Goal.FULL: Procedure.FULL,
+    Tune.Goal.BASIC: Procedure.BASIC,
+    Tune.Goal.STATOR_RESISTANCE: Procedure.STATOR_RESISTANCE,
+    Tune.Goal.CALCULATE: Procedure.CALCULATE,
+}
+#: How often it is looked whether there is something new, s.
+_LOOK_PERIOD = 0.05
+
+
+class TuningServices:
+    """Offers ``~/tune_full`` and its like, and the action ``~/tune``."""
+
+    def __init__(self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]) -> None:
+        self._node = node
+        self._managed = managed
+        self._stamp = stamp
+        # reentrant, so that a second one is refused at once and a cancel need not wait
+        group = ReentrantCallbackGroup()
+        for name, procedure in _SERVICES.items():
+            node.create_service(Trigger, name, self._service_of(procedure), callback_group=group)
+        self._server = ActionServer(
+            node,
+            Tune,
+            '~/tune',
+            self._execute,
+            callback_group=group,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def _service_of(
+        self, procedure: Procedure
+    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            tuned = self._result(lambda: self._managed.require_active().tune(procedure).result())
+            response.success = tuned.success
+            response.message = self._managed.wording.say(tuned.report)
+            return response
+
+        return answer
+
+    def _result(self, tune: Callable[[], Tuned]) -> Tuned:
+        try:
+            return tune()
+        except DriveError as error:
+            return Tuned(False, error.report, ())
+        except NodeError as error:
+            return Tuned(False, Report(Cause.NOT_POSSIBLE, why=str(error)), ())
+        except Exception as error:
+            # an exception that leaves a callback would end the executor
+            self._node.get_logger().error(f'error in a tuning: {error!r}')
+            return Tuned(False, Report(Cause.DRIVER_ERROR, error=str(error)), ())
+
+    def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
+        tuned = self._result(lambda: self._followed(goal))
+        if tuned.success:
+            goal.succeed()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+        return Tune.Result(
+            success=tuned.success,
+            message=self._managed.wording.say(tuned.how),
+            changed=[str(change) for change in tuned.changes],
+        )
+
+    def _followed(self, goal: ServerGoalHandle) -> Tuned:
+        procedure = _PROCEDURES.get(goal.request.procedure)
+        if procedure is None:
+            raise NodeError(f'there is no procedure {goal.request.procedure}: 0 to 3')
+        drive = self._managed.require_active()
+        # the bus reports how far it is, and nobody may keep it waiting
+        reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
+        future = drive.tune(procedure, lambda *report: reports.put(report))
+        cancelling = False
+        while True:
+            ended = future.done()
+            while not reports.empty():
+                self._report(goal, *reports.get())
+            if ended:
+                return future.result()
+            if goal.is_cancel_requested and not cancelling:
+                cancelling = True
+                drive.cancel_tuning()
+            with contextlib.suppress(FutureTimeoutError):
+                future.exception(_LOOK_PERIOD)
+
+    def _report(self, goal: ServerGoalHandle, snapshot: Snapshot, elapsed: float) -> None:
+        stamp = self._stamp(snapshot.at)
+        status = inv_st(snapshot, stamp, self._node.get_parameter('frame_id').value)
+        goal.publish_feedback(Tune.Feedback(status=status, elapsed=elapsed))

@@ -65,11 +65,7 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
 def drive_status(
     name: str, managed: ManagedDrive, snapshot: Snapshot, verdict: tuple[bytes, str]
 ) -> DiagnosticStatus:
-    """
-    Return how one drive is doing.
-
-    :param verdict: as :func:`drive_verdict` has it.
-    """
+    """Return how one drive is doing (verdict: as :func:`drive_verdict` has it)."""
     drive = managed.drive
     identity, parameters = drive.identity, drive.parameters
     code = '' if snapshot.status is None else str(snapshot.status.code)

@@ -39,19 +39,19 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands
+from nfo_sinus_driver.node.commands import ErrorLogServices
+from nfo_sinus_driver.node.commands import TuningServices
 from nfo_sinus_driver.node.drive_parameters import DriveParameters
 from nfo_sinus_driver.node.drive_parameters import wanted_state
-from nfo_sinus_driver.node.error_log import ErrorLogServices
-from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import coerce
 from nfo_sinus_driver.node.settings import declare
-from nfo_sinus_driver.node.tuning import TuningServices
 from nfo_sinus_driver.node.wording import NodeError
 from nfo_sinus_driver.node.wording import Wording
 
@@ -78,9 +78,8 @@ def _guarded(transition: _Transition) -> _Transition:
 
 class DriveNode(LifecycleNodeMixin, Node):
     """
-    A managed node for one drive.
+    A managed node for one drive, taken into a context.
 
-    :param context: the bus and the drives on it, which takes this one in.
     :raises rclpy.exceptions.ParameterException: an override of a setting is wrong.
     :raises ValueError: settings that contradict each other; the message says how.
     """
@@ -126,11 +125,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         context.add(self.managed)
 
     def stop_for_good(self, patience: float) -> Future[Report | None]:
-        """
-        Stop the motor, and see to it that nobody can start it again.
-
-        :param patience: how long the drive may take to confirm it, s.
-        """
+        """Stop the motor within so many s, and see to it that nobody can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
@@ -255,11 +250,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return settings
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """
-        Set parameters for somebody outside, all of them or none.
-
-        Only what comes this way is written to the drive: declaring and following it do not.
-        """
+        """Set parameters for somebody outside, all or none: only so the drive is written to."""
         try:
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
             admitted = self._drive_parameters.admit(coerced)
@@ -282,11 +273,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return SetParametersResult(successful=True)
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
-        """
-        Return the settings as they would be.
-
-        :raises ValueError: they make no sense, or cannot be changed now.
-        """
+        """Return the settings as they would be; a ValueError if they make no sense."""
         changed = {one.name: one.value for one in parameters if one.name in _NAMES}
         if not changed:
             # a drive has many of its own, and they come one by one
@@ -307,11 +294,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return self._drive_settings({**values, **changed})
 
     def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
-        """
-        Set the drive's own time-out if the drive is there; else configure does it.
-
-        :param changes: what is undone if the drive does not take it.
-        """
+        """Set the drive's own time-out if it is there, or undo changes; else configure does it."""
         managed = self.managed
         if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:
             try:

@@ -109,12 +109,7 @@ class DriveParameters:
     # --- to the drive -------------------------------------------------------------------------
 
     def admit(self, parameters: Iterable[Parameter]) -> list[Parameter]:
-        """
-        Return parameters to set as the drive will have them; nothing is asked of the drive.
-
-        :raises DriveError: the drive cannot have a value, or it may not be changed.
-        :raises ValueError: no such parameter, or a value of another type.
-        """
+        """Return parameters as the drive will have them, or raise why not; nothing is asked."""
         return [self._admit(parameter) for parameter in parameters]
 
     def _admit(self, parameter: Parameter) -> Parameter:
@@ -142,9 +137,8 @@ class DriveParameters:
 
     def write(self, parameters: Iterable[Parameter]) -> tuple[Change, ...]:
         """
-        Write parameters that somebody sets to the drive; all of them or none.
+        Write parameters to the drive that somebody sets, all or none; return what was changed.
 
-        :returns: what was changed.
         :raises DriveError: why not; the drive is as it was, or the error says what is not.
         :raises NodeError: the bus does not get to it.
         """
@@ -155,12 +149,7 @@ class DriveParameters:
         return self._change(drive, wanted) if wanted else ()
 
     def put_back(self, changes: Sequence[Change]) -> None:
-        """
-        Undo changes.
-
-        :raises DriveError: why not.
-        :raises NodeError: the bus does not get to it.
-        """
+        """Undo changes, or raise why not."""
         if changes and self._drive is not None:
             self._change(self._drive, {change.key: change.old for change in changes})
 
@@ -176,11 +165,7 @@ class DriveParameters:
 
 
 def coerce(parameter: CatalogParameter, given: object) -> Value:
-    """
-    Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for 'OFF'.
-
-    :raises ValueError: another type altogether.
-    """
+    """Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for OFF."""
     kind = parameter.kind
     if kind is str and isinstance(given, bool):
         switched = ('off', 'no') if not given else ('on', 'yes')
@@ -199,12 +184,7 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
 
 
 def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
-    """
-    Return the settings of a drive that were given to its node, in a parameter file or by ``-p``.
-
-    :raises DriveError: the drive cannot have one of them.
-    :raises ValueError: one is of a wrong type.
-    """
+    """Return the settings of a drive that were given to its node, by file or by ``-p``."""
     # rclpy has no other way to see the overrides that nobody declared
     given = node._parameter_overrides
     wanted: dict[str, Value] = {}
@@ -220,11 +200,7 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
 
 
 def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
-    """
-    Return what ``ros2 param describe`` shows.
-
-    :param value: what the drive has; the range takes it in, even if the manual does not.
-    """
+    """Return what ``ros2 param describe`` shows; its range takes in what the drive has."""
     parameter = drive.model[key]
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     shown = ParameterDescriptor(
@@ -246,9 +222,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
         span = IntegerRange(from_value=int(low), to_value=int(high), step=step)
         shown.integer_range = [span]
     else:
-        shown.floating_point_range = [
-            FloatingPointRange(from_value=low, to_value=high, step=step)
-        ]
+        shown.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=step)]
     return shown
 
 

@@ -81,11 +81,7 @@ class Lifecycle:
             self._autostart.give_up()
 
     def complain(self, why: str, *, known: bool) -> None:
-        """
-        Log why the drive cannot be configured; of what autostart tries, once for each reason.
-
-        :param known: somebody else says so already.
-        """
+        """Log why the drive cannot be configured, if not ``known``; in autostart each once."""
         log = self._node.get_logger()
         if self.by_operator:
             log.error(why)

@@ -39,8 +39,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.node.arguments import refuse_other_arguments
-from nfo_sinus_driver.node.arguments import take_out_node_name
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
@@ -50,6 +48,8 @@ from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
+from nfo_sinus_driver.node.overrides import refuse_other_arguments
+from nfo_sinus_driver.node.overrides import take_out_node_name
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 from nfo_sinus_driver.signals import ENDING
@@ -123,12 +123,7 @@ class DriverProcess:
         return all(part.alive for part in (*threads, *self._executors))
 
     def stop(self, why: str) -> bool:
-        """
-        Stop the motors, give control back and end.
-
-        :param why: what to say of it.
-        :returns: whether every drive confirmed that it stops.
-        """
+        """Stop the motors, give control back and end; false if a drive does not confirm it."""
         confirmed = self._stop_motors(why)
         # whoever still waits for the bus is told, so that no callback keeps the executor
         self._context.bus.close()
@@ -178,11 +173,7 @@ def _time_left(node: DriveNode, begun: float) -> float:
 
 
 def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveNode, Future[Any]]]:
-    """
-    Yield nodes with their futures: as these end, and at last those that do not end in time.
-
-    All of them together have the time that an exit may take.
-    """
+    """Yield nodes with their futures as these end; in the end those that have not in time."""
     waiting = set(futures)
     longest = max((one.managed.settings.shutdown_timeout for one in futures.values()), default=0.0)
     with contextlib.suppress(FutureTimeoutError):
@@ -194,11 +185,7 @@ def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveN
 
 
 def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
-    """
-    Log the answer to a stop or a release; false if there is none, or it is no success.
-
-    A drive that has never answered anything need not confirm: it may well not be there.
-    """
+    """Log how a stop ended; false if not well, but for a drive that may well not be there."""
     log = node.get_logger()
     try:
         answer = future.result(timeout=0)

@@ -102,11 +102,7 @@ class ManagedDrive:
         return self.state != 'unconfigured' and not self._drive.snapshot.connected
 
     def require_active(self) -> Drive:
-        """
-        Return the drive for a command that may turn the motor.
-
-        :raises NodeError: the node takes none; the message says why, and what to do.
-        """
+        """Return the drive for a command that may turn the motor, or a NodeError why not."""
         if not self.active:
             raise NodeError(self._lifecycle.why_not_active)
         return self._drive
@@ -145,11 +141,7 @@ class ManagedDrive:
 
     @property
     def _concrete(self) -> DriveSettings:
-        """
-        The settings with a model that is one.
-
-        :raises ValueError: the model that was found has not all that is set.
-        """
+        """The settings with a model that is one; a ValueError if it has not all that is set."""
         if self._settings.model != AUTO:
             return self._settings
         return dataclasses.replace(self._settings, model=self._found_model)

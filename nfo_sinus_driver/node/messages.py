@@ -11,11 +11,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""Turns what a drive and a line tell into messages."""
+"""Turns what a drive and a line tell into messages, and the joint that a motor turns."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from builtin_interfaces.msg import Time
@@ -24,6 +24,7 @@ from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.bus import Statistics
@@ -31,6 +32,7 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
@@ -98,11 +100,7 @@ def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
 
 
 def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
-    """
-    Return the InvSt of a poll.
-
-    :raises ValueError: the drive was not connected.
-    """
+    """Return the InvSt of a poll (ValueError: the drive was not connected)."""
     if snapshot.status is None:
         raise ValueError('no inverter status without a connection')
     return InvSt(
@@ -124,23 +122,17 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
 
 
 def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
-    """
-    Return the ErrorLogEntry of an entry.
-
-    :param stamp: when it happened; 0 if nobody knows.
-    """
+    """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if nobody knows)."""
     return ErrorLogEntry(
         code=entry.code,
-        text=entry.text,
+        text=entry.full_text,
         operating_time=entry.operating_time,
         age=entry.age,
         stamp=stamp,
     )
 
 
-def bus_statistics(
-    statistics: Statistics, silent_drives: list[str], stamp: Time
-) -> BusStatistics:
+def bus_statistics(statistics: Statistics, silent_drives: list[str], stamp: Time) -> BusStatistics:
     """Return the BusStatistics message of a line, or of one drive."""
     return BusStatistics(
         header=Header(stamp=stamp),
@@ -159,3 +151,54 @@ def bus_statistics(
         silent_drives=silent_drives,
         round_trip_median=statistics.round_trip_median,
     )
+
+
+_RPM = 2 * math.pi / 60
+#: A pause between two polls that is longer says nothing about where the shaft went meanwhile, s.
+_LONGEST_STEP = 1.0
+
+
+class Joint:
+    """The joint that a motor turns; its ratio is motor turns per turn, negative inverts."""
+
+    def __init__(self, name: Callable[[], str], ratio: Callable[[], float]) -> None:
+        self._name = name
+        self._ratio = ratio
+        self._position = 0.0
+        self._at = -math.inf
+
+    @property
+    def name(self) -> str:
+        """Its name in messages."""
+        return self._name()
+
+    def state(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> JointState:
+        """Return its state of a poll; the position, since it began, is what the speed comes to."""
+        velocity = snapshot.speed * _RPM / self._ratio()
+        step = snapshot.at - self._at
+        if 0 < step < _LONGEST_STEP and not math.isnan(velocity):
+            self._position += velocity * step
+        self._at = snapshot.at
+        return JointState(
+            header=Header(stamp=stamp, frame_id=frame_id),
+            name=[self.name],
+            position=[self._position],
+            velocity=[velocity],
+        )
+
+    def setpoint(self, velocity: float, drive: Drive) -> float:
+        """Return the set-point for a velocity of the shaft, rad/s, or a ValueError."""
+        rpm = velocity * self._ratio() / _RPM
+        mode = drive.snapshot.control_mode
+        if mode == 'Speed':
+            return rpm
+        if mode != 'Freque':
+            raise ValueError(f'the control mode is {mode or "not known"}, not Speed or Freque')
+        nominal, key = drive.parameters.values, drive.model.key
+        frequency = nominal.get(key(Role.NOMINAL_FREQUENCY), 0)
+        speed = nominal.get(key(Role.NOMINAL_SPEED), 0)
+        if not frequency or not speed:
+            raise ValueError('f-Nom and N-nom of the motor are not known, so Hz are no speed')
+        # slip is left out: how much there is depends on the load
+        pole_pairs = max(1, round(60 * float(frequency) / float(speed)))
+        return rpm * pole_pairs / 60

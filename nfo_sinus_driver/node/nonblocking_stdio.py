@@ -52,12 +52,7 @@ class NonblockingStdio:
         self._threads = [_begin_to_pump(descriptor) for descriptor in _STREAMS]
 
     def close(self) -> None:
-        """
-        Write what is waiting, unless that takes too long.
-
-        What is said from now on goes nowhere: the process has yet to end, ROS has yet more to log
-        then, and the reader may still not read.
-        """
+        """Write what is waiting, for a while; what is said from now on goes nowhere."""
         with open(os.devnull, 'wb', buffering=0) as nowhere:
             for descriptor in _STREAMS:
                 os.dup2(nowhere.fileno(), descriptor)

@@ -11,8 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""Who gets what was given to the nodes, and what nobody takes: a misspelt parameter or node."""
+"""Who gets which ROS arguments, and what nobody takes: a misspelt parameter or node."""
 
 from __future__ import annotations
 
@@ -21,10 +20,12 @@ from collections.abc import Iterator
 import difflib
 import itertools
 from pathlib import Path
+import re
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.utilities import remove_ros_args
 import yaml
 
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
@@ -62,11 +63,7 @@ def _given_to(name: str) -> dict[str, Parameter]:
 
 
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
-    """
-    Return a warning for each parameter that was given and that no node declares.
-
-    What is given without a node's name reaches every node, so one that declares it is enough.
-    """
+    """Return a warning for each parameter that was given and that no node declares."""
     nodes = list(nodes)
     declared = {name for node in nodes for name in _declared(node)}
     unknown: dict[str, set[str]] = {}
@@ -132,3 +129,60 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
 def _did_you_mean(name: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, list(known), n=2)
     return f'; did you mean {" or ".join(close)}?' if close else ''
+
+
+_ROS_ARGS = '--ros-args'
+_END = '--'
+_REMAP_FLAGS = ('-r', '--remap')
+_NODE = re.compile(r'(?:__node|__name):=(.+)')
+
+
+_HELP = """usage: driver [--ros-args ...]
+
+Drives NFO Sinus inverters on one serial line. For example:
+
+  driver --ros-args -p port:=/dev/ttyUSB0 -p address:=1
+  driver --ros-args --params-file conveyor.yaml
+"""
+
+
+def refuse_other_arguments(arguments: list[str]) -> None:
+    """Refuse what is meant for nobody, saying how to give it; ``--help`` prints the usage."""
+    others = remove_ros_args(arguments)[1:]
+    if '-h' in others or '--help' in others:
+        print(_HELP)
+        raise SystemExit(0)
+    if others:
+        raise ValueError(
+            f'unknown argument {others[0]}: parameters are given as --ros-args -p name:=value'
+        )
+
+
+def take_out_node_name(arguments: list[str]) -> tuple[list[str], str | None]:
+    """
+    Split off a name that would be given to every node of the process.
+
+    A launch file's ``name=`` does that, and with several nodes in one process all of them would
+    get the same name. ``node:__node:=x`` renames one node and is left alone.
+
+    :returns: the other arguments, and the name if there was one.
+    """
+    left: list[str] = []
+    name = None
+    in_ros = False
+    waiting = iter(arguments)
+    for argument in waiting:
+        if argument == _ROS_ARGS:
+            in_ros = True
+        elif argument == _END:
+            in_ros = False
+        elif in_ros and argument in _REMAP_FLAGS:
+            rule = next(waiting, None)
+            match = _NODE.fullmatch(rule or '')
+            if match:
+                name = match.group(1)
+            else:
+                left += [argument] if rule is None else [argument, rule]
+            continue
+        left.append(argument)
+    return left, name

@@ -42,8 +42,8 @@ from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.node import diagnostics
 from nfo_sinus_driver.node import messages
-from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.qos import KEPT
 from nfo_sinus_driver.node.qos import LATCHED

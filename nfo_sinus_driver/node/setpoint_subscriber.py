@@ -61,11 +61,7 @@ class SetpointSubscriber:
         self._thread = threading.Thread(target=self._work, name='setpoint subscriber', daemon=True)
 
     def subscribe(
-        self,
-        node: Node,
-        message_type: type,
-        topic: str,
-        callback: Callable[[Any], None],
+        self, node: Node, message_type: type, topic: str, callback: Callable[[Any], None]
     ) -> None:
         """Have a function called with each message, once :meth:`start` was called."""
         subscription = node.create_subscription(

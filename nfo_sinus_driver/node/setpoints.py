@@ -32,8 +32,8 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.setpoint_all import SetpointAll
 from nfo_sinus_driver.drive.setpoint_all import Told
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.joint import Joint
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.messages import Joint
 
 _UNITS = {
     'Freque': Setpoint.HZ,
@@ -140,9 +140,7 @@ class SetpointsForAll:
             lambda: {managed.name: managed.drive.setpoint for managed in context.drives},
             self._on_told,
         )
-        context.setpoint_subscriber.subscribe(
-            node, Float32, '~/setpoint_all', self._on_setpoint
-        )
+        context.setpoint_subscriber.subscribe(node, Float32, '~/setpoint_all', self._on_setpoint)
 
     def _on_setpoint(self, message: Float32) -> None:
         if math.isfinite(message.data):

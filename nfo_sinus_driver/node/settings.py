@@ -30,7 +30,7 @@ from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.settings import BAUD_RATES
+from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: What YAML makes of a character format without quotes.
 _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}
@@ -49,13 +49,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Setting:
-    """
-    One setting of a node.
-
-    :ivar low: the least value; ``None`` where there is no range.
-    :ivar unit: of the range.
-    :ivar fixed: it cannot be changed while the process runs.
-    """
+    """One setting of a node; its range, if it has one, has a unit. A fixed one stays as it is."""
 
     name: str
     default: SettingValue
@@ -67,13 +61,7 @@ class Setting:
     unit: str = ''
 
     def coerce(self, given: object) -> SettingValue:
-        """
-        Take what was given for what was meant: 5 for 5.0, and 8E1 for '8E1'.
-
-        The types of ROS parameters are stricter than people, and YAML takes 8E1 for eighty.
-
-        :raises ValueError: another type altogether, or out of range; the message says what can be.
-        """
+        """Take what was given for what was meant: 5 for 5.0, and 8E1, eighty in YAML, for text."""
         value = given
         if type(given) is int and isinstance(self.default, float):
             value = float(given)
@@ -232,8 +220,7 @@ DRIVE_SETTINGS = (
     Setting(
         'setpoint_max',
         0.0,
-        'Set-points are clamped to this, in the unit of the control mode; '
-        "0: the drive's own limit",
+        "Set-points are clamped to this, in the unit of the control mode; 0: the drive's own limit",
         0,
         32767,
         unit='in the unit of the control mode',
@@ -324,12 +311,7 @@ def _reads_as(wanted: type, text: str) -> bool:
 
 
 def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue]:
-    """
-    Declare settings on a node and return their values.
-
-    :raises ValueError: an override has a wrong type or is out of range; the message says which
-        one, and what it can be.
-    """
+    """Declare settings on a node and return their values; a ValueError says which is wrong."""
     for setting in settings:
         # rclpy has no other way to see an override first, and its own complaints name no remedy
         given = node._parameter_overrides.get(setting.name)
@@ -339,11 +321,7 @@ def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue
 
 
 def coerce(parameter: Parameter, settings: tuple[Setting, ...]) -> Parameter:
-    """
-    Take what somebody sets for what is meant, if it is one of the settings.
-
-    :raises ValueError: another type altogether, or out of range; the message says what can be.
-    """
+    """Take what somebody sets for what is meant, if it is one of the settings."""
     for setting in settings:
         if setting.name == parameter.name and parameter.type_ is not Parameter.Type.NOT_SET:
             return Parameter(parameter.name, value=setting.coerce(parameter.value))

@@ -29,11 +29,7 @@ class NodeError(Exception):
 
 
 class Wording:
-    """
-    Makes sentences for the node of one drive.
-
-    :ivar enable: how the drive is enabled.
-    """
+    """Makes sentences for the node of one drive, which says how it is enabled."""
 
     def __init__(self, node: Node) -> None:
         self.enable = f'call {node.resolve_service_name("~/enable")}'

@@ -44,31 +44,18 @@ class Wrong(Exception):
 
 
 class Server(abc.ABC):
-    """
-    What one drive does with Classic messages; its family says.
-
-    :ivar own_address: a message to address 0 is answered with the drive's own [C86].
-    :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
-    """
+    """What one drive does with Classic messages; its family says, also what it answers as [C86]."""
 
     own_address: bool
     lower_case: bool
 
     @abc.abstractmethod
     def enquiry(self, id_: int) -> int:
-        """
-        Return the word that stands at an id.
-
-        :raises Wrong: it cannot be read.
-        """
+        """Return the word that stands at an id (Wrong: it cannot be read)."""
 
     @abc.abstractmethod
     def select(self, id_: int, word: int, *, to_all: bool) -> None:
-        """
-        Set what stands at an id.
-
-        :raises Wrong: it cannot be set, or not now.
-        """
+        """Set what stands at an id (Wrong: it cannot be set, or not now)."""
 
     @abc.abstractmethod
     def refused(self, flag: LineError) -> bool:

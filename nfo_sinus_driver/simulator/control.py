@@ -139,11 +139,7 @@ class ControlServer:
 
 
 class Client:
-    """
-    Speaks to a running simulator.
-
-    :param path: its control channel, as it printed it; or use :meth:`at_link`.
-    """
+    """Speaks to a running simulator by its control channel; a ControlError says why not."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -156,11 +152,7 @@ class Client:
         return cls(control_path(link))
 
     def state(self, address: int | None = None) -> dict[str, Any]:
-        """
-        Return the state of a drive; without an address, of the only one.
-
-        :raises ControlError: nobody listens, no such drive, or several to choose from.
-        """
+        """Return the state of a drive; without an address, of the only one."""
         result: dict[str, Any] = self.call('state', address=address)
         return result
 
@@ -172,11 +164,7 @@ class Client:
     def inject(
         self, what: str, *values: object, address: int | None = None, **arguments: object
     ) -> None:
-        """
-        Let something happen: a verb of ``simulator inject`` with its arguments, by order or name.
-
-        :raises ControlError: nobody listens, or the simulator refuses.
-        """
+        """Let something happen: a verb of ``simulator inject`` with its arguments."""
         self.call('inject', what=what, values=values, address=address, arguments=arguments)
 
     def wait_for(
@@ -185,11 +173,7 @@ class Client:
         timeout: float = 5.0,
         address: int | None = None,
     ) -> dict[str, Any]:
-        """
-        Wait until the state of a drive fulfils a condition, and return that state.
-
-        :raises TimeoutError: it did not within ``timeout`` seconds; shows the last state.
-        """
+        """Wait until the state of a drive fulfils a condition, and return that state."""
         end = time.monotonic() + timeout
         while True:
             state = self.state(address)
@@ -201,11 +185,7 @@ class Client:
             time.sleep(0.005)
 
     def call(self, verb: str, **arguments: object) -> Any:
-        """
-        Send a request and return its result.
-
-        :raises ControlError: nobody listens, or the simulator refuses.
-        """
+        """Send a request and return its result."""
         request = json.dumps({'verb': verb, 'arguments': arguments}).encode() + b'\n'
         try:
             if self._socket is None:

@@ -27,8 +27,8 @@ from typing import Any
 from typing import ClassVar
 
 from nfo_sinus_driver.simulator.faults import Faults
-from nfo_sinus_driver.simulator.measured import Counters
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.motor import Counters
 from nfo_sinus_driver.simulator.motor import Motor
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.timing import Timing
@@ -66,11 +66,7 @@ class ControlUnit(abc.ABC):
 
     @abc.abstractmethod
     def write(self, key: str, raw: int) -> bool:
-        """
-        Carry out a write of a command; ``False`` if ``key`` is none, so that it is stored.
-
-        :raises Refused: VALUE or STATE.
-        """
+        """Carry out a write of a command, or refuse it; ``False`` if it is none: it is stored."""
 
     @abc.abstractmethod
     def show(self, key: str) -> int | None:
@@ -90,11 +86,7 @@ class ControlUnit(abc.ABC):
         return key
 
     def admit(self, key: str) -> None:
-        """
-        Look whether a parameter may be written now.
-
-        :raises Refused: STATE.
-        """
+        """Look whether a parameter may be written now (Refused: STATE)."""
 
     def stored(self, key: str) -> None:
         """Take note that a parameter has a new value in the memory."""
@@ -127,11 +119,7 @@ class ControlUnit(abc.ABC):
         self.initialised = True
 
     def trip(self, code: int, *, cause_present: bool = False) -> None:
-        """
-        Let a fault happen.
-
-        :raises ValueError: the family has no such fault.
-        """
+        """Let a fault happen (ValueError: the family has no such fault)."""
         self.faults.trip(code, self.counters.operating_time, cause_present=cause_present)
 
     def nameplate(self) -> Nameplate:

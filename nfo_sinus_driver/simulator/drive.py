@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 A whole drive made of software: parameters, commands, motor, faults, power and time.
 
@@ -25,16 +24,17 @@ from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import Any
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.measured import measure
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.motor import measure
 
 #: The characters of a serial number [M0 §6.2.4].
 SERIAL_LENGTH = 16
@@ -122,22 +122,14 @@ class SimulatedDrive:
         self.control_unit.heard()
 
     def read_raw(self, key: str) -> int:
-        """
-        Read a parameter as the bus does, a number of the memory, side effects included.
-
-        :raises Refused: ADDRESS; it can only be written.
-        """
+        """Read a parameter as the bus does, a number of the memory, side effects included."""
         if self.memory.model[key].access is Access.WRITE:
             raise Refused(Reason.ADDRESS, f'{key} cannot be read')
         raw = self.control_unit.read(key)
         return self._peek(key) if raw is None else raw
 
     def write_raw(self, key: str, raw: int) -> None:
-        """
-        Write a parameter as the bus does, a number of the memory.
-
-        :raises Refused: ADDRESS when it can only be read, VALUE or STATE.
-        """
+        """Write a parameter as the bus does, a number of the memory, or be refused."""
         key = self.control_unit.key_of(key)
         parameter = self.memory.model[key]
         if parameter.access not in (Access.WRITE, Access.READ_WRITE):
@@ -159,7 +151,6 @@ class SimulatedDrive:
         Let a fault happen: the motor coasts, and it wants acknowledging.
 
         :param cause_present: the cause lasts, so that it cannot be acknowledged yet.
-        :raises ValueError: the model has no such fault.
         """
         self.control_unit.trip(code, cause_present=cause_present)
         self._settle()
@@ -174,11 +165,7 @@ class SimulatedDrive:
         self._settle()
 
     def set_from_keypad(self, key: str, value: Value) -> None:
-        """
-        Change a parameter at the keypad, in engineering units.
-
-        :raises ValueError: an unknown key or a value that the drive would refuse.
-        """
+        """Change a parameter at the keypad, in engineering units, or a ValueError."""
         if key not in self.settings and key not in self.control_unit.setpoints:
             raise ValueError(f'{key} cannot be changed at the keypad')
         self.memory.set(key, value)
@@ -265,13 +252,42 @@ class SimulatedDrive:
 
 
 def _serial_number(text: str | None, address: int) -> str:
-    """
-    Return the characters of a serial number; by default one for each address.
-
-    :raises ValueError: too long, or not ASCII.
-    """
+    """Return the characters of a serial number; by default one for each address."""
     if text is None:
         text = f'{26_0117_0000_0000 + address:0{SERIAL_LENGTH}d}'
     if len(text) > SERIAL_LENGTH or not (text.isascii() and text.isprintable()):
         raise ValueError(f'serial number {text!r}: at most {SERIAL_LENGTH} characters of ASCII')
     return text.ljust(SERIAL_LENGTH)
+
+
+def describe(drive: SimulatedDrive) -> dict[str, Any]:
+    """Return everything about a drive, in engineering units; it can be written as JSON."""
+    motor = drive.motor
+    return {
+        'address': drive.address,
+        'model': drive.model.name,
+        'serial_number': drive.serial_number,
+        'time': drive.time,
+        'silent': not drive.listening,
+        'run_input': drive.control_unit.run_input,
+        **drive.control_unit.report(),
+        'fault': next(iter(drive.faults.codes), 0),
+        'faults': drive.faults.codes,
+        'alarms': drive.faults.alarms,
+        'frequency': motor.frequency,
+        'speed': motor.speed,
+        'rotor_speed': motor.rotor_speed,
+        'turning': motor.turning,
+        'driven': motor.driven,
+        'current': motor.current,
+        'torque': 100 * motor.torque,
+        'dc_link': motor.dc_link,
+        'writes': dict(drive.writes),
+        'command_writes': dict(drive.command_writes),
+        'error_log': [[entry.code, entry.op_time] for entry in drive.faults.log],
+        'parameters': {
+            key: drive.peek(key)
+            for key, parameter in drive.memory.model.items()
+            if parameter.access in (Access.READ, Access.READ_WRITE)
+        },
+    }

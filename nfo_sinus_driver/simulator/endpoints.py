@@ -99,19 +99,11 @@ class Endpoint:
         return PROTOCOLS[self.protocol].make(gateway_timeout)
 
     def open(self) -> Port:
-        """
-        Return its port.
-
-        :raises PortError: it cannot be had.
-        """
+        """Return its port (PortError: it cannot be had)."""
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
 
     def check(self, address: int) -> None:
-        """
-        Look whether an address is one of the protocol.
-
-        :raises ValueError: it is not.
-        """
+        """Look whether an address is one of the protocol (ValueError: it is not)."""
         possible = PROTOCOLS[self.protocol].addresses
         if address not in possible:
             span = f'{possible.start} to {possible.stop - 1}'
@@ -126,11 +118,7 @@ def endpoint(
     baud: int | None = None,
     char_format: str | None = None,
 ) -> Endpoint:
-    """
-    Return an end of a line; what is not given is the protocol's default.
-
-    :raises ValueError: an unknown protocol, or one that does not go with the rest.
-    """
+    """Return an end of a line; what is not given is the protocol's default."""
     if protocol not in PROTOCOLS:
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
@@ -147,11 +135,7 @@ def endpoint(
 
 
 def parse_endpoint(text: str) -> Endpoint:
-    """
-    Return the end that was typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``.
-
-    :raises ValueError: it is none.
-    """
+    """Return the end typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``."""
     protocol, _, place = text.partition(':')
     if place.isascii() and place.isdigit():
         if int(place) > 65535:

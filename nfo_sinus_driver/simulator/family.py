@@ -91,11 +91,7 @@ def simulated() -> tuple[str, ...]:
 
 @functools.cache
 def load(name: str) -> SimulatedFamily:
-    """
-    Return what the folder of a family says.
-
-    :raises ValueError: there is no such family; the message lists those there are.
-    """
+    """Return what the folder of a family says; a ValueError lists the families there are."""
     if name not in simulated():
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(simulated())}')
     family = importlib.import_module(f'{__package__}.{name}.family').FAMILY

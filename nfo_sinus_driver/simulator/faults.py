@@ -79,11 +79,7 @@ class Faults:
         return any(self._present[code] for code in self.codes)
 
     def trip(self, code: int, op_time: float, *, cause_present: bool) -> None:
-        """
-        Let a fault happen, at ``op_time`` hours.
-
-        :raises ValueError: the model has no such fault.
-        """
+        """Let a fault happen, at ``op_time`` hours (ValueError: the model has no such fault)."""
         if self._model.status_code(code).kind not in self._kinds:
             raise ValueError(f'{code} is no fault of {self._model.name}: see its status codes')
         if code not in self._present:

@@ -39,11 +39,7 @@ _REQUIRED: Any = object()
 
 
 def parse_setting(model: Family, key: str, text: Value) -> Value:
-    """
-    Turn what was typed for a parameter into its value.
-
-    :raises ValueError: an unknown key, with the names nearest to it; or no value for it.
-    """
+    """Turn what was typed for a parameter into its value; a ValueError names the nearest."""
     if key not in model:
         near = difflib.get_close_matches(key, list(model), n=3, cutoff=0.4)
         hint = f': did you mean {", ".join(near)}?' if near else ''
@@ -83,11 +79,7 @@ class Argument:
         return replace(self, choices=tuple(both) or None)
 
     def convert(self, value: Any) -> Any:
-        """
-        Return the value in its right type.
-
-        :raises ValueError: it cannot be that.
-        """
+        """Return the value in its right type (ValueError: it cannot be that)."""
         if value is None and not self.required:
             return None
         try:
@@ -138,11 +130,7 @@ class Verb:
         return replace(self, help=f'{self.help}; or {other.help}', arguments=arguments)
 
     def bind(self, values: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
-        """
-        Return the arguments by name, converted and complete.
-
-        :raises ValueError: too many, one missing, unknown or wrong.
-        """
+        """Return the arguments by name, converted and complete, or a ValueError."""
         names = [argument.name for argument in self.arguments]
         if len(values) > len(names):
             raise ValueError(f'takes at most {len(names)} arguments: {", ".join(names)}')
@@ -194,9 +182,7 @@ def _answers(what: str, help_text: str, *more: Argument) -> Verb:
 
 
 def _noise_rate(target: Target, given: dict[str, Any]) -> None:
-    target.line.faults.set_rate(
-        given['what'], given['share'], given['seed'], given['seconds']
-    )
+    target.line.faults.set_rate(given['what'], given['share'], given['seed'], given['seconds'])
 
 
 def _burst(target: Target, given: dict[str, Any]) -> None:

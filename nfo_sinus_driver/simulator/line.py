@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 The far end of a line: requests come in, drives carry them out, answers go back, in their time.
 
@@ -21,11 +20,14 @@ Knows no clock of its own: it is told the time, so that tests can make it up.
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 import heapq
 import itertools
+import json
+from typing import TextIO
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import LineFaults
@@ -33,10 +35,7 @@ from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.protocol import Protocol
-from nfo_sinus_driver.simulator.receiver import Arrived
-from nfo_sinus_driver.simulator.receiver import Receiver
 from nfo_sinus_driver.simulator.timing import Timing
-from nfo_sinus_driver.simulator.trace import Trace
 
 #: How long to wait before a port that could not come back is tried again (s).
 _TRY_AGAIN = 0.1
@@ -235,3 +234,111 @@ class Line:
         if delivery.until == len(data) and self._trace is not None and not answer.is_echo:
             note = 'lost' if dead else answer.reply.note
             self._trace.record('answer', data, answer.began, stamp, note)
+
+
+class Trace:
+    """
+    Writes one JSON object a line and flushes it, so that it can be read while it grows.
+
+    ``first`` and ``last`` are the times of the frame's first and last byte at the simulator (s,
+    steady clock, the same in every process), ``direction`` is ``request`` or ``answer``, ``hex``
+    the bytes, ``gap`` the silence since the last byte before it (s, ``null`` for the first), and
+    ``note`` says what was wrong with it, if anything: ``rubbish``, ``lost``, ``damaged`` ….
+
+    A request's first byte is stamped when it was read and an answer's just before it is written,
+    so a gap after an answer is never shown shorter than the master kept it.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._end: float | None = None
+
+    def record(
+        self, direction: str, data: bytes, first: float, last: float, note: str = ''
+    ) -> None:
+        """Write one frame down."""
+        gap = None if self._end is None else first - self._end
+        self._end = last if self._end is None else max(self._end, last)
+        frame = {
+            'first': first,
+            'last': last,
+            'direction': direction,
+            'hex': data.hex(),
+            'gap': gap,
+            'note': note,
+        }
+        self._stream.write(json.dumps(frame) + '\n')
+        self._stream.flush()
+
+
+#: More than any frame has: rubbish is not collected for ever.
+_MOST = 600
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """A frame, or rubbish, and when its first and last byte arrived (s)."""
+
+    data: bytes
+    first: float
+    last: float
+
+
+class Receiver:
+    """
+    Collects bytes; a frame is there when its last byte has had time to arrive.
+
+    :param protocol: knows how long a frame is.
+    :param character: time of one character on the line (s); 0 on a line without pace.
+    :param silence: the silence that ends what is no whole frame (s).
+    """
+
+    def __init__(self, protocol: Protocol, character: float, silence: float) -> None:
+        self._protocol = protocol
+        self._character = character
+        self._silence = silence
+        self._buffer = b''
+        self._first = 0.0
+        #: When the byte at the buffer's beginning began, and when its last one ends, on the wire.
+        self._begin = self._end = float('-inf')
+
+    def clear(self) -> None:
+        """Forget what has not become a frame."""
+        self._buffer = b''
+
+    def feed(self, data: bytes, now: float) -> Iterator[Arrived]:
+        """Take bytes that were read at ``now``; return what is complete by then."""
+        # what the silence before these bytes has ended does not belong to them
+        yield from self.take(now)
+        begin = max(now, self._end)
+        if not self._buffer:
+            self._first = now
+            self._begin = begin
+        self._end = begin + len(data) * self._character
+        self._buffer += data
+        yield from self.take(now)
+
+    def take(self, now: float) -> Iterator[Arrived]:
+        """Return what is complete at ``now``."""
+        while self._buffer:
+            length, end = self._next()
+            if end > now:
+                return
+            yield Arrived(self._buffer[:length], self._first, end)
+            self._buffer = self._buffer[length:]
+            # bytes right behind a frame are the next one, as from a hasty master
+            self._begin = self._first = end
+
+    @property
+    def due(self) -> float | None:
+        """When :meth:`take` will have something; ``None`` while nothing has arrived."""
+        return self._next()[1] if self._buffer else None
+
+    def _next(self) -> tuple[int, float]:
+        """How much of the buffer comes out next, and when."""
+        have = len(self._buffer)
+        length = self._protocol.cut(self._buffer)
+        if length:
+            whole = length == have
+            return length, self._end if whole else self._begin + length * self._character
+        return have, self._end if have > _MOST else self._end + self._silence

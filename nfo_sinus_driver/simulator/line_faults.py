@@ -66,13 +66,7 @@ class Reply:
 
 
 class LineFaults:
-    """
-    The faults that wait for the next answers, and those that come by chance or by the clock.
-
-    :param bits: data bits of a character.
-
-    :ivar dead_until: until when the whole line carries nothing, either way.
-    """
+    """The faults that wait for the next answers, and those that come by chance or by the clock."""
 
     def __init__(self, bits: int = 8, seed: int = 0) -> None:
         self._bits = bits
@@ -85,12 +79,7 @@ class LineFaults:
     def add(
         self, what: str, times: int = 1, address: int | None = None, seconds: float = 0.0
     ) -> None:
-        """
-        Spoil the next ``times`` answers, of one drive or of any.
-
-        :param what: one of :data:`ANSWER_FAULTS`.
-        :param seconds: how late the answers come, for ``delay``.
-        """
+        """Spoil the next answers, of one drive or any, by one of :data:`ANSWER_FAULTS`."""
         self._pending.append(_Pending(what, address, times, seconds))
 
     def set_rate(
@@ -111,11 +100,7 @@ class LineFaults:
         self._rates[what] = _Rate(what, share, seconds, chance)
 
     def set_bursts(self, seconds: float, period: float, now: float) -> None:
-        """
-        Let the line carry nothing for so long in every period, either way; first after one of them.
-
-        :raises ValueError: a burst that is longer than its period, or times below 0.
-        """
+        """Let the line carry nothing for so long in every period, first after one of them."""
         if not 0.0 <= seconds <= period:
             raise ValueError(f'bursts of {seconds:g} s every {period:g} s: they would never end')
         self._bursts = _Bursts(seconds, period, now) if seconds else None
@@ -132,24 +117,16 @@ class LineFaults:
         self.dead_until = float('-inf')
 
     def alter(self, address: int, frame: bytes, instead: Reply | None = None) -> list[Reply]:
-        """
-        Return what goes on the line in place of an answer.
-
-        :param instead: what a gateway says when the answer does not reach it whole.
-        """
+        """Return what goes on the line for an answer; ``instead`` of none what a gateway says."""
         replies = [Reply(frame)]
         for fault in list(self._pending):
             if fault.address in (None, address):
-                replies = [
-                    new for reply in replies for new in self._spoiled(fault, reply, instead)
-                ]
+                replies = [new for reply in replies for new in self._spoiled(fault, reply, instead)]
                 fault.left -= 1
         self._pending = [fault for fault in self._pending if fault.left > 0]
         for rate in self._rates.values():
             if rate.chance.random() < rate.share:
-                replies = [
-                    new for reply in replies for new in self._spoiled(rate, reply, instead)
-                ]
+                replies = [new for reply in replies for new in self._spoiled(rate, reply, instead)]
         return replies
 
     def _spoiled(self, fault: _Pending | _Rate, reply: Reply, instead: Reply | None) -> list[Reply]:
@@ -169,9 +146,7 @@ class LineFaults:
             data = bytes(byte & mask for byte in noise) + reply.data
             return [replace(reply, data=data, note=_noted(reply, 'noise'))]
         damaged = bytearray(reply.data)
-        damaged[self._random.randrange(len(damaged))] ^= (
-            1 << self._random.randrange(self._bits)
-        )
+        damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(self._bits)
         return [replace(reply, data=bytes(damaged), note=_noted(reply, 'damaged'))]
 
 

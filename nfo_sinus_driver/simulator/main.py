@@ -11,8 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The command ``simulator``: simulated drives on a pseudo-terminal or TCP port; needs no ROS."""
+"""The command ``simulator``, without ROS: simulated drives, and what happens to running ones."""
 
 from __future__ import annotations
 
@@ -20,18 +19,22 @@ import argparse
 from collections.abc import Iterator
 from collections.abc import Sequence
 import contextlib
+import json
 import signal
 import sys
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
+from nfo_sinus_driver.simulator.control import Client
 from nfo_sinus_driver.simulator.control import ControlError
+from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
 from nfo_sinus_driver.simulator.endpoints import PROTOCOLS
 from nfo_sinus_driver.simulator.family import every_option
+from nfo_sinus_driver.simulator.family import every_verb
 from nfo_sinus_driver.simulator.family import machine_of
 from nfo_sinus_driver.simulator.family import simulated
-from nfo_sinus_driver.simulator.inject import inject
+from nfo_sinus_driver.simulator.injections import Argument
 from nfo_sinus_driver.simulator.injections import parse_setting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -48,11 +51,7 @@ _ROS_ARGS = '--ros-args'
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """
-    Run the command and return its exit status.
-
-    :param argv: the arguments, without the program's name; by default the process's own.
-    """
+    """Run the command, by default as the process was called, and return its exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if _ROS_ARGS in arguments:
         # a launch file's Node action adds them; there is no ROS in here
@@ -82,9 +81,7 @@ def _serve(simulator: Simulator) -> int:
         for line in simulator.lines
     )
     also = ''.join(f'; also {other}' for other in others)
-    print(
-        f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True
-    )
+    print(f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True)
     # the line has a thread of its own: this one waits for a signal, or for a failure there
     simulator.finished.wait()
     print(f'simulator: the line broke down: {simulator.failure!r}', file=sys.stderr)
@@ -261,3 +258,78 @@ def _parser() -> argparse.ArgumentParser:
         else:
             add(flag, action='store_true', default=None, help=option.help)
     return parser
+
+
+_EXAMPLES = """
+examples:
+  simulator inject --link /tmp/nfo0 --address 1 fault 5
+  simulator inject --link /tmp/nfo0 run off
+  simulator inject --link /tmp/nfo0 keypad stop
+  simulator inject --link /tmp/nfo0 delay 1 0.5
+  simulator inject --link /tmp/nfo0 state
+"""
+
+
+def inject(argv: Sequence[str]) -> int:
+    """Run the command and return its exit status; ``argv`` begins behind ``inject``."""
+    options = _inject_parser().parse_args(argv)
+    if options.control is not None:
+        path = options.control
+    elif options.link is not None or options.tcp is not None:
+        path = control_path(options.link, options.tcp)
+    else:
+        _inject_parser().error('say which simulator: --link, --tcp or --control')
+    try:
+        with Client(path) as client:
+            if options.verb == 'state':
+                one = options.address is not None
+                state = client.state(options.address) if one else client.states()
+                print(json.dumps(state, indent=2, ensure_ascii=False))
+            else:
+                names = [argument.name for argument in every_verb()[options.verb].arguments]
+                given = {name: getattr(options, name) for name in names}
+                client.inject(options.verb, address=options.address, **given)
+    except ControlError as error:
+        print(f'simulator inject: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def _inject_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='simulator inject',
+        description='Makes something happen to a running simulator.',
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('--link', metavar='PATH', help='the pseudo-terminal that it serves')
+    parser.add_argument('--tcp', type=int, metavar='PORT', help='the TCP port that it serves')
+    parser.add_argument('--control', metavar='PATH', help='its control channel')
+    parser.add_argument(
+        '--address',
+        type=int,
+        metavar='N',
+        help='the drive; needed where there are several and it happens to one',
+    )
+    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
+    for name, verb in every_verb().items():
+        sub = verbs.add_parser(name, help=verb.help, description=verb.help)
+        for argument in verb.arguments:
+            _add(sub, argument)
+    text = 'print the state of the drives as JSON'
+    verbs.add_parser('state', help=text, description=text)
+    return parser
+
+
+def _add(parser: argparse.ArgumentParser, argument: Argument) -> None:
+    if argument.type is bool:
+        parser.add_argument(f'--{argument.name}', action='store_true', help=argument.help)
+        return
+    parser.add_argument(
+        argument.name,
+        type=argument.type if argument.type in (int, float) else str,
+        help=argument.help,
+        nargs=None if argument.required else '?',
+        default=None if argument.required else argument.default,
+        choices=argument.choices,
+    )

@@ -11,9 +11,8 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
-The parameter memory of a simulated drive: raw numbers by catalog key, and what they may be.
+The parameter memory of a simulated drive: raw numbers by catalog key, and how it says no.
 
 A raw number is the one that the first protocol carries that the tables name for a parameter.
 """
@@ -21,6 +20,7 @@ A raw number is the one that the first protocol carries that the tables name for
 from __future__ import annotations
 
 from collections.abc import Mapping
+import enum
 from fractions import Fraction
 import math
 
@@ -28,8 +28,6 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 
 
 def home(parameter: Parameter) -> str:
@@ -120,11 +118,7 @@ class Memory:
         return default if raw is None else raw * self._factors[key]
 
     def set(self, key: str, value: Value) -> None:
-        """
-        Store a value in engineering units, as someone at the keypad would.
-
-        :raises ValueError: an unknown key, or a value that the drive would refuse.
-        """
+        """Store a value in engineering units, as someone at the keypad would, or a ValueError."""
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         parameter = self.model[key]
@@ -139,11 +133,7 @@ class Memory:
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
-        """
-        Refuse a raw number that the manual does not allow.
-
-        :raises Refused: VALUE.
-        """
+        """Refuse a raw number that the manual does not allow (Refused: VALUE)."""
         value = raw * parameter.factor(home(parameter))
         if parameter.labels:
             if value not in parameter.labels:
@@ -164,3 +154,37 @@ class Memory:
         if low is None or low <= 0:
             return 0
         return -int(-Fraction(low) / parameter.factor(home(parameter)) // 1)
+
+
+class Reason(enum.IntEnum):
+    """
+    Why a request is refused; the numbers are Modbus's exception codes.
+
+    The manuals do not say which code the drive uses when [C87]; these are the standard's meanings.
+    """
+
+    #: The drive does not have this function.
+    FUNCTION = 1
+    #: No such parameter, not its length, not its beginning, or not this way (read, write).
+    ADDRESS = 2
+    #: The value is out of range, or no code of the enumeration.
+    VALUE = 3
+    #: Right as such, but not in the state that the drive is in.
+    STATE = 4
+
+
+class GatewayReason(enum.IntEnum):
+    """What a gateway says in place of a drive; the standard's exception codes."""
+
+    #: It knows no way to the drive.
+    NO_PATH = 10
+    #: The drive does not answer it.
+    NO_ANSWER = 11
+
+
+class Refused(Exception):
+    """The drive refuses a request; ``reason`` goes over the line, the text is for people."""
+
+    def __init__(self, reason: Reason, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason

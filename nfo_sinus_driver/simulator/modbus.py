@@ -27,10 +27,10 @@ from nfo_sinus_driver.catalog import to_bytes
 from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import carried
 from nfo_sinus_driver.simulator.memory import kept
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 
 #: How a drive treats a function.
 KNOWN, REFUSED, SILENT = 'known', 'refused', 'silent'
@@ -53,7 +53,6 @@ _CONFORMITY = 0x82
 _MOST_READ = 125
 _MOST_WRITTEN = 123
 _MOST_WRITTEN_WITH_READ = 121
-
 
 
 class Server:
@@ -104,11 +103,7 @@ class Server:
     # ---- registers ----
 
     def read(self, register: int, count: int) -> tuple[int, ...]:
-        """
-        Read the parameter at a register, as words, the low one first.
-
-        :raises Refused: no such parameter, or not its length.
-        """
+        """Read the parameter at a register, as words, the low one first; else :class:`Refused`."""
         entry = self._log_entry(register, count)
         if entry is not None:
             return entry
@@ -117,11 +112,7 @@ class Server:
         return to_words(parameter.at('modbus').number.encode(raw))
 
     def write(self, register: int, words: Sequence[int]) -> None:
-        """
-        Write the parameter at a register.
-
-        :raises Refused: as the reason says.
-        """
+        """Write the parameter at a register (Refused: as the reason says)."""
         parameter = self._find(register, len(words))
         raw = parameter.at('modbus').number.decode(to_bytes(words))
         self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
@@ -130,11 +121,7 @@ class Server:
     def write_and_read(
         self, register: int, words: Sequence[int], source: int, count: int
     ) -> tuple[int, ...]:
-        """
-        Write the parameter at ``register``, then read the one at ``source``.
-
-        :raises Refused: as the reason says; nothing was written if there is none at ``source``.
-        """
+        """Write the parameter at ``register``, then read that at ``source``; or none of both."""
         self._find(source, count)
         self.write(register, words)
         return self.read(source, count)

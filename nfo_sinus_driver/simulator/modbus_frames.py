@@ -23,10 +23,10 @@ import re
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.memory import GatewayReason
 from nfo_sinus_driver.simulator.modbus import is_write
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.refusal import GatewayReason
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: Everybody obeys a write to this address and nobody answers.
@@ -219,11 +219,7 @@ class ModbusTcp:
         return drive.address == request.address or _for_all(request.address, request.body[2:])
 
     def instead(self, request: Request, there: bool) -> Reply | None:
-        """
-        Say that the drive does not answer, after having waited for it.
-
-        To a drive that there is not the gateway has no path, and says so at once.
-        """
+        """Say, after having waited, that the drive does not answer; or that there is none."""
         if request.address == BROADCAST:
             return None
         reason = GatewayReason.NO_ANSWER if there else GatewayReason.NO_PATH

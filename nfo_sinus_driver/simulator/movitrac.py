@@ -26,10 +26,10 @@ import abc
 from nfo_sinus_driver.simulator import movitrac_frames
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
 from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The silence after which the rest of a frame is not waited for (s). No manual says; a busy
@@ -56,11 +56,7 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def enquiry(self, index: int) -> bytes:
-        """
-        Return the 4 or 8 bytes that stand at an index.
-
-        :raises Nack: they cannot be read.
-        """
+        """Return the 4 or 8 bytes that stand at an index (Nack: they cannot be read)."""
 
     @abc.abstractmethod
     def select(self, index: int, value: bytes) -> None:

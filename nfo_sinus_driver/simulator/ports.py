@@ -148,12 +148,7 @@ def _put_link(link: Path, device: str) -> None:
 
 
 class TcpPort:
-    """
-    A TCP port on this machine, as of a serial device server: one master after another.
-
-    :param port: the port number; 0 lets the system choose.
-    :raises PortError: the port is taken.
-    """
+    """A TCP port here, 0: any, as of a serial device server: one master after another."""
 
     def __init__(self, port: int = 0) -> None:
         self._client: socket.socket | None = None

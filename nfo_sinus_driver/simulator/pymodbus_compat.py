@@ -115,54 +115,34 @@ def tcp_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
 
 
 def decode_read(data: bytes) -> tuple[int, int]:
-    """
-    Decode what follows function 03 or 04: register and count.
-
-    :raises ValueError: malformed, or a count that the standard forbids.
-    """
+    """Decode what follows function 03 or 04: register and count."""
     request = _decoded(_ReadRequest(), data)
     return request.address, request.count
 
 
 def decode_write_single(data: bytes) -> tuple[int, int]:
-    """
-    Decode what follows function 06: register and word.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 06: register and word (ValueError: malformed)."""
     request = _decoded(_WriteSingleRequest(), data)
     word = request.value if hasattr(request, 'value') else request.registers[0]
     return request.address, word
 
 
 def decode_write_multiple(data: bytes) -> tuple[int, int, tuple[int, ...]]:
-    """
-    Decode what follows function 16: register, count, words.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 16: register, count, words (ValueError: malformed)."""
     request = _decoded(_WriteMultipleRequest(), data)
     words = request.values if hasattr(request, 'values') else request.registers
     return request.address, request.count, tuple(words)
 
 
 def decode_write_and_read(data: bytes) -> tuple[int, int, int, int, tuple[int, ...]]:
-    """
-    Decode what follows function 23: what to read, register and count, then what to write.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 23: what to read, then what to write."""
     request = _decoded(_WriteAndReadRequest(), data)
     source = (request.read_address, request.read_count)
     return *source, request.write_address, request.write_count, tuple(request.write_registers)
 
 
 def decode_device(data: bytes) -> tuple[int, int]:
-    """
-    Decode what follows function 43 with MEI type 14: read device ID code and object.
-
-    :raises ValueError: malformed.
-    """
+    """Decode what follows function 43 with MEI type 14: read device ID code and object."""
     request = _decoded(_DeviceRequest(), data)
     return request.read_code, request.object_id
 

@@ -32,6 +32,7 @@ from nfo_sinus_driver.simulator.control import ControlServer
 from nfo_sinus_driver.simulator.control import control_path
 from nfo_sinus_driver.simulator.control import somebody_listens
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.drive import describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.endpoints import parse_endpoint
@@ -39,10 +40,9 @@ from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.family import verbs_of
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.ports import PortError
-from nfo_sinus_driver.simulator.report import describe
 from nfo_sinus_driver.simulator.timing import sharpen_timers
-from nfo_sinus_driver.simulator.trace import Trace
 
 #: How often every drive catches up with the clock while nobody asks it (s).
 _TICK = 0.05
@@ -215,11 +215,7 @@ class Simulator:
             raise RuntimeError('the simulated line broke down') from self.failure
 
     def state(self, address: int | None = None) -> dict[str, Any]:
-        """
-        Return the state of a drive as it is now; without an address, of the only one.
-
-        :raises ValueError: no such drive, or several to choose from.
-        """
+        """Return the state of a drive as it is now; without an address, of the only one."""
         with self.lock:
             drive = self._drive(address)
             drive.advance_to(time.monotonic())
@@ -232,11 +228,7 @@ class Simulator:
     def inject(
         self, what: str, *values: object, address: int | None = None, **arguments: object
     ) -> None:
-        """
-        Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`.
-
-        :raises ValueError: no such verb, drive or argument, or a value that is not possible.
-        """
+        """Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`."""
         if what not in self._verbs:
             raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(self._verbs)}')
         verb = self._verbs[what]

@@ -27,13 +27,7 @@ _PR_SET_TIMERSLACK = 29
 
 @dataclass(frozen=True)
 class Timing:
-    """
-    The line's speed.
-
-    :param baud: bits a second.
-    :param char_format: data bits, parity and stop bits, such as ``8E1``.
-    :raises ValueError: there is no such speed or format.
-    """
+    """The speed of a line: bit/s, and data bits, parity and stop bits, such as ``8E1``."""
 
     baud: int = 19200
     char_format: str = '8E1'

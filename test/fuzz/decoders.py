@@ -41,15 +41,15 @@ from fuzz.judges import Refusal
 from fuzz.mutations import Mutator
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link import modbus_ascii
-from nfo_sinus_driver.link import modbus_identify
+from nfo_sinus_driver.link import modbus_link
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import modbus_tcp
 from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import rtu
-from nfo_sinus_driver.link.answer_reader import AnswerReader
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 
 #: Most bytes that a reader of a whole connection keeps, beside those just handed over.
 _MOST_KEPT = 600
@@ -88,8 +88,8 @@ def _request(asked: Asked) -> modbus_pdu.Request[Any]:
     if function == judges.WRITE_AND_READ:
         return modbus_pdu.WriteAndRead(unit, place, data, place ^ 2, count)
     if function == judges.REPORT_ID:
-        return modbus_identify.ReportSlaveId(unit)
-    return modbus_identify.ReadDevice(unit, count, place)
+        return modbus_link.ReportSlaveId(unit)
+    return modbus_link.ReadDevice(unit, count, place)
 
 
 def _answer(asked: Asked, random: Random) -> bytes:
@@ -138,7 +138,7 @@ def _message(asked: Asked, random: Random) -> bytes:
 def _said(meant: Meaning | None) -> object:
     """Return what the driver makes of a meaning."""
     if isinstance(meant, Objects):
-        return modbus_identify.DeviceObjects(*meant)
+        return modbus_link.DeviceObjects(*meant)
     return meant
 
 
@@ -286,7 +286,7 @@ def _identify(random: Random, frames: int) -> None:
             nonlocal questions
             questions += 1
             asked = Asked(request.unit, request.function)
-            if isinstance(request, modbus_identify.ReadDevice):
+            if isinstance(request, modbus_link.ReadDevice):
                 asked = asked._replace(place=request.first, count=request.code)
             message = _answer(asked, random)
             if random.random() < 0.6:
@@ -296,7 +296,7 @@ def _identify(random: Random, frames: int) -> None:
                 raise NoAnswer
             return answer, 0.0
 
-        inquiry = modbus_identify.ModbusInquiry(unit, ask)
+        inquiry = modbus_link.ModbusInquiry(unit, ask)
         while not inquiry.done:
             with contextlib.suppress(LinkError):
                 inquiry.ask()

@@ -35,15 +35,15 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
-from nfo_sinus_driver.link import classic_refusal
+from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.protocol import Protocol
-from nfo_sinus_driver.simulator.receiver import Receiver
 
 #: Most bytes that a receiver keeps without a word that something is due.
 _MOST_KEPT = 600
@@ -102,7 +102,7 @@ def _catalog(random: Random, frames: int) -> None:
         word = random.getrandbits(16)
         assert words.state_of(word) in State
         assert words_optimal.state_of(word) in State
-        assert len(classic_refusal.flag_names(word)) == bin(word).count('1')
+        assert len(classic.flag_names(word)) == bin(word).count('1')
 
 
 # --- the simulator's receivers --------------------------------------------------------------------

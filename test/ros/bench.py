@@ -63,6 +63,8 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: Machines are shared and slow: a condition that does not come true in this time never will, s.
 PATIENCE = 40.0
+#: All settings of a drive are read before its node is active, of some over 9600 bit/s.
+_STARTING = 3 * PATIENCE
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
 
@@ -194,6 +196,7 @@ class Bench(contextlib.ExitStack):
         super().__init__()
         self.folder = folder
         self.way = way
+        self.drives = way.drives
         #: What `Simulator` is told of the line, by the names of its arguments.
         self.line: dict[str, Any] = {**way.simulator, 'control': str(folder / 'control')}
         if way.protocol == 'modbus_tcp':
@@ -313,19 +316,23 @@ class Client(contextlib.ExitStack):
         messages = self.messages[key]
         return messages[-1] if messages else None
 
-    def wait_for(self, key: str, condition: Callable[[Any], Any], what: str) -> Any:
+    def wait_for(
+        self, key: str, condition: Callable[[Any], Any], what: str, timeout: float = PATIENCE
+    ) -> Any:
         """Wait until the newest message of a topic fulfils a condition; return the message."""
 
         def seen() -> Any:
             message = self.latest(key)
             return message if message is not None and condition(message) else None
 
-        return wait_until(seen, what)
+        return wait_until(seen, what, timeout)
 
     def connected(self) -> Client:
         """Wait until the drive is connected and its node is active."""
-        self.wait_for('status', lambda status: status.connected, 'the drive is connected')
-        wait_until(lambda: self.state() == 'active', 'the node is active')
+        self.wait_for(
+            'status', lambda status: status.connected, 'the drive is connected', _STARTING
+        )
+        wait_until(lambda: self.state() == 'active', 'the node is active', _STARTING)
         return self
 
     # --- commanding ---------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from ways import WAYS
 from ways import Way
 from ways import why_not
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 
 # before any context exists, in this process and in those it starts
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -41,6 +41,7 @@ from support.classic_ends import on_classic
 from support.parameter_ends import ENDS
 from support.parameter_ends import Ends
 from support.variants import hardest
+from support.wire import understand
 from ways import UNFRAMED
 from ways import Way
 
@@ -160,11 +161,18 @@ def _classic(data: bytes) -> Write | None:
     return written(_BY_ID[name].name, (word,), unit, classic=True) if name in _BY_ID else None
 
 
+def _movitrac(data: bytes) -> Write | None:
+    request = understand(data, 'movitrac')
+    assert request is not None
+    return None if request.words is None else Write(request.unit, request.place, request.words)
+
+
 _WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
     'modbus_rtu': lambda frame: _modbus(UNFRAMED['modbus_rtu'](frame)),
     'modbus_ascii': lambda frame: _modbus(UNFRAMED['modbus_ascii'](frame)),
     'modbus_tcp': lambda frame: _modbus(UNFRAMED['modbus_tcp'](frame)),
     'classic': _classic,
+    'movitrac': _movitrac,
 }
 
 

@@ -102,7 +102,7 @@ def test_a_stop_for_all_where_it_may_be(bench: Bench, watched: bool) -> None:
     assert not answer.success
     if watched:
         assert 'no stop was broadcast' in answer.message
-        assert simulator.state(1)['mode'] == Mode.BUS
+        assert bench.drives.taken(simulator.state(1))
     else:
         assert 'a stop for all was broadcast' in answer.message
         # it is MODE = Stop, which takes control, too

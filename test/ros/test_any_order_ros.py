@@ -29,6 +29,7 @@ from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import wait_until
+from drives import Drives
 import pytest
 from ways import needs
 
@@ -36,11 +37,10 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 
 pytestmark = needs('states')
 
-_QUICK = ('--set', 'control.accel=0.2', '--set', 'control.retard=0.2', '--boot-time', '0.2')
+_BOOT = ('--boot-time', '0.2')
 _EAGER = ('-p', 'poll_rate:=20.0', '-p', 'setpoint_timeout:=0.3')
 #: For how long nothing may start, s of the simulated drive; longer than a few polls.
 _A_MOMENT = 0.2
-_OVERLOAD = 5
 
 
 class Walk(contextlib.ExitStack):
@@ -50,8 +50,9 @@ class Walk(contextlib.ExitStack):
     :ivar enabled: somebody enabled it, and nothing has happened since that ends that.
     """
 
-    def __init__(self, drive: Simulated, client: Client) -> None:
+    def __init__(self, drives: Drives, drive: Simulated, client: Client) -> None:
         super().__init__()
+        self._drives = drives
         self._drive = drive
         self._client = client
         self.enabled = False
@@ -123,7 +124,7 @@ class Walk(contextlib.ExitStack):
     # --- what happens to it -----------------------------------------------------------------------
 
     def fault(self) -> None:
-        self._drive.inject('fault', _OVERLOAD, standing=True)
+        self._drive.inject('fault', self._drives.overload.code, standing=True)
         self.enabled = False
         self.judge()
         assert not self._client.call('fault_ack').success
@@ -137,8 +138,11 @@ class Walk(contextlib.ExitStack):
         self._drive.inject('run', True)
 
     def keypad_stop(self) -> None:
-        self._drive.inject('keypad', 'stop')
+        self._drives.stop_at_keypad(self._drive, self._noticed)
         self.enabled = False
+
+    def _noticed(self) -> None:
+        self._client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
 
     def power_cycle(self) -> None:
         self._drive.inject('power-cycle')
@@ -168,12 +172,19 @@ OTHERS = (Walk.enable, Walk.set_points, Walk.no_set_points)
 
 
 @pytest.mark.parametrize('seed', [1])
-@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+@pytest.mark.parametrize(
+    'method',
+    [
+        pytest.param('mode_scmd', marks=needs('scmd')),
+        pytest.param('drive_control', marks=needs('scmd')),
+        pytest.param('function_bits', marks=needs('movitrac')),
+    ],
+)
 def test_any_order(bench: Bench, method: str, seed: int) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*bench.drives.ramps(0.2), *_BOOT)
     bench.driver(*_EAGER, '-p', f'control_method:={method}')
     history = random.Random(seed)
-    with Walk(drive, bench.client().connected()) as walk:
+    with Walk(bench.drives, drive, bench.client().connected()) as walk:
         for event in history.sample(ENDS + OTHERS, len(ENDS + OTHERS)):
             if event in ENDS:
                 walk.ride()

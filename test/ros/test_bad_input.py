@@ -39,10 +39,9 @@ from ways import SILENCE
 from ways import Way
 from ways import needs
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
-_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 _CANNOT_START = 2
 
 
@@ -160,6 +159,7 @@ def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> Non
     client.connected()
 
 
+@needs('format')
 def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Bench) -> None:
     # the simulated drive hears nothing of a line whose format is not its own
     drive = bench.simulator('--set', 'serial.si_prot=8b Op 1s', '--boot-time', '0.1')
@@ -189,7 +189,7 @@ def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
 def test_a_setpoint_that_is_no_number_is_ignored_with_one_warning(
     bench: Bench, value: float
 ) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver()
     client = bench.client().connected()
     assert client.enable().success
@@ -200,7 +200,7 @@ def test_a_setpoint_that_is_no_number_is_ignored_with_one_warning(
 
 
 def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver('-p', 'setpoint_max:=12.0')
     client = bench.client().connected()
     assert client.enable().success
@@ -210,26 +210,27 @@ def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -
         client.wait_for('status', lambda status: abs(status.actual + 12) < 0.3, '-12 Hz')
         _says(driver, 'set-point -4000 is limited to -12')
         assert client.set_parameters(setpoint_max=0.0).successful
-        client.wait_for('status', lambda status: status.setpoint == -150, "the drive's limit")
-    assert drive.state()['setpoint'] == -150
+        most = bench.drives.most
+        client.wait_for('status', lambda status: status.setpoint == -most, "the drive's limit")
+    assert abs(drive.state()['setpoint']) == most
 
 
 def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) -> None:
     drive = bench.simulator()
-    drive.inject('fault', 4, standing=True)
+    hot = bench.drives.hot_motor
+    drive.inject('fault', hot.code, standing=True)
     bench.driver()
     client = bench.client().connected()
     refused = client.enable()
     assert not refused.success
-    sensor = 'thermistor' if bench.way.tells else 'temperature sensor'
-    for part in ('4 PTC Temp', sensor, 'Let the motor cool', '/nfo_sinus/fault_ack'):
+    for part in (str(hot), *hot.explained, '/nfo_sinus/fault_ack'):
         assert part in refused.message
-    assert drive.state()['scmd'] == 0
+    assert not bench.drives.commanded(drive.state())
     assert not drive.state()['turning']
 
 
 def test_what_to_call_is_named_in_full_wherever_it_is(bench: Bench) -> None:
-    bench.simulator().inject('fault', 4, standing=True)
+    bench.simulator().inject('fault', bench.drives.hot_motor.code, standing=True)
     bench.driver('-r', '__ns:=/line1', '-r', '~/fault_ack:=reset')
     refused = bench.client('/line1/nfo_sinus').connected().enable()
     assert refused.message.endswith('then call /line1/reset')
@@ -300,7 +301,7 @@ def untouched(
             ['-p', 'char_format:=8E1'], ['char_format', '7 data bits', '7E1'], marks=needs('seven')
         ),
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1.5 s']),
-        (['-p', 'control_method:=magic'], ['control_method', 'mode_scmd', 'monitor']),
+        (['-p', 'control_method:=magic'], ['control_method', 'monitor']),
         (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
         (['-p', 'protocol:=canopen'], ['protocol', 'modbus_rtu']),
         (['-p', 'baud_rate:=12345'], ['baud_rate', '57600']),
@@ -397,7 +398,7 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     assert {name: bus_node.parameter(name) for name in wanted} == wanted
     assert 'was given to' not in driver.text, 'nothing was given in vain'
     assert client.enable().success
-    assert drive.state()['scmd'] == 0x101
+    assert bench.drives.commanded(drive.state())
     assert not any('_nobody' in name for name in client.node.get_node_names())
 
 

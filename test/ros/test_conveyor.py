@@ -55,7 +55,7 @@ class Conveyor:
 
     def __init__(self, bench: Bench) -> None:
         self.simulator = bench.simulator(
-            '--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0',
+            *bench.drives.ramps(1), '--boot-time', '0',
             *(f'--address={address}' for address in NAMES),
             paced=False,
         )

@@ -33,7 +33,7 @@ from ways import needs
 import yaml
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.node.joint import Joint
+from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 

@@ -35,13 +35,13 @@ class Machine:
 
     def __init__(self, bench: Bench) -> None:
         addresses = [word for address in _DRIVES for word in ('--address', str(address))]
-        ramps = ('--set', 'control.accel=1', '--set', 'control.retard=1')
-        self.simulator = bench.simulator(*addresses, *ramps)
+        self.simulator = bench.simulator(*addresses, *bench.drives.ramps(1))
         parameters = bench.folder / 'two.yaml'
         parameters.write_text(_TWO)
         bench.driver('--params-file', str(parameters))
         self.drives: list[Client] = [bench.client(n).connected() for n in ('/left', '/right')]
         self.bus = bench.client('/nfo_sinus_bus')
+        self.without_run_input = bench.drives.without_run_input
 
     def relay(self, closed: bool) -> None:
         """Close or open the relay of the emergency stop."""
@@ -77,7 +77,7 @@ def test_emergency_stop_and_arming_again(bench: Bench) -> None:
         for drive in machine.drives:
             refused = drive.enable()
             assert not refused.success
-            assert 'RUN input' in refused.message
+            assert machine.without_run_input in refused.message
         machine.relay(closed=True)
         holds_for(A_WHILE, lambda: not any(machine.turning), 'set-points alone move nothing')
         machine.start()
@@ -88,7 +88,7 @@ def test_one_drive_that_stops_does_not_stop_the_other(bench: Bench) -> None:
     left, right = machine.drives
     with left.setpoints(20.0), right.setpoints(-20.0):
         machine.start()
-        machine.simulator.inject('fault', 5, address=1)
+        machine.simulator.inject('fault', bench.drives.overload.code, address=1)
         left.wait_for('status', lambda status: not status.enabled, 'the left one is disarmed')
         wait_until(lambda: machine.turning == [False, True], 'the right one turns on')
         assert machine.bus.call('stop_all').success

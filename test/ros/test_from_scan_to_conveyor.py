@@ -37,7 +37,6 @@ from ways import needs
 
 _COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
 _ADDRESSES = ('--address', '1', '--address', '2', '--address', '3')
-_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 _THREE = """
 nfo_sinus_bus: {{ros__parameters: {{drives: [infeed, middle, outfeed]}}}}
 infeed: {{ros__parameters: {{address: 1}}}}
@@ -48,7 +47,7 @@ outfeed: {{ros__parameters: {{address: 3, {third}}}}}
 
 def start(bench: Bench, third: str = 'telemetry_rate: 2.0', rate: str = '25.0') -> tuple:
     """Start three drives and the driver; return the simulator and a client of each drive."""
-    simulator = bench.simulator(*_ADDRESSES, *_QUICK)
+    simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     parameters = bench.folder / 'three.yaml'
     parameters.write_text(_THREE.format(third=third))
     bench.driver('--params-file', str(parameters), '-p', f'poll_rate:={rate}')
@@ -130,7 +129,7 @@ def test_no_set_point_for_all_without_a_broadcast(bench: Bench) -> None:
 
 
 def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
-    simulator = bench.simulator(*_ADDRESSES, *_QUICK)
+    simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     file = bench.folder / 'found.yaml'
     way = bench.way
     line = ('--protocol', way.protocol, '--model', way.model, '--baud-rate', str(way.baud_rate))

@@ -56,7 +56,10 @@ class Publisher:
 
 
 def start(bench: Bench, *arguments: str, mode: str = 'Freque') -> tuple:
-    simulator = bench.simulator('--set', 'control.accel=0.5', '--set', f'control.mode={mode}')
+    options = bench.drives.ramps(0.5)
+    if mode != 'Freque':
+        options = (*options, '--set', f'control.mode={mode}')
+    simulator = bench.simulator(*options)
     bench.driver('-p', f'expected_control_mode:={mode}', *arguments)
     client = bench.client().connected()
     client.listen('joint_states', JointState, '/nfo_sinus/joint_states', 10)

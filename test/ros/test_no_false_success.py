@@ -34,20 +34,17 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
-from support.wire import Request
 from support.wire import understand
+from told import stop_sequence
 from ways import needs
 
-from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.drive_node import DriveNode
 
-_QUICK = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
 _REFUSING = ('--stop-in-tuning', 'refused')
 #: How a person, a manager of lifecycles or a script stops a drive.
 _WAYS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
@@ -65,7 +62,7 @@ def _succeeds(client: Client, driver: Process, out: str) -> bool:
     return bool(client.call('/nfo_sinus_bus/stop_all' if out == 'stop_all' else out).success)
 
 
-@needs('states')
+@needs('scmd')
 @pytest.mark.parametrize('out', _WAYS)
 def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
     bench: Bench, out: str
@@ -91,13 +88,13 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
 
 
 def test_no_enable_survives_a_stop_that_was_asked_for_after_it(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK, paced=False)
+    drive = bench.simulator(*bench.drives.ramps(0.5), paced=False)
     bench.driver()
     client = bench.client().connected()
     with client.setpoints(20.0, period=0.01):
         for _ in range(20):
             enables = [client.call_async('enable', SetBool, data=True)]
-            drive.wait_for(lambda state: state['mode'] == 3, timeout=PATIENCE)
+            drive.wait_for(bench.drives.taken, timeout=PATIENCE)
             enables.append(client.call_async('enable', SetBool, data=True))
             stop = client.call_async('stop', Trigger)
             wait_until(stop.done, 'stop answers')
@@ -109,11 +106,11 @@ def test_no_enable_survives_a_stop_that_was_asked_for_after_it(bench: Bench) -> 
                 lambda state, at=stood: state['turning'] or state['time'] > at + 0.3,
                 timeout=PATIENCE,
             )
-            assert not state['turning'] or state['scmd'] == 0
+            assert not state['turning'] or not bench.drives.commanded(state)
 
 
 def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK)
+    drive = bench.simulator(*bench.drives.ramps(0.5))
     first = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -129,7 +126,7 @@ def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(benc
         second.signal(signal.SIGTERM)
         status = second.wait()
         state = drive.state()
-        assert state['scmd'] == 0 or status != 0, second.text
+        assert not bench.drives.commanded(state) or status != 0, second.text
         assert status == 0, second.text
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         _run_by_another(bench)
@@ -148,7 +145,7 @@ def _run_by_another(bench: Bench) -> None:
 def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator(*_QUICK, '--address', '1', '--address', '2')
+    drive = bench.simulator(*bench.drives.ramps(0.5), '--address', '1', '--address', '2')
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [good, silent]}}\n'
@@ -169,8 +166,7 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
         assert not any(call.result().success for call in calls)
     requests = [frame for frame in bench.frames()[asked:] if frame['direction'] == 'request']
     asked_of = [understand(bytes.fromhex(frame['hex']), bench.way.protocol) for frame in requests]
-    place = load_family(bench.way.model)['fieldbus.scmd'].at(bench.way.bus).index
-    stop = asked_of.index(Request(1, place, 1, (Scmd.STOP,)))
+    stop = asked_of.index(stop_sequence(bench.way)[0])
     waits = [request for request in asked_of[:stop] if request and request.unit == 2]
     # each of them keeps the line for a time-out: one on its way, one while the call came in
     assert len(waits) <= 2, asked_of[: stop + 1]

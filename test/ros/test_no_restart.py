@@ -26,12 +26,11 @@ from bench import Client
 from bench import Process
 from bench import wait_until
 import pytest
+from support.variants import hardest
 from ways import Way
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
-
-_QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1', '--boot-time', '0.5')
 
 #: The computer has more to do than this one driver.
 _MODEST = ('-p', 'poll_rate:=20.0')
@@ -41,10 +40,10 @@ Rig = tuple[Bench, Simulated, Client]
 
 
 def _hardest(bench: Bench) -> tuple[str, ...]:
-    """Have a G2 keep its run command through a fault and take nothing meanwhile [C98]."""
-    if bench.way.model != 'sinus_g2':
-        return _QUICK
-    return (*_QUICK, '--run-command-in-fault', 'keeps', '--refuses-in-fault', 'all')
+    """Return the options of the drive that makes it hardest, such as [C98]."""
+    variant = hardest(bench.way.model)
+    options = (f'--{name.replace("_", "-")}={value}' for name, value in variant.items())
+    return (*bench.drives.ramps(1), '--boot-time', '0.5', *options)
 
 
 @pytest.fixture(scope='module')
@@ -75,19 +74,22 @@ def _turns_after_enable(drive: Simulated, client: Client) -> None:
 
 
 def _fault_and_acknowledgement(bench: Bench, drive: Simulated, client: Client) -> None:
-    drive.inject('fault', 5)
+    overload = bench.drives.overload
+    drive.inject('fault', overload.code)
     client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
-    wait_until(lambda: 'stopped: fault 5 Overload' in bench.log, 'the reason in the log')
-    assert 'Overload' in client.enable().message
-    assert client.call('fault_ack').message == 'acknowledged 5 Overload'
+    wait_until(lambda: f'stopped: fault {overload}' in bench.log, 'the reason in the log')
+    # a stop may not be confirmed yet
+    wait_until(lambda: overload.text in client.enable().message, 'it is refused, and why')
+    assert client.call('fault_ack').message == f'acknowledged {overload}'
 
 
 def _fault_that_stands(bench: Bench, drive: Simulated, client: Client) -> None:
-    drive.inject('fault', 3, standing=True)
+    overheating = bench.drives.overheating
+    drive.inject('fault', overheating.code, standing=True)
     client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
     refused = client.call('fault_ack')
     assert not refused.success
-    assert 'Temp Hi is still active' in refused.message
+    assert f'{overheating.text} is still active' in refused.message
     drive.inject('ack-cause-gone')
     assert client.call('fault_ack').success
 
@@ -99,8 +101,10 @@ def _run_input_lost_and_back(bench: Bench, drive: Simulated, client: Client) -> 
 
 
 def _keypad_stop(bench: Bench, drive: Simulated, client: Client) -> None:
-    drive.inject('keypad', 'stop')
-    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    bench.drives.stop_at_keypad(
+        drive,
+        lambda: client.wait_for('status', lambda status: not status.enabled, 'it is disarmed'),
+    )
 
 
 def _power_cycle(bench: Bench, drive: Simulated, client: Client) -> None:
@@ -124,9 +128,9 @@ def _adapter_unplugged(bench: Bench, drive: Simulated, client: Client) -> None:
 
 
 def _mode_changed_by_somebody(bench: Bench, drive: Simulated, client: Client) -> None:
-    drive.inject('keypad', 'ext')
+    bench.drives.run_by_terminals(drive)
     client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
-    drive.inject('keypad', 'stop')
+    bench.drives.end_run_by_terminals(drive)
 
 
 def _stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
@@ -134,10 +138,7 @@ def _stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
 
 
 def _quick_stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
-    g2 = bench.way.model == 'sinus_g2'
-    coasts = 'released: the motor coasts'
-    ramps = 'stopping: it ramps down (this drive has no quick stop)'
-    assert client.call('quick_stop').message == (coasts if g2 else ramps)
+    assert client.call('quick_stop').message == bench.drives.quick_stopped()
 
 
 def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
@@ -196,8 +197,8 @@ def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None
     with client.setpoints(20.0):
         refused = client.enable()
         assert not refused.success
-        assert 'RUN input is not active' in refused.message
-        drive.wait_for(lambda state: state['scmd'] == 0, timeout=PATIENCE)
+        assert bench.drives.without_run_input in refused.message
+        drive.wait_for(lambda state: not bench.drives.commanded(state), timeout=PATIENCE)
         drive.inject('run', True)
         _stays_still(drive)
 
@@ -220,7 +221,7 @@ def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
 
 def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> None:
     drive = bench.simulator(*_hardest(bench))
-    drive.inject('keypad', 'ext')
+    bench.drives.run_by_terminals(drive)
     running = drive.wait_for(lambda state: state['driven'], timeout=PATIENCE)
     driver = bench.driver()
     client = bench.client().connected()

@@ -28,7 +28,7 @@ from parameter_bench import set_one
 import pytest
 from ways import WAYS
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _STOP = 1

@@ -37,7 +37,7 @@ import pytest
 from ways import Way
 from ways import needs
 
-from nfo_sinus_driver.demo.domain import own_domain
+from nfo_sinus_driver.demo.bench import own_domain
 
 pytestmark = needs('parameters')
 

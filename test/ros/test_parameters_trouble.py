@@ -39,8 +39,8 @@ import pytest
 from std_srvs.srv import Trigger
 from ways import needs
 
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 pytestmark = needs('parameters')
 

@@ -25,10 +25,9 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from support.wire import Request
 from support.wire import understand
+from told import run_command
+from told import stop_sequence
 from ways import needs
-
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 pytestmark = needs('states')
 
@@ -46,17 +45,9 @@ def _asked(bench: Bench) -> list[tuple[float, Request | None]]:
     ]
 
 
-def _place(bench: Bench, key: str) -> int:
-    return load_family(bench.way.model)[key].at(bench.way.bus).index
-
-
-def _write(place: int, word: int) -> Request:
-    return Request(1, place, 1, (word,))
-
-
 def _stops(bench: Bench) -> list[float]:
     """Return when the good drive was told to stop."""
-    stop = _write(_place(bench, 'fieldbus.scmd'), Scmd.STOP)
+    stop = stop_sequence(bench.way)[0]
     return [at for at, request in _asked(bench) if request == stop]
 
 
@@ -114,17 +105,8 @@ def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: 
     two = bench.client('/two').connected()
     with one.run_at(10.0), two.run_at(10.0):
         assert one.call('stop').success
-    # older firmware has no status word [C21], and one place for all set-points [C11]
-    older, classic = bench.way.dialect == '5.0', bench.way.protocol == 'classic'
-    status = _place(bench, 'fieldbus.inv_st' if older else 'fieldbus.drive_status')
-    setpoint = _place(bench, 'fieldbus.setpoint' if classic else 'status.frq_set')
-    scmd = _place(bench, 'fieldbus.scmd')
     requests = [request for _, request in _asked(bench)]
-    run = _write(scmd, Scmd.FIELDBUS)
+    run, sequence = run_command(bench.way), stop_sequence(bench.way)
     last_run = max(number for number, request in enumerate(requests) if request == run)
-    stop = requests.index(_write(scmd, Scmd.STOP), last_run)
-    # the stop, set-point 0, and the status that confirms it follow each other directly
-    zero, look = requests[stop + 1 : stop + 3]
-    assert zero == _write(setpoint, 0)
-    assert look is not None
-    assert (look.unit, look.place, look.words) == (1, status, None)
+    stop = requests.index(sequence[0], last_run)
+    assert requests[stop : stop + len(sequence)] == sequence

@@ -29,24 +29,13 @@ import pytest
 from std_srvs.srv import SetBool
 from ways import needs
 
-#: What a drive calls its state while it ramps down.
-_RAMPS = {'sinus_g2': 'SHUTDOWN', 'sinus_optimal': 'STOPPING'}
 #: Its inverter status in the start delay.
 _START_DELAY = {'sinus_g2': 25, 'sinus_optimal': 54}
 
 
-def _stops(state: dict) -> bool:
+def _stops(bench: Bench, state: dict) -> bool:
     """Tell whether the motor stands or is on its way: the drive drives it to a stop or not."""
-    return not state['turning'] or state['state'] in (
-        *_RAMPS.values(),
-        'DISABLE',
-        'QUICK_STOP',
-        'SWITCHED_ON',
-        'READY_TO_SWITCH_ON',
-        'SWITCH_ON_DISABLED',
-        'FAULT_REACTION_ACTIVE',
-        'FAULTED',
-    )
+    return not state['turning'] or bench.drives.stopping(state)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +51,7 @@ def _stops(state: dict) -> bool:
     ids=lambda number: number.name,
 )
 def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int) -> None:
-    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     # as a background job of a shell is started, and worse
     driver = bench.driver(through=('env', '--ignore-signal=INT,QUIT,HUP,TERM,USR1,RTMIN'))
     client = bench.client().connected()
@@ -71,14 +60,12 @@ def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int)
         driver.signal(number)
         assert driver.wait() == 0, driver.text
         state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert state['mode'] == 1, 'control was not given back'
-    assert state['scmd'] == 0
+    assert bench.drives.left(state), 'control was not given back'
     assert state['fault'] == 0
-    assert state['mode_ext_writes'] == 0
 
 
 def test_a_signal_that_comes_to_a_thread_of_a_library_stops_the_motor(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver()
     client = bench.client().connected()
     open_ones = [
@@ -94,12 +81,12 @@ def test_a_signal_that_comes_to_a_thread_of_a_library_stops_the_motor(bench: Ben
         driver.signal(signal.SIGTERM, thread=int(open_ones[0].name))
         assert driver.wait() == 0, driver.text
         state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert state['mode'] == 1, 'control was not given back'
+    assert bench.drives.left(state), 'control was not given back'
     assert state['fault'] == 0
 
 
 def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.retard=60', '--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1, 60))
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -107,16 +94,16 @@ def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None
         assert driver.wait() == 0, driver.text
         state = drive.state()
     assert state['turning']
-    assert state['scmd'] == 0
-    assert state['state'] == _RAMPS[bench.way.model]
+    assert not bench.drives.commanded(state)
+    assert state['driven'] and bench.drives.stopping(state)
     assert state['fault'] == 0
 
 
-@needs('parameters')
+@needs('timeout', 'quiet')
 def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator('--set', 'control.retard=60', '--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1, 60))
     driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'drive_timeout:=2.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -129,27 +116,25 @@ def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     assert not state['error_log']
 
 
-@needs('parameters')
+@needs('timeout')
 def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     drive = bench.simulator(
-        '--set', 'control.retard=60', '--set', 'control.accel=1', '--set', 'serial.auto_stop=OFF'
+        *bench.drives.ramps(1, 60), *bench.drives.no_timeout
     )
     # so long that no busy machine is silent for it
     driver = bench.driver('-p', 'drive_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(20.0):
-        parameters = drive.state()['parameters']
-        assert parameters['serial.sio_tot'] == 3.0
-        assert parameters['serial.auto_stop'] is True
+        assert bench.drives.has_timeout(drive.state(), 3.0)
         driver.signal(signal.SIGKILL)
         assert driver.wait() == -signal.SIGKILL
         state = drive.wait_for(lambda state: not state['driven'], timeout=PATIENCE)
     assert state['fault'], 'the drive stopped for another reason'
 
 
-@needs('parameters')
+@needs('timeout')
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     # without telemetry, and with a poll every five seconds, only the keeping alive is left
     settings = ('drive_timeout:=2.0', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
     bench.driver(*(word for setting in settings for word in ('-p', setting)))
@@ -167,7 +152,7 @@ def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
             lambda state: state['fault'] or state['time'] > stopped + 4.0, timeout=PATIENCE
         )
     assert not state['fault']
-    assert state['mode'] == 3, 'control is still ours, and that makes this a test'
+    assert bench.drives.taken(state), 'control is still ours, and that makes this a test'
 
 
 def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
@@ -180,12 +165,12 @@ def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
 
 
 def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
         assert client.change_state(Transition.TRANSITION_DEACTIVATE)
-        assert _stops(drive.state())
+        assert _stops(bench, drive.state())
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         stood = drive.state()['time']
         state = drive.wait_for(
@@ -198,12 +183,12 @@ def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
 
 def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
     # slow answers keep the enable long enough on its way
-    drive = bench.simulator('--turnaround', '0.1', '--set', 'control.accel=1')
+    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1))
     driver = bench.driver('-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     with client.setpoints(20.0):
         enable = client.call_async('enable', SetBool, data=True)
-        drive.wait_for(lambda state: state['mode'] == 3, timeout=PATIENCE)
+        drive.wait_for(bench.drives.taken, timeout=PATIENCE)
         assert client.change_state(Transition.TRANSITION_DEACTIVATE)
         wait_until(enable.done, 'enable answers')
         assert 'stopped while it was being enabled' in enable.result().message
@@ -215,9 +200,10 @@ def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
         assert not state['turning']
     driver.signal(signal.SIGINT)
     assert driver.wait() == 0, driver.text
-    assert drive.state()['mode'] == 1
+    assert bench.drives.left(drive.state())
 
 
+@needs('delay')
 def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.run_dly=3000')
     bench.driver()
@@ -228,41 +214,40 @@ def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) ->
     assert other.enable(False).success
     wait_until(enable.done, 'enable answers')
     assert not enable.result().success
-    drive.wait_for(lambda state: state['scmd'] == 0, timeout=PATIENCE)
+    drive.wait_for(lambda state: not bench.drives.commanded(state), timeout=PATIENCE)
 
 
 def test_cleanup_gives_control_back_without_mode_ext(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
         assert client.change_state(Transition.TRANSITION_DEACTIVATE)
         assert client.change_state(Transition.TRANSITION_CLEANUP)
     state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert state['mode'] == 1
-    assert state['mode_ext_writes'] == 0
+    assert bench.drives.left(state)
     assert state['fault'] == 0
 
 
 def test_lifecycle_shutdown_stops_the_motor(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
         assert client.change_state(Transition.TRANSITION_ACTIVE_SHUTDOWN)
-        assert _stops(drive.state())
+        assert _stops(bench, drive.state())
         state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert state['mode'] == 1
+    assert bench.drives.left(state)
 
 
 def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver('-p', 'setpoint_timeout:=0.5')
     client = bench.client().connected()
     with client.run_at(20.0):
         pass
     drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert drive.state()['scmd'] == 0x101, 'it is still enabled'
+    assert bench.drives.commanded(drive.state()), 'it is still enabled'
     wait_until(lambda: 'no set-point for 0.5 s' in driver.text, 'the warning')
     with client.setpoints(15.0):
         client.wait_for('status', lambda status: status.actual > 14, 'it moves again')
@@ -270,7 +255,7 @@ def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Benc
 
 
 def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -281,7 +266,7 @@ def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
 
 
 def test_a_driver_that_was_suspended_takes_no_signal_for_granted(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1', '--set', 'control.retard=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -297,7 +282,7 @@ def test_a_driver_that_was_suspended_takes_no_signal_for_granted(bench: Bench) -
 
 
 def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.retard=1', '--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     pipe = bench.folder / 'pipe'
     os.mkfifo(pipe)
     with open(os.open(pipe, os.O_RDWR | os.O_NONBLOCK), 'wb', buffering=0) as nobody:
@@ -310,11 +295,11 @@ def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> 
             driver.signal(signal.SIGTERM)
             assert driver.wait() == 0
         state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-    assert state['mode'] == 1, 'control was not given back'
+    assert bench.drives.left(state), 'control was not given back'
 
 
 def test_a_driver_whose_streams_are_closed_takes_its_log_for_no_signal(bench: Bench) -> None:
-    bench.simulator('--set', 'control.accel=1')
+    bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver(through=('sh', '-c', 'exec "$@" <&- >&- 2>&-', 'sh'))
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -323,7 +308,7 @@ def test_a_driver_whose_streams_are_closed_takes_its_log_for_no_signal(bench: Be
 
 
 def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=1')
+    drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
     client = bench.client().connected()
     with client.run_at(20.0):

@@ -21,6 +21,8 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from drives import DRIVES
+from drives import Drives
 import pytest
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
@@ -37,9 +39,15 @@ WITHOUT = {
     'later': 'on this firmware it counts at once, and the line is gone [C7]',
     'at_once': 'on this firmware it counts from the next power-up on [C7]',
     'fast': 'this dialect knows no more than 9600 bit/s',
-    'parameters': 'this model has no drive parameters',
+    'parameters': 'this model has not the settings that it names',
+    'timeout': 'this model has no time-out of its own',
     'bare': 'this model has drive parameters',
     'states': 'there is no state machine that the words of the test are about',
+    'scmd': 'it is about the run commands of a G2',
+    'movitrac': 'it is about a MOVITRAC',
+    'quiet': 'its time-out goes on where nobody is: control stays with the bus',
+    'delay': 'this model has no start delay',
+    'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
 }
@@ -80,7 +88,12 @@ class Way:
     @property
     def bus(self) -> str:
         """How parameters are addressed."""
-        return 'classic' if self.protocol == 'classic' else 'modbus'
+        return self.protocol if self.protocol in ('classic', 'movitrac') else 'modbus'
+
+    @property
+    def drives(self) -> Drives:
+        """What is to be known of its drives."""
+        return DRIVES[self.model]
 
     @property
     def simulator(self) -> dict[str, str | int]:
@@ -102,7 +115,7 @@ class Way:
     @property
     def tells(self) -> bool:
         """The drive has settings to be read, and the driver knows from them how it is set."""
-        return 'parameters' in self.features
+        return 'bare' not in self.features
 
     @property
     def absent(self) -> tuple[str, str]:
@@ -125,8 +138,12 @@ class Way:
         return SILENCE if self.protocol == 'modbus_tcp' else ('is no answer', 'baud rate', 'parity')
 
 
-_G2 = frozenset(('fast', 'later', 'newer', 'parameters', 'states'))
-_OPTIMAL = frozenset(('bare', 'fast', 'fine', 'later', 'modbus', 'newer'))
+#: Of any firmware, and of the usual one.
+_OLD_G2 = frozenset(('delay', 'format', 'parameters', 'quiet', 'timeout'))
+_G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
+_OPTIMAL = frozenset((
+    'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer',
+))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _CLASSIC = frozenset(('classic', 'serial'))
 _RTU = frozenset(('eight', 'serial'))
@@ -146,6 +163,11 @@ _NOT_OF_THE_OPTIMAL = frozenset((
     'output_voltage', 'dc_link_voltage', 'torque', 'motor_temperature', 'pt1000_temperature',
     'brake_time', 'energy', 'total_energy',
 ))
+_NOT_IN_INDEX_284 = frozenset(('network_reference', 'setpoint_reached'))
+_NOT_OF_THE_MOVITRAC = frozenset((
+    'output_current', 'output_power', 'power_factor', 'torque', 'motor_temperature',
+    'pt1000_temperature', 'operating_time', 'running_time', 'brake_time', 'energy', 'total_energy',
+))
 
 WAYS = {
     way.name: way
@@ -158,7 +180,7 @@ WAYS = {
         Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
         Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
         Way(
-            'classic_v5', 'classic', _G2 & {'parameters'} | _CLASSIC | {'at_once'},
+            'classic_v5', 'classic', _OLD_G2 | _CLASSIC | {'at_once'},
             dialect='5.0', baud_rate=9600, beyond=NEWER,
             untold=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
         ),
@@ -169,11 +191,15 @@ WAYS = {
             )
             for kind, features in (('rtu', _RTU), ('ascii', _ASCII))
         ),
+        Way(
+            'movitrac', 'movitrac', frozenset(('movitrac', 'serial', 'states', 'timeout')),
+            'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
+        ),
     )
 }
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.
-EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii')
+EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii', 'movitrac')
 
 
 def needs(*features: str) -> pytest.MarkDecorator:

@@ -43,7 +43,7 @@ CALLS = Calls(
 
 class Said(str):
     """
-    A sentence.
+    A templates.
 
     :ivar causes: what it says, and why.
     """

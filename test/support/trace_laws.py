@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from support.movitrac_laws import MovitracJudge
 from support.wire import WITH_GAP
 from support.wire import Request
 from support.wire import understand
@@ -78,7 +79,7 @@ def violations(
 
     :param frame_gap: the least silence before a request, t3.5, s; counts for Modbus RTU alone.
     """
-    judge = _Judge(model, protocol)
+    judge = MovitracJudge() if protocol == 'movitrac' else _Judge(model, protocol)
     return [
         f'frame {number}: {complaint} ({frame["hex"]})'
         for number, frame in enumerate(frames)

@@ -268,9 +268,8 @@ def test_launch_file_is_documented(path: Path) -> None:
 
 def test_simulator_is_documented() -> None:
     folder = PACKAGE / 'simulator'
-    injections, inject = read(folder / 'injections.py'), read(folder / 'inject.py')
-    names = options(read(folder / 'main.py')) | options(inject)
-    names |= verbs(injections, inject) | switches(injections)
+    injections, main = read(folder / 'injections.py'), read(folder / 'main.py')
+    names = options(main) | verbs(injections, main) | switches(injections)
     assert {'--link', '--paced', '--standing', 'fault', 'power-cycle', 'state'} <= names
     assert names - documented(read(SIMULATOR)) == set()
 

@@ -42,7 +42,7 @@ from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.profile import one
 from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.role import Role
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
 from nfo_sinus_driver.families.movitrac31.words import Bits

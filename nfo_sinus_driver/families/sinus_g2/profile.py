@@ -46,8 +46,8 @@ from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.catalog.profile import one
 from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.role import Role
 from nfo_sinus_driver.catalog.status import Meaning
+from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words

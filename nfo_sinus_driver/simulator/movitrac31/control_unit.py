@@ -219,11 +219,7 @@ class MovitracControlUnit(ControlUnit):
         self._switch(ENABLE, active)
 
     def switch(self, number: int, closed: bool) -> None:
-        """
-        Close or open a binary input.
-
-        :raises ValueError: there is no such input.
-        """
+        """Close or open a binary input (ValueError: there is no such input)."""
         self._switch(number, closed)
         self.settle()
 
@@ -306,9 +302,7 @@ class MovitracControlUnit(ControlUnit):
     def settled(self) -> bool:
         """Whether nothing happens by the clock alone."""
         watches = self._watches and PC_TIMEOUT not in self.faults.codes
-        return not (
-            watches or self._sequence.waiting or self._resets_itself or self.factory_left
-        )
+        return not (watches or self._sequence.waiting or self._resets_itself or self.factory_left)
 
     def settle(self) -> None:
         """Let the output stage do what is wanted, unless something keeps it off."""

@@ -65,11 +65,7 @@ class ParameterSet:
 
 
 def parameter_set(memory: Memory, number: int, second_ramp: bool) -> ParameterSet:
-    """
-    Return what a set says.
-
-    :param second_ramp: ramp 2 is chosen, which is one for both ways.
-    """
+    """Return what a set says (second_ramp: ramp 2 is chosen, which is one for both ways)."""
     get = memory.number
     # V/f pattern 3 is one for both sets
     pattern = number if get(f'frequency.vf_pattern_{number}') else 3

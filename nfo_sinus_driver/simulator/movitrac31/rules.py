@@ -38,9 +38,7 @@ def _never_both(one: str, other: str, code: ReturnCode) -> Iterator[_Rule]:
     yield _Rule(other, True, one, True, code)
 
 
-def _needs(
-    key: str, needed: str, missing: ReturnCode, in_use: ReturnCode
-) -> Iterator[_Rule]:
+def _needs(key: str, needed: str, missing: ReturnCode, in_use: ReturnCode) -> Iterator[_Rule]:
     yield _Rule(key, True, needed, False, missing)
     yield _Rule(needed, False, key, True, in_use)
 

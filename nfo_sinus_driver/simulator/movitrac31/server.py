@@ -113,11 +113,7 @@ class Server(movitrac.Server):
         return self._signed(data) if isinstance(table, Bcd) and raw < 0 else data
 
     def _number(self, parameter: Parameter, value: bytes) -> int:
-        """
-        Return the raw number of bytes.
-
-        :raises Nack: they mean none.
-        """
+        """Return the raw number of bytes (Nack: they mean none)."""
         table = self._drive.model[parameter.key].at(_PROTOCOL).number
         codec = parameter.at(_PROTOCOL).number
         negative = codec.signed and isinstance(table, Bcd) and value[0] >> 4 == self._negative

@@ -40,10 +40,7 @@ _MORE_INPUTS: Mapping[str, tuple[int, ...]] = {
     'fea': (48, 49, 50, 51),
     'fio': (48, 49, 50, 51, 52, 53, 54),
 }
-_MORE_OUTPUTS: Mapping[str, tuple[int, ...]] = {
-    'fea': (63, 64),
-    'fio': (63, 64, 69, 70, 71, 72),
-}
+_MORE_OUTPUTS: Mapping[str, tuple[int, ...]] = {'fea': (63, 64), 'fio': (63, 64, 69, 70, 71, 72)}
 
 
 class Terminals:
@@ -63,11 +60,7 @@ class Terminals:
         self.closed: frozenset[int] = frozenset()
 
     def switch(self, number: int, closed: bool) -> None:
-        """
-        Close or open a binary input.
-
-        :raises ValueError: there is no such input.
-        """
+        """Close or open a binary input (ValueError: there is no such input)."""
         if number not in self.inputs:
             known = ', '.join(map(str, self.inputs))
             raise ValueError(f'there is no binary input {number}, only {known}')

@@ -87,17 +87,12 @@ class Variant:
         text='what is shown at standstill with an enable but no direction',
     )
     settings_need: str = _one_of(
-        'nothing',
-        'output_off',
-        'inhibit',
-        text='what has to be so for a setting to be written',
+        'nothing', 'output_off', 'inhibit', text='what has to be so for a setting to be written'
     )
     bits_after_power_on: str = _one_of(
         'cleared', 'kept', text='what becomes of function bits and set-point by power-off'
     )
-    bits_in_fault: str = _one_of(
-        'kept', 'cleared', text='what a fault does to the function bits'
-    )
+    bits_in_fault: str = _one_of('kept', 'cleared', text='what a fault does to the function bits')
 
     def __post_init__(self) -> None:
         for one in fields(self):

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 How a Sinus is commanded, what reference it follows, and what its display says of it.
 
@@ -29,6 +28,7 @@ from collections.abc import Iterator
 from collections.abc import Mapping
 from collections.abc import Sequence
 import contextlib
+from dataclasses import dataclass
 from dataclasses import replace
 import enum
 from typing import Any
@@ -38,20 +38,16 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.modbus import KNOWN
 from nfo_sinus_driver.simulator.modbus import TREATMENTS
 from nfo_sinus_driver.simulator.motor import Nameplate
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
-from nfo_sinus_driver.simulator.sinus.faults import REFUSALS
-from nfo_sinus_driver.simulator.sinus.faults import SinusFaults
 from nfo_sinus_driver.simulator.sinus.serial_side import LINE_SETTINGS
+from nfo_sinus_driver.simulator.sinus.serial_side import REFUSALS
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 from nfo_sinus_driver.simulator.sinus.serial_side import SerialSide
-from nfo_sinus_driver.simulator.sinus.variant import ALL
-from nfo_sinus_driver.simulator.sinus.variant import DROPS
-from nfo_sinus_driver.simulator.sinus.variant import SCMD
-from nfo_sinus_driver.simulator.sinus.variant import Variant
+from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 from nfo_sinus_driver.simulator.timing import Timing
 
 
@@ -488,3 +484,44 @@ class SinusControlUnit(ControlUnit):
             'sio_err_reads': self.sio_err_reads,
             'mode_ext_writes': self.mode_ext_writes,
         }
+
+
+KEEPS, DROPS = 'keeps', 'drops'
+ALL, SCMD, NOTHING = 'all', 'scmd', 'nothing'
+TAKEN, REFUSED = 'taken', 'refused'
+#: What each of them can be, what the G2 does by default last.
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    'run_command_in_fault': (KEEPS, DROPS),
+    'refuses_in_fault': (ALL, SCMD, NOTHING),
+    'stop_in_tuning': (REFUSED, TAKEN),
+}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """
+    One way to read the manuals; by default a G2 that follows [M0 table 16].
+
+    :ivar run_command_in_fault: what becomes of a run command by a fault [C98]. ``keeps``: it
+        stands, and the motor starts by itself when the fault is over. ``drops``: an acknowledgement
+        ends it, also one that was given meanwhile, so a run needs a new one [M0 table 16]. A fault
+        that the drive ends by itself starts the motor again in either case: that is what RstDly and
+        ErrCnt are for. So do the terminals, whose RUN stands. With DriveControl the G2's state
+        machine decides.
+    :ivar refuses_in_fault: what is refused while a fault is active [C98], in whatever protocol:
+        ``all`` but DriveControl and MODE = Stop in a serial fault, the run command (``scmd``), or
+        ``nothing``.
+        Classic refuses all whatever this says [M0 §6.1.5].
+    :ivar stop_in_tuning: whether SCMD = Stop is ``taken`` while MODE is Inhibit, and ends the
+        tuning, or ``refused`` until it is over [C101].
+    :raises ValueError: one of them cannot be that.
+    """
+
+    run_command_in_fault: str = DROPS
+    refuses_in_fault: str = NOTHING
+    stop_in_tuning: str = TAKEN
+
+    def __post_init__(self) -> None:
+        for name, choices in CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise ValueError(f'{name}: choose one of {", ".join(choices)}')

@@ -28,9 +28,9 @@ from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.modbus import KNOWN
 from nfo_sinus_driver.simulator.modbus import TREATMENTS
+from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES
 from nfo_sinus_driver.simulator.sinus.control_unit import KEYS
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
-from nfo_sinus_driver.simulator.sinus.variant import CHOICES
 
 OPTIONS = (
     Option('lenient', 'a Classic message that is refused while the bus has control is no serial '

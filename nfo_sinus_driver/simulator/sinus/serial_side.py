@@ -11,8 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""The serial interface of a Sinus: the settings in effect, and the watch on silence."""
+"""The serial interface of a Sinus: settings in effect, the watch on silence, its own faults."""
 
 from __future__ import annotations
 
@@ -22,6 +21,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 
+from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.timing import Timing
 
@@ -30,9 +33,7 @@ BUS_TYPES: Mapping[str, int] = {'classic': 1, 'modbus_ascii': 2, 'modbus_rtu': 3
 BAUD_CODES = {1200: 16, 2400: 32, 4800: 64, 9600: 128, 19200: 256, 38400: 512, 57600: 768}
 FORMAT_CODES = {'7E1': 0, '7O1': 1, '7N2': 2, '8E1': 4, '8O1': 5, '8N2': 6}
 #: By these it hears the line.
-LINE_SETTINGS = frozenset(
-    {'serial.bus_type', 'serial.address', 'serial.si_baud', 'serial.si_prot'}
-)
+LINE_SETTINGS = frozenset({'serial.bus_type', 'serial.address', 'serial.si_baud', 'serial.si_prot'})
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,7 @@ class LineRules:
     at_once: bool = False
 
     def check(self, protocol: str, timing: Timing) -> None:
-        """
-        Look whether a drive can be set to a line.
-
-        :raises ValueError: it does not know the speed or the format.
-        """
+        """Look whether a drive can be set to a line, or a ValueError."""
         if timing.baud not in BAUD_CODES:
             choices = ', '.join(map(str, BAUD_CODES))
             raise ValueError(f'{timing.baud} baud: choose one of {choices}')
@@ -101,12 +98,7 @@ class SerialSide:
         self.bus_type = self._memory.raw('serial.bus_type')
 
     def set_to(self, lines: Sequence[tuple[str, Timing]]) -> None:
-        """
-        Set the drive to the first of some lines, but for what was set otherwise.
-
-        :raises ValueError: it does not know the speed or the format of one, or was given an address
-            as a setting.
-        """
+        """Set the drive to the first of some lines, but for what was set otherwise."""
         if 'serial.address' in self._memory.given:
             raise ValueError('serial.address: give the address with --address')
         for spoken, timing in lines:
@@ -153,3 +145,61 @@ class SerialSide:
     def timed_out(self) -> bool:
         """Whether the silence has lasted longer than SioTot."""
         return self.watches and self._unheard >= self._memory.number('serial.sio_tot')
+
+
+#: The flags of messages that were understood and are not carried out.
+REFUSALS = (
+    LineError.BLOCKED
+    | LineError.PREFIX
+    | LineError.NOT_PERMITTED
+    | LineError.UNKNOWN
+    | LineError.UNREADABLE
+    | LineError.UNWRITABLE
+    | LineError.OUT_OF_RANGE
+)
+
+
+class SinusFaults(Faults):
+    """
+    The faults of a Sinus.
+
+    :param log_size: entries that the error log holds [C4].
+
+    :ivar sio_err: what went wrong on the line since it was last read.
+    """
+
+    def __init__(self, model: Family, *, log_size: int = 32) -> None:
+        (lost,) = (code.code for code in model.codes(Meaning.SERIAL_FAILURE))
+        # where SioErr can be read, that is how it is acknowledged [C42]
+        kept = {lost} if 'fieldbus.sio_err' in model else set()
+        super().__init__(model, log_size=log_size, kept=kept)
+        #: What a silent or damaged line leads to.
+        self.line_lost = lost
+        #: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges
+        #: them [M0 §6.1.5].
+        self.of_the_line = {lost, *(code.code for code in model.codes(Meaning.FIELDBUS_FAILURE))}
+        self.sio_err = LineError(0)
+
+    @property
+    def serial(self) -> bool:
+        """Whether a fault of the serial channel is active."""
+        return not self.of_the_line.isdisjoint(self._present)
+
+    def acknowledge_serial(self) -> None:
+        """Acknowledge the serial channel's faults, as MODE = Stop does [M0 §6.1.5]."""
+        self.sio_err = LineError(0)
+        self._present = {
+            code: cause for code, cause in self._present.items() if code not in self.of_the_line
+        }
+
+    def take_sio_err(self) -> LineError:
+        """Return the flags of SioErr and clear them, and Sio Fail unless its cause lasts."""
+        flags, self.sio_err = self.sio_err, LineError(0)
+        if not self._present.get(self.line_lost, True):
+            del self._present[self.line_lost]
+        return flags
+
+    def restart(self) -> None:
+        """Forget what a power cycle makes forget."""
+        self.sio_err = LineError(0)
+        super().restart()

@@ -35,11 +35,11 @@ from nfo_sinus_driver.simulator import classic
 from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.measured import measure
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import carried
 from nfo_sinus_driver.simulator.memory import kept
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 #: Counters of 24 bits [C26].
@@ -55,11 +55,7 @@ _FLAGS: Mapping[Reason, LineError] = {
 
 
 class Server(classic.Server):
-    """
-    The Classic side of one G2.
-
-    :ivar tears: how many times yet a counter goes on between the readings of its two halves.
-    """
+    """The Classic side of one G2; so many times yet a counter ``tears`` while it is read."""
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, G2ControlUnit)

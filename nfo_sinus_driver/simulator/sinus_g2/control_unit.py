@@ -30,27 +30,27 @@ from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.motor import Regulation
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
 from nfo_sinus_driver.simulator.sinus import control_unit
+from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
-from nfo_sinus_driver.simulator.sinus.faults import SinusFaults
+from nfo_sinus_driver.simulator.sinus.control_unit import Variant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
-from nfo_sinus_driver.simulator.sinus.variant import REFUSED
-from nfo_sinus_driver.simulator.sinus.variant import Variant
-from nfo_sinus_driver.simulator.sinus_g2.commands import RELEASED
-from nfo_sinus_driver.simulator.sinus_g2.commands import RUN_COMMANDS
-from nfo_sinus_driver.simulator.sinus_g2.commands import RUNNING
-from nfo_sinus_driver.simulator.sinus_g2.commands import STANDBY
-from nfo_sinus_driver.simulator.sinus_g2.commands import local_share
+from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import RELEASED
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import RUN_COMMANDS
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import RUNNING
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import STANDBY
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import local_share
 from nfo_sinus_driver.simulator.sinus_g2.tuning import FAILURES
 from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
 from nfo_sinus_driver.simulator.sinus_g2.tuning import Tuning
@@ -185,11 +185,7 @@ class G2ControlUnit(SinusControlUnit):
         self.self_restart.tripped(code)
 
     def fail_tuning(self, code: int) -> None:
-        """
-        Let the next tuning end with a fault.
-
-        :raises ValueError: none that a tuning ends with.
-        """
+        """Let the next tuning end with a fault (ValueError: none that a tuning ends with)."""
         if code not in FAILURES:
             raise ValueError(f'a tuning fails with {sorted(FAILURES)}, not with {code}')
         self._next_failure = code

@@ -119,11 +119,7 @@ _FIRST_NEW = Fraction('4.28')
 
 
 def firmware_of(memory: Memory, dialect: str | None = None) -> Firmware:
-    """
-    Return which of the two a drive has, by its SWVer, or by the manual that describes it.
-
-    :raises ValueError: there is no such manual, or SWVer was given and is of the other firmware.
-    """
+    """Return which of the two a drive has, by its SWVer, or by the manual that describes it."""
     if dialect is not None:
         if dialect not in DIALECTS:
             raise ValueError(f'unknown dialect {dialect!r}: choose one of {", ".join(DIALECTS)}')

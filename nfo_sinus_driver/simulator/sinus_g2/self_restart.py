@@ -62,12 +62,7 @@ class SelfRestart:
         self._waited = self._ran = 0.0
 
     def wait(self, dt: float, *, driven: bool, voltage: bool) -> None:
-        """
-        Let ``dt`` seconds pass.
-
-        :param driven: the motor runs.
-        :param voltage: there is still voltage on it, so that the reaction to a fault goes on.
-        """
+        """Let ``dt`` seconds pass; while there is voltage, the reaction to a fault goes on."""
         if self.waiting and not voltage:
             self._waited += dt
             if self._waited >= self._memory.number(_RST_DLY):

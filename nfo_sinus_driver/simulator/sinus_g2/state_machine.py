@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 The generic state machine of the drive [M0 §7.1, tables 14 to 16].
 
@@ -21,11 +20,14 @@ are translated to control words for it [M0 §7].
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import enum
 
 from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 
 #: Without both of these the power is off, or a quick stop is wanted [M0 table 14].
 _POWER = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
@@ -70,13 +72,7 @@ class Conditions:
 
 
 class StateMachine:
-    """
-    The generic state machine.
-
-    :ivar phase: the state it is in.
-    :ivar word: the last control word.
-    :ivar direction: 1 forward, -1 reverse; kept while the motor brakes.
-    """
+    """The generic state machine; its direction, 1 or -1, is kept while the motor brakes."""
 
     def __init__(self) -> None:
         self.phase = Phase.NOT_READY_TO_SWITCH_ON
@@ -221,3 +217,35 @@ _ECHOES = frozenset(
         Phase.FAULTED,
     }
 )
+
+
+#: The motor is released: MODE = Stop.
+RELEASED = Control(0)
+#: Ready, waiting for a run command. From a run it stops the motor as StMode says.
+STANDBY = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP | Control.AUTO_INIT
+#: Runs, but for the direction.
+RUNNING = (
+    STANDBY | Control.SWITCH_ON | Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
+)
+
+#: SCMD codes that run the motor.
+RUN_COMMANDS = frozenset(code for code in Scmd if code & 1 and code < Scmd.FULL_TUNING)
+
+#: The references that do not come over the bus, as shares of the nominal value.
+_ANALOG_SHARE = 0.6
+_FIXED_SHARES = (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+
+
+def local_share(code: int, fixed: Mapping[int, float]) -> float:
+    """
+    Return the reference of an SCMD run code other than Fieldbus, as a share of the nominal value.
+
+    :param fixed: shares that the drive's own fixed references (1 to 7) have, where it has them.
+    """
+    if code in (Scmd.TERMINAL, Scmd.OP_MODE):
+        return TERMINAL_SHARE
+    sign = -1 if code & 4 else 1
+    number = code >> 3
+    if number == 0:
+        return sign * _ANALOG_SHARE
+    return sign * fixed.get(number, _FIXED_SHARES[number - 1])

@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """
 How a Sinus Optimal is commanded and what it shows of it [M1].
 
@@ -35,19 +34,18 @@ from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 from nfo_sinus_driver.families.sinus_optimal.words import Status
 from nfo_sinus_driver.families.sinus_optimal.words import state_of
-from nfo_sinus_driver.simulator.measured import nearest
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Regulation
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.motor import nearest
+from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
-from nfo_sinus_driver.simulator.sinus.faults import SinusFaults
-from nfo_sinus_driver.simulator.sinus.variant import KEEPS
-from nfo_sinus_driver.simulator.sinus.variant import Variant
-from nfo_sinus_driver.simulator.sinus_optimal.control_steps import ControlSteps
+from nfo_sinus_driver.simulator.sinus.control_unit import Variant
+from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 
 #: Codes of the setting control.mode.
 _FREQUENCY, _SPEED = 0, 3
@@ -56,11 +54,7 @@ _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
 
 class OptimalControlUnit(SinusControlUnit):
-    """
-    Runs the motor of an Optimal.
-
-    :param options: those of every Sinus.
-    """
+    """Runs the motor of an Optimal (options: those of every Sinus)."""
 
     setpoint_of: ClassVar[Mapping[int, str]] = {
         _FREQUENCY: 'fieldbus.input_freq_setpoint',
@@ -240,3 +234,82 @@ class OptimalControlUnit(SinusControlUnit):
         least = self.memory.number('control.f_sleep')
         slow = not self.motor.driven or abs(self.motor.ramp) < least
         return slow and abs(reference) < least
+
+
+#: The commands in their order, and the status bits that must be there for one to be taken.
+_STEPS = (
+    (Control.BUS_CONTROL, Status(0)),
+    (Control.ENABLE, Status.CONTROL_FROM_BUS | Status.READY),
+    (Control.SWITCH_ON, Status.CONTROL_FROM_BUS | Status.ENABLED),
+)
+#: How long the drive takes to respond (s): longer than a write, so that it matters to wait.
+_RESPONSE = 0.05
+
+
+class ControlSteps:
+    """
+    How far a master has come.
+
+    A command is taken when its bit rises and the status word is ready for it. What came too early
+    does nothing until it is taken back and given again; what is taken back ends at once, and all
+    that came after it.
+
+    :ivar word: the last control word.
+    """
+
+    def __init__(self) -> None:
+        self.word = Control(0)
+        self._asked = 0
+        self._reached = 0
+        self._left = 0.0
+
+    def write(self, word: Control, shown: Status) -> None:
+        """Take a control word; ``shown`` is the status word until now."""
+        rises = word & ~self.word
+        self.word = word
+        held = 0
+        while held < len(_STEPS) and word & _STEPS[held][0]:
+            held += 1
+        self._asked = min(self._asked, held)
+        self._reached = min(self._reached, held)
+        if self._reached == self._asked < held:
+            command, needed = _STEPS[self._asked]
+            if rises & command and shown & needed == needed:
+                self._asked += 1
+                self._left = _RESPONSE
+
+    def give_up(self) -> None:
+        """Lose control to somebody else; the word stays as it was written."""
+        self._asked = self._reached = 0
+
+    def drop_run(self) -> None:
+        """Forget the run command; its bit must be taken back and given again."""
+        before_run = len(_STEPS) - 1
+        self._asked = min(self._asked, before_run)
+        self._reached = min(self._reached, before_run)
+
+    def wait(self, dt: float) -> None:
+        """Let ``dt`` seconds pass."""
+        self._left = max(0.0, self._left - dt)
+        if not self._left:
+            self._reached = self._asked
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a command has been taken and has had no effect yet."""
+        return self._asked > self._reached
+
+    @property
+    def has_control(self) -> bool:
+        """Whether the bus has control by this word."""
+        return self._reached >= 1
+
+    @property
+    def enabled(self) -> bool:
+        """Whether a run command would be taken."""
+        return self._reached >= 2
+
+    @property
+    def run(self) -> bool:
+        """Whether a run command stands."""
+        return self._reached == len(_STEPS)

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 from bus_bench import UNIT
@@ -81,7 +82,7 @@ def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
     bus: Bus, link: FakeLink
 ) -> None:
     link.answer = raiser(PortError('gone'))
-    tasks: list[Task] = []
+    tasks: list[Task | None] = []
 
     async def end_the_other() -> None:
         try:
@@ -268,7 +269,7 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
     assert figures.round_trip_min == pytest.approx(0.01)
     assert figures.round_trip_mean == pytest.approx(0.025)
     assert figures.round_trip_max == pytest.approx(0.04)
-    bus.call(lambda: bus.recorder.forget_cycle(2))
+    bus.call(lambda: bus.recorder.cycle(2, math.nan))
     result(bus.run(nothing()))
     assert bus.statistics().cycle_time == 0.2
     bus.close()

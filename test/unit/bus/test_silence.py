@@ -20,7 +20,7 @@ import math
 
 import pytest
 
-from nfo_sinus_driver.bus.silence import Silences
+from nfo_sinus_driver.bus.scheduler import Silences
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer

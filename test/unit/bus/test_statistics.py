@@ -112,10 +112,10 @@ def test_cycle_time_is_that_of_the_slowest(clock: SimpleNamespace) -> None:
     assert recorder.statistics().cycle_time == 0.3
     recorder.cycle(2, 0.05)
     assert recorder.statistics().cycle_time == 0.1
-    recorder.forget_cycle(1)
-    recorder.forget_cycle(7)
+    recorder.cycle(1, math.nan)
+    recorder.cycle(7, math.nan)
     assert recorder.statistics().cycle_time == 0.05
-    recorder.forget_cycle(2)
+    recorder.cycle(2, math.nan)
     assert math.isnan(recorder.statistics().cycle_time)
 
 
@@ -130,7 +130,7 @@ def test_read_while_it_is_written() -> None:
             number += 1
             recorder.transaction(number % 50, number * 0.01, 0.001, None)
             recorder.cycle(number % 50, 0.1)
-            recorder.forget_cycle((number + 25) % 50)
+            recorder.cycle((number + 25) % 50, math.nan)
 
     worker = threading.Thread(target=work)
     worker.start()
@@ -182,7 +182,7 @@ def test_who_only_asks_leaves_no_trace(clock: SimpleNamespace) -> None:
     recorder = Recorder()
     assert recorder.statistics(9).transactions == 0
     assert math.isnan(recorder.statistics(9).round_trip_median)
-    recorder.forget_cycle(9)
+    recorder.cycle(9, math.nan)
     assert math.isnan(recorder.statistics().cycle_time)
 
 

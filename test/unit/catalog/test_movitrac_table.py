@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from fractions import Fraction
+import math
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -235,3 +236,24 @@ def test_roles() -> None:
         'communication_timeout': 285,
         'bus_address': 206,
     }
+
+
+def test_error_log() -> None:
+    area = MOVITRAC.error_logs[BUS]
+    # P060 to P064
+    keys = [f'status.fault_t{number}' for number in range(5)]
+    assert [area.address(number) for number in range(5)] == [index(MOVITRAC[key]) for key in keys]
+    assert [area.code(count) for count in (0, 100, 4500, 8700)] == [0, 101, 145, 187]
+    assert not area.timed
+    assert math.isnan(area.hours(4500))
+    # the fault memory; inverter status and terminals are not decoded [C77]
+    kept = [[index(MOVITRAC[key]) for _, key in area.readings_of(one)] for one in range(5)]
+    assert kept[0] == [400, 402, 403, 404, 406]
+    assert kept[4] == [436, 438, 439, 440, 442]
+
+
+@pytest.mark.parametrize(('number', 'first'), list(enumerate((400, 409, 418, 427, 436))))
+def test_fault_memory(number: int, first: int) -> None:
+    kept = [row for row in MOVITRAC.values() if row.name.startswith(f'Fault t-{number} ')]
+    assert [index(row) - first for row in kept] == [0, 2, 3, 4, 6, 7, 8]
+    assert [row.at(BUS).codec.name for row in kept] == ['bcd32'] * 5 + ['uint32_be'] * 2

@@ -34,8 +34,8 @@ from typing import NamedTuple
 from support.variants import hardest
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -51,6 +51,14 @@ def test_every_verb_can_be_typed_and_stands_in_the_page() -> None:
 
 
 @pytest.mark.parametrize('verb', VERBS)
+def test_every_verb_says_what_it_takes(verb: str) -> None:
+    # a bare % in a help text raises
+    said = verb_parsers()[verb].format_help()
+    assert said.startswith(f'usage: nfo-sinus {verb}')
+    assert '%(' not in said
+
+
+@pytest.mark.parametrize('verb', VERBS)
 def test_every_option_stands_in_the_page(verb: str) -> None:
     written = {word.strip('[]') for span, _ in rows() for word in span.split()}
     for action in verb_parsers()[verb]._actions:

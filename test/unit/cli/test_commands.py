@@ -32,7 +32,7 @@ import pytest
 
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
-from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.memory import Reason
 
 Nfo = Callable[..., Done]
 OVERLOAD, SIO_FAIL = 5, 14

@@ -25,7 +25,7 @@ import yaml
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.parameter_file import HEADER
 from nfo_sinus_driver.cli.parameter_file import format_file
 from nfo_sinus_driver.cli.parameter_file import parse_file

@@ -31,10 +31,10 @@ from cli_bench import wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli import bulk_write
+from nfo_sinus_driver.cli import transfer
 from nfo_sinus_driver.cli.parameter_file import parse_file
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 Nfo = Callable[..., Done]
 REACHED = [p for p in load_family('sinus_g2').settings if {*p.addresses} >= {'modbus', 'classic'}]
@@ -412,7 +412,7 @@ def test_a_fault_half_way(nfo: Nfo, bench: Bench, some: Path) -> None:
 def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """What sends one signal, the first time it is asked to, and waits until it was noted."""
     noted: list[Callable[[], bool]] = []
-    original = bulk_write._signals_noted
+    original = transfer._signals_noted
     sent: list[int] = []
 
     @contextlib.contextmanager
@@ -428,7 +428,7 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
             # the main thread may be late to note it: without this more would be written
             wait_until(noted[-1])
 
-    monkeypatch.setattr(bulk_write, '_signals_noted', seen)
+    monkeypatch.setattr(transfer, '_signals_noted', seen)
     return send
 
 

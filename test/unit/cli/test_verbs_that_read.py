@@ -30,7 +30,7 @@ import yaml
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
-from nfo_sinus_driver.cli.errors import CliError
+from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.options import parse
 
 Nfo = Callable[..., Done]

@@ -35,7 +35,7 @@ import pytest
 
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.refusal import Refused as Refusal
+from nfo_sinus_driver.simulator.memory import Refused as Refusal
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
 WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))

@@ -62,8 +62,8 @@ from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.memory import Refused as FarRefusal
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.refusal import Refused as FarRefusal
 
 #: One byte at 57600 8E1, the silence between frames, and what the drive takes to answer, s.
 _CHARACTER = 11 / 57600

@@ -38,9 +38,9 @@ from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
 from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
 from nfo_sinus_driver.simulator.movitrac31.commands import MANUAL
 from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
-from nfo_sinus_driver.simulator.sinus.variant import ALL
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
 
 #: ParameterAccess of one word or two [M0 §7], [M1].
 MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250

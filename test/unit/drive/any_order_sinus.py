@@ -32,13 +32,13 @@ from hypothesis.stateful import rule
 
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.sinus.variant import ALL
-from nfo_sinus_driver.simulator.sinus.variant import DROPS
-from nfo_sinus_driver.simulator.sinus.variant import KEEPS
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
-from nfo_sinus_driver.simulator.sinus.variant import REFUSED
-from nfo_sinus_driver.simulator.sinus.variant import SCMD
-from nfo_sinus_driver.simulator.sinus.variant import TAKEN
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL
+from nfo_sinus_driver.simulator.sinus.control_unit import DROPS
+from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
+from nfo_sinus_driver.simulator.sinus.control_unit import SCMD
+from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 _CONTROL = 'fieldbus.drive_control'

@@ -34,7 +34,7 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import poller as watch_module
-from nfo_sinus_driver.drive import stop_sequence
+from nfo_sinus_driver.drive import sequences
 
 
 @pytest.fixture
@@ -72,7 +72,7 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver try again soon, where it is not tested how long it waits."""
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.05)
     monkeypatch.setattr(watch_module, '_RECONNECT_PERIOD', 0.1)
-    monkeypatch.setattr(stop_sequence, '_LOST_RETRY_PERIOD', 0.1)
+    monkeypatch.setattr(sequences, '_LOST_RETRY_PERIOD', 0.1)
 
 
 @pytest.fixture

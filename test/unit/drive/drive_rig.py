@@ -53,8 +53,8 @@ from nfo_sinus_driver.link import Link
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 #: No honest wait takes this long, on any machine, s.

@@ -31,8 +31,8 @@ from any_order_rig import FaultyLine
 from any_order_rig import Rig
 from support.wire import understand
 
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.movitrac_link import MovitracLink
-from nfo_sinus_driver.link.settings import LineSettings
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 

@@ -34,8 +34,8 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.rtu_link import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive

@@ -39,9 +39,9 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.movitrac_link import MovitracLink
-from nfo_sinus_driver.link.rtu_link import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
@@ -214,7 +214,7 @@ class NoiseRig(Rig):
 
     def register(self, key: str) -> int:
         """Return where a parameter stands."""
-        return self.drive._registers.address(key).index
+        return self.drive.registers.address(key).index
 
     @property
     def ends(self) -> list[str]:

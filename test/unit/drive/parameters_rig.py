@@ -29,8 +29,8 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import parameters as parameters_module
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 #: What stands at the far end of a quick rig, s; see ``QUICK``.
 ACCEL = 0.2

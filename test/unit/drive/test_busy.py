@@ -90,7 +90,7 @@ def test_a_stop_is_tried_on(rig: Rig) -> None:
 
 def test_a_setpoint_is_written_again(rig: Rig) -> None:
     rig.turn(20.0)
-    register = rig.drive._registers.address('status.frq_set').index
+    register = rig.drive.registers.address('status.frq_set').index
     busy = Busy(rig, 3, register, writes=True)
     rig.publish(10.0)
     rig.wait_for_frequency(10.0)
@@ -100,7 +100,7 @@ def test_a_setpoint_is_written_again(rig: Rig) -> None:
 
 def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
     rig.turn(20.0)
-    register = rig.drive._registers.address('status.frq_set').index
+    register = rig.drive.registers.address('status.frq_set').index
     Busy(rig, 10_000, register, writes=True)
     rig.publish(10.0)
     wait_until(lambda: not rig.drive.armed)

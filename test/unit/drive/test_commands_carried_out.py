@@ -36,7 +36,6 @@ from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import NoAnswer
@@ -127,7 +126,7 @@ def test_a_refusal_that_ends_the_sequence_is_that_of_the_drive() -> None:
     carried_out(Noted(NO, False), steps())
 
 
-@pytest.mark.parametrize('error', [NoAnswer('silence'), DriveError(Report(Cause.NOT_CONFIRMED))])
+@pytest.mark.parametrize('error', [NoAnswer('silence'), DriveError(Cause.NOT_CONFIRMED)])
 def test_anything_else_ends_the_sequence(error: Exception) -> None:
     def steps() -> Steps[None]:
         try:

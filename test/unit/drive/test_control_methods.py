@@ -29,7 +29,7 @@ from support.said import said
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.simulator.sinus_optimal import control_steps
+from nfo_sinus_driver.simulator.sinus_optimal import control_unit
 
 OVERLOAD = 5
 #: Bits of the Optimal's Drive Status [M1].
@@ -186,7 +186,7 @@ def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
     rig = make_rig(control_method=method)
     rig.connect()
     assert rig.enable().startswith('enabled')
-    inverter = rig.drive._inverter
+    inverter = rig.drive.inverter
 
     async def read(priority: Priority = Priority.SERVICE) -> str:
         inverter.control_mode = '7'
@@ -210,7 +210,7 @@ def test_the_optimal_is_expected_in_no_mode_that_it_lacks(mode: str) -> None:
 def test_each_step_of_the_optimal_is_confirmed_before_the_next(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(control_steps, '_RESPONSE', 0.3)
+    monkeypatch.setattr(control_unit, '_RESPONSE', 0.3)
     rig = make_rig(
         model='sinus_optimal', control_method='drive_control', reference='terminal'
     )

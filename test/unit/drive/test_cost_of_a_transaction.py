@@ -32,9 +32,9 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link import rtu
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.modbus_pdu import read_of
-from nfo_sinus_driver.link.rtu_link import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu

@@ -34,12 +34,12 @@ from support.addresses import Words
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive import poller as watch_module
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 
@@ -440,7 +440,7 @@ def test_stop_during_the_start_delay(make_rig: MakeRig) -> None:
 def test_stop_when_nobody_answers_is_tried_on_and_on(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.5)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.5)
     rig = make_rig(retries=1)
     rig.turn()
     rig.set_response_timeout(0.1)
@@ -477,7 +477,7 @@ def test_exit_while_the_drive_restarts(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the same, and nobody polls any more whose answers would tell
-    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.2)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
     rig = make_rig(retries=0)
     rig.turn()
     rig.set_response_timeout(0.2)
@@ -492,7 +492,7 @@ def test_exit_while_the_drive_restarts(
 def test_stop_that_is_refused_is_tried_on_and_on(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.3)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.3)
     rig.turn()
     write = rig.far.write_raw
 

@@ -28,7 +28,7 @@ from virtual_rig import MakeVirtual
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 OVERLOAD = 5
@@ -39,7 +39,7 @@ ONLY_READ = {3, 17, 43}
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(confirmation, 'TIMEOUT', 0.2)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,8 @@ from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.faults import LogEntry
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 

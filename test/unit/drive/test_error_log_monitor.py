@@ -31,8 +31,8 @@ from virtual_rig import MakeVirtual
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import error_log_monitor
-from nfo_sinus_driver.drive.operating_clock import OperatingClock
+from nfo_sinus_driver.drive import error_log
+from nfo_sinus_driver.drive.error_log import OperatingClock
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
@@ -123,7 +123,7 @@ def test_a_fault_that_stands_already_is_told_but_nobody_knows_since_when(rig: Ri
 
 
 def test_a_fault_that_no_poll_saw(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.1)
+    monkeypatch.setattr(error_log, '_PERIOD', 0.1)
     connect(rig)
     began = time.monotonic()
     with rig.simulator.lock:
@@ -140,7 +140,7 @@ def test_a_fault_that_no_poll_saw(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> 
 def test_the_same_fault_twice_within_a_tick_is_told_twice(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(error_log_monitor, '_SOON', 0.0)
+    monkeypatch.setattr(error_log, '_SOON', 0.0)
     connect(rig)
     trip(rig)
     told(rig)
@@ -163,7 +163,7 @@ def test_a_drive_that_writes_its_log_late(rig: Rig) -> None:
         rig.far.trip(5)
         late = list(rig.far.faults.log)
         rig.far.faults.log.clear()
-    wait_until(lambda: rig.drive._error_log_monitor._tries < error_log_monitor._TRIES)
+    wait_until(lambda: rig.drive._error_log_monitor._tries < error_log._TRIES)
     assert rig.notes.entries == []
     with rig.simulator.lock:
         rig.far.faults.log[:] = late
@@ -174,8 +174,8 @@ def test_a_drive_that_writes_its_log_late(rig: Rig) -> None:
 def test_what_came_while_the_drive_was_not_reached(
     rig: Rig, hasty: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.1)
-    monkeypatch.setattr(error_log_monitor, '_WAIT', 0.05)
+    monkeypatch.setattr(error_log, '_PERIOD', 0.1)
+    monkeypatch.setattr(error_log, '_WAIT', 0.05)
     connect(rig)
     with rig.simulator.lock:
         rig.far.power_cycle(3600.0)
@@ -195,7 +195,7 @@ def test_what_came_while_the_drive_was_not_reached(
 def test_a_drive_that_has_no_log_is_asked_once(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.0)
+    monkeypatch.setattr(error_log, '_PERIOD', 0.0)
     asked = []
 
     def refuse(register: int, words) -> None:
@@ -212,7 +212,7 @@ def test_a_drive_that_has_no_log_is_asked_once(
 
 
 def test_the_optimal_is_not_asked(make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(error_log_monitor, '_PERIOD', 0.0)
+    monkeypatch.setattr(error_log, '_PERIOD', 0.0)
     rig = make_rig(model='sinus_optimal')
     asked = []
     rig.tap.before = lambda register, words: asked.append(register)

@@ -43,7 +43,6 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.detect import detect_model
-from nfo_sinus_driver.drive.plausibility import can_be
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
@@ -324,10 +323,10 @@ def test_a_set_point_is_limited_to_the_one_direction(bolt: Bolt, bus: Bus) -> No
 
 def test_what_a_drive_cannot_measure_is_its_familys() -> None:
     bolt, acme = load_family('bolt'), load_family('acme')
-    assert can_be(bolt, 'status.hertz', 119.0) and not can_be(bolt, 'status.hertz', -121.0)
-    assert can_be(acme, 'status.hertz', 400.0)
+    assert bolt.can_be('status.hertz', 119.0) and not bolt.can_be('status.hertz', -121.0)
+    assert acme.can_be('status.hertz', 400.0)
     # neither a word whose code the manual lacks
-    assert can_be(bolt, 'bus.told', 145 << 16) and not can_be(bolt, 'bus.told', 7 << 16)
+    assert bolt.can_be('bus.told', 145 << 16) and not bolt.can_be('bus.told', 7 << 16)
 
 
 @pytest.mark.parametrize('role', ['status_word', 'actual_frequency'])

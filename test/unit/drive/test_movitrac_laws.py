@@ -178,31 +178,39 @@ def stopped_at(
 
 @pytest.mark.parametrize('way', ['stop', 'quick stop', 'deactivate'])
 def test_a_stop_at_each_step_of_an_enable(make_virtual: MakeVirtual, way: str) -> None:
-    # from P841 = Standard, so that control is taken on the way
     for moment in itertools.count():
+        # from P841 = Standard, so that control is taken on the way
         rig = make(make_virtual, {'stop_status': 'enable'})
-        rig.connect()
-        enable = rig.drive.enable()
-        stops: list[Future[Any]] = []
-        requests = itertools.count()
-
-        def meet(index: int, words: Words | None) -> None:
-            if next(requests) == moment and not enable.done():
-                stops.append(WAYS[way](rig.drive))
-
-        rig.before = meet
-        rig.answer(enable)
-        if not stops:
+        stop = stopped_in_enable(rig, moment, WAYS[way])
+        if stop is None:
             break
-        rig.before = lambda index, words: None
-        assert succeeded(rig, stops[0])
+        assert succeeded(rig, stop)
         assert not rig.drive.armed
         rig.send(20.0)
         rig.pass_time(0.5)
         assert not bits(rig) & DIRECTIONS, moment
-        assert not rig.far.motor.turning
+        assert not turns(rig)
     # it was stopped at each of the checks, of what takes control and of the run command
     assert moment > 35
+
+
+def stopped_in_enable(
+    rig: VirtualRig, moment: int, way: Callable[[Drive], Future[Any]]
+) -> Future[Any] | None:
+    """Enable, and go a way out at some request of that; ``None`` if there are not so many."""
+    rig.connect()
+    enable = rig.drive.enable()
+    requests = itertools.count()
+    stops: list[Future[Any]] = []
+
+    def meet(index: int, words: Words | None) -> None:
+        if next(requests) == moment and not enable.done():
+            stops.append(way(rig.drive))
+
+    rig.before = meet
+    rig.answer(enable)
+    rig.before = lambda index, words: None
+    return stops[0] if stops else None
 
 
 # --- no restart -----------------------------------------------------------------------------------
@@ -238,9 +246,9 @@ def test_no_turn_at_an_acknowledgement(
 ) -> None:
     rig = make(make_virtual, switch)
     rig.ride()
+    turned: list[bool] = []
     for fault, between in itertools.product((OVERCURRENT, PC_TIMEOUT), (0.0, 0.01, 0.05, 1.0)):
         rig.far.trip(fault)
-        turned: list[bool] = []
         rig.pass_time(between)
         rig.looked = lambda: turned.append(turns(rig))
         rig.answer(rig.drive.acknowledge())

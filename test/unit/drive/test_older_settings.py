@@ -44,8 +44,8 @@ from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 STOP, EXT, BUS = 1, 2, 3
@@ -128,10 +128,10 @@ class Rig:
 
     def why_not(self, **values: Any) -> str:
         """Return why parameters are not changed; nothing may have been written."""
-        before = (dict(self.far.writes), list(self.modes), self.far.control_unit.status_code)
+        before = (dict(self.far.writes), list(self.modes), self.far.motor.driven)
         with pytest.raises(DriveError) as error:
             self.change(**values)
-        assert (dict(self.far.writes), self.modes, self.far.control_unit.status_code) == before
+        assert (dict(self.far.writes), self.modes, self.far.motor.driven) == before
         return said(error.value)
 
 

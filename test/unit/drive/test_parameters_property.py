@@ -35,8 +35,8 @@ from support.said import said
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 BEFORE: dict[str, Value] = {
     'control.accel': 1.0,

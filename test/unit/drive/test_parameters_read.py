@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from drive_rig import PATIENCE
@@ -38,11 +39,10 @@ from support.said import said
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import parameters as parameters_module
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 
 @pytest.fixture
@@ -119,6 +119,26 @@ def test_one_that_the_drive_does_not_show_is_not_there(
     assert message == 'freque.f_fix1: the drive has no such parameter (exception 2)'
 
 
+def test_what_needs_option_cards_is_told_in_one(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    cards = {'freque.f_fix1': 'X1', 'freque.f_fix2': 'X1', 'control.accel': 'Y or Z'}
+    model = rig.drive.inverter.model
+    for key, card in cards.items():
+        monkeypatch.setitem(model.parameters, key, replace(model[key], option=card))  # type: ignore[arg-type]
+
+    def refuse(key: str) -> None:
+        if key in cards:
+            raise Refused(Reason.ADDRESS, 'no such thing')
+
+    on_read(rig, monkeypatch, refuse)
+    assert len(connect(rig).values) == 116
+    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
+    assert rig.notes.told(
+        'parameters: 3 are left out, for the drive has none of the option cards that they need '
+        '(Y or Z, X1)',
+        Severity.INFO,
+    )
+
+
 @pytest.mark.parametrize('reason', [Reason.ADDRESS, Reason.VALUE, Reason.STATE])
 def test_drive_that_refuses_every_third_request(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, reason: Reason
@@ -145,11 +165,11 @@ def test_switch_that_is_neither_on_nor_off(
     assert rig.notes.told('serial.auto_stop: the drive has code 2', Severity.WARNING)
     at_keypad(rig, 'serial.auto_stop', True)
     wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
-    wait_until(lambda: rig.drive._inverter.auto_stop)
+    wait_until(lambda: rig.drive.inverter.auto_stop)
     # nobody relies on a value that is gone
     put_raw(rig, 'serial.auto_stop', 2)
     wait_until(lambda: 'serial.auto_stop' not in parameters.values)
-    wait_until(lambda: not rig.drive._inverter.auto_stop)
+    wait_until(lambda: not rig.drive.inverter.auto_stop)
     told = [text for _, text in rig.notes.events if 'has code 2' in text]
     assert len(told) == 2
 
@@ -281,7 +301,7 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
     rig: Rig, busy_watch: None, auto: bool
 ) -> None:
     parameters = connect(rig)
-    inverter = rig.drive._inverter
+    inverter = rig.drive.inverter
     at_keypad(rig, 'serial.sio_tot', 5)
     at_keypad(rig, 'serial.auto_stop', auto)
     wait_until(lambda: inverter.sio_tot == 5 and inverter.auto_stop is auto)
@@ -295,12 +315,12 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
 def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig) -> None:
     rig = make_rig(allow_communication_changes=True)
     connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
-    assert rig.drive._inverter.sio_tot == 3
-    assert rig.drive._inverter.auto_stop
+    assert rig.drive.inverter.sio_tot == 3
+    assert rig.drive.inverter.auto_stop
 
 
 @pytest.mark.parametrize(
-    'error', [DriveError(Report(Cause.NOT_ACTIVE)), RuntimeError('a mistake')]
+    'error', [DriveError(Cause.NOT_ACTIVE), RuntimeError('a mistake')]
 )
 def test_a_first_reading_that_fails_leaves_nothing_connected(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception

@@ -35,8 +35,8 @@ from parameters_rig import written
 import pytest
 from support.said import said
 
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 

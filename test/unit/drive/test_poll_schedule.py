@@ -29,7 +29,7 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 STATUS, INV_ST, FREQUENCY, SPEED, TORQUE = 0x258, 0x2A5, 0x400, 0x264, 0x40C
 OVERLOAD = 5
@@ -53,7 +53,7 @@ def keep(rig: VirtualRig) -> Kept:
     """Keep the snapshots from now on."""
     kept = Kept(rig)
     kept.snapshot = rig.notes.snapshot
-    rig.drive._watch._listener = rig.notes = kept
+    rig.drive.inverter.listener = rig.notes = kept
     return kept
 
 

@@ -26,7 +26,7 @@ from virtual_rig import VirtualRig
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.sinus.variant import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 SETPOINT, STATUS, INV_ST, SCMD = 0x3FC, 0x258, 0x2A5, 0x298
 OVERLOAD = 5

@@ -37,8 +37,8 @@ from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.faults import LogEntry
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 COMMANDS = {

@@ -35,8 +35,8 @@ from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.refusal import Refused
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
 
 OVERLOAD = 5
 DC_LOW = 7
@@ -306,7 +306,7 @@ def test_what_stops_nothing(
 def test_set_points_that_stop_coming(make_rig: MakeRig, model: str, method: str) -> None:
     rig = turning(make_rig, model, method, 'fieldbus', setpoint_timeout=TIMEOUT)
     rig.stop_publishing()
-    last = rig.drive._setpoint._request[1]
+    last = rig.drive.setpoint._request[1]
     wait_until(lambda: rig.notes.snapshots[-1].setpoint == 0.0)
     # the time had passed when these were asked for, and they do not tell it yet
     late = [one for one in rig.notes.snapshots if one.at > last + TIMEOUT and one.setpoint]
@@ -356,9 +356,9 @@ def test_drive_that_was_off_for_long(make_rig: MakeRig) -> None:
     wait_until(lambda: rig.drive.snapshot.connected)
     rig.next_snapshots(3)
     lines = warnings(rig)
-    assert len([text for text in lines if text.startswith('lost: ')]) == 1
-    assert 'check the cable and that the drive has power' in lines[0]
-    assert 'then call ~/enable to go on' in lines[0]
+    (lost,) = (text for text in lines if text.startswith('lost: '))
+    assert 'check the cable and that the drive has power' in lost
+    assert 'then call ~/enable to go on' in lost
     meanwhile = [text for text in lines if 'the bus has lost control meanwhile (24 Stop)' in text]
     assert len(meanwhile) == 1
     assert 'was switched off and on' in meanwhile[0]

@@ -106,7 +106,7 @@ class VirtualRig(any_order_rig.Rig):
 
     def register(self, key: str) -> int:
         """Return where a parameter stands."""
-        return self.drive._registers.address(key).index
+        return self.drive.registers.address(key).index
 
     def be_busy(self, register: int, times: int = 1, *, writes: bool = False) -> None:
         """Have the drive say so many times that it is busy, to whoever reads or writes this."""

@@ -27,10 +27,10 @@ from support.addresses import packed
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.settings import LineSettings
 
 TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=9600, char_format='7E1', response_timeout=TIMEOUT)

@@ -24,15 +24,15 @@ from support.addresses import register
 from support.addresses import words_of
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.modbus_link import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.rtu_link import RtuLink
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.rtu import RtuLink
 
 if opinion.OLD:
     from pymodbus import mei_message

@@ -25,12 +25,12 @@ from virtual_wire import Fate
 from virtual_wire import Slave
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.errors import LinkError
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.serial_link import SerialLink
-from nfo_sinus_driver.link.settings import LineSettings
 
 TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)

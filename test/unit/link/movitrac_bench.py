@@ -24,9 +24,9 @@ from movitrac_far_end import Fate
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.movitrac_link import MovitracLink
-from nfo_sinus_driver.link.settings import LineSettings
 
 TIMEOUT = 0.2
 SETTINGS = LineSettings(baud_rate=9600, char_format='8N1', response_timeout=TIMEOUT)

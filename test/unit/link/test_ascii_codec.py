@@ -26,15 +26,15 @@ import pytest
 from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT
 from nfo_sinus_driver.link.modbus_ascii import AsciiReader
 from nfo_sinus_driver.link.modbus_ascii import encode
 from nfo_sinus_driver.link.modbus_ascii import length
 from nfo_sinus_driver.link.modbus_ascii import lrc
-from nfo_sinus_driver.link.modbus_identify import REGULAR
-from nfo_sinus_driver.link.modbus_identify import ReadDevice
-from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
+from nfo_sinus_driver.link.modbus_link import REGULAR
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write

@@ -51,9 +51,9 @@ from test_rtu_link import test_write_goes_out_at_once_even_in_quarantine  # noqa
 from virtual_wire import AsciiWire
 from virtual_wire import Fate
 
-from nfo_sinus_driver.link.ascii_link import AsciiLink
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 
 
 @pytest.fixture(autouse=True, scope='module')

@@ -31,13 +31,13 @@ from hypothesis import strategies as st
 import pytest
 from support.addresses import classic_id
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
 
 # --- quarantine -----------------------------------------------------------------------------------
 

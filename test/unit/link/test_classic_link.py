@@ -37,12 +37,12 @@ from support.addresses import classic_id
 from support.addresses import packed
 
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
+from nfo_sinus_driver.link.interface import BAUD_RATES
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.settings import BAUD_RATES
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
 
 # --- plain transactions ---------------------------------------------------------------------------
 

@@ -32,11 +32,11 @@ from support.addresses import packed
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 
 #: Longer than any drive here takes to answer, on any machine, s.
 PATIENT = 10.0

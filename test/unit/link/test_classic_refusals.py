@@ -25,7 +25,7 @@ from classic_link_bench import Bench
 import pytest
 from support.addresses import classic_id
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 
 # --- refusals -------------------------------------------------------------------------------------
 

@@ -49,14 +49,14 @@ from virtual_wire import Wire
 
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.ascii_link import AsciiLink
-from nfo_sinus_driver.link.echo import Echo
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.rtu_link import RtuLink
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.modbus_ascii import AsciiLink
+from nfo_sinus_driver.link.rtu import RtuLink
+from nfo_sinus_driver.link.serial_link import Echo
 
 KINDS = {'rtu': (RtuLink, Wire), 'ascii': (AsciiLink, AsciiWire)}
 

@@ -36,22 +36,22 @@ from identify_bench import spoil
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.modbus_identify import REGULAR
-from nfo_sinus_driver.link.modbus_identify import DeviceObjects
-from nfo_sinus_driver.link.modbus_identify import ModbusInquiry
-from nfo_sinus_driver.link.modbus_identify import ReadDevice
-from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
-from nfo_sinus_driver.link.modbus_identify import revision
-from nfo_sinus_driver.link.modbus_identify import serial_number
-from nfo_sinus_driver.link.modbus_identify import text
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.modbus_link import REGULAR
+from nfo_sinus_driver.link.modbus_link import DeviceObjects
+from nfo_sinus_driver.link.modbus_link import ModbusInquiry
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_link import revision
+from nfo_sinus_driver.link.modbus_link import serial_number
+from nfo_sinus_driver.link.modbus_link import text
 from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.settings import LineSettings
 
 # --- what the bytes say ---------------------------------------------------------------------------
 

@@ -34,13 +34,13 @@ import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.errors import Refused
-from nfo_sinus_driver.link.modbus_identify import BASIC
-from nfo_sinus_driver.link.modbus_identify import REGULAR
-from nfo_sinus_driver.link.modbus_identify import SPECIFIC
-from nfo_sinus_driver.link.modbus_identify import DeviceObjects
-from nfo_sinus_driver.link.modbus_identify import ReadDevice
-from nfo_sinus_driver.link.modbus_identify import ReportSlaveId
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.modbus_link import BASIC
+from nfo_sinus_driver.link.modbus_link import REGULAR
+from nfo_sinus_driver.link.modbus_link import SPECIFIC
+from nfo_sinus_driver.link.modbus_link import DeviceObjects
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.rtu import CRC_LENGTH

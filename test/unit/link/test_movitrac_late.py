@@ -31,11 +31,11 @@ from movitrac_bench import Bench
 from movitrac_far_end import Fate
 import pytest
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
 
 #: A drive that nobody knows yet is waited for two time-outs.
 LATE = [2.2, 3.0, 4.0]

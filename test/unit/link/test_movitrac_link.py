@@ -35,11 +35,11 @@ import pytest
 
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import NeverSilent
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
 
 #: Two characters of silence between any two frames.
 GAP = 2 * CHAR

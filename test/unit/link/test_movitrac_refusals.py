@@ -22,7 +22,7 @@ from movitrac_bench import Bench
 from movitrac_far_end import Fate
 import pytest
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.movitrac_refusal import DONE
 from nfo_sinus_driver.link.movitrac_refusal import REFUSALS
 from nfo_sinus_driver.link.movitrac_refusal import refusal

@@ -25,6 +25,7 @@ import heapq
 from classic_far_end import FarEnd
 from classic_far_end import Fate as ClassicFate
 from classic_link_bench import Bench as ClassicBench
+from hypothesis import example
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -56,7 +57,7 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import LineSettings
 
 LOST = Fate(what='drop')
 NAMES = {'A': A, 'B': B, 'C': C, 'D': D}
@@ -148,6 +149,12 @@ def test_a_refusal_that_may_be_an_earlier_one_is_asked_for_again() -> None:
 
 @hypothesis_settings(max_examples=300)
 @given(FATES, STEPS, st.sampled_from(sorted(UNITS)))
+@example(
+    # three answers told twice at once: the line has no gap for longer than a write waits
+    [Fate(3.0, 'double'), Fate(what='double'), Fate(what='double')],
+    [('write A', 0.0), ('C', 0.0), ('write A', 0.0), ('write A', 0.0)],
+    'G2',
+)
 def test_whatever_is_lost_late_doubled_or_damaged_the_line_is_used(
     fates: list[Fate], steps: list[tuple[str, float]], unit: str
 ) -> None:

@@ -28,8 +28,8 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.settings import BAUD_RATES
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import BAUD_RATES
+from nfo_sinus_driver.link.interface import LineSettings
 
 EVERY = pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
 PORTS = {'modbus_tcp': 'gateway:502'}

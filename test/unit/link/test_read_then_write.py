@@ -39,8 +39,8 @@ from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.ascii_link import AsciiLink
 from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 
 ACK = register(0x2A4)
 STOP = register(0x3EC)

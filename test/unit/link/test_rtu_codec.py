@@ -28,7 +28,7 @@ import pytest
 from support.addresses import packed
 from support.addresses import words_of
 
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_pdu import Read
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write

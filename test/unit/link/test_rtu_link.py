@@ -39,16 +39,16 @@ import pytest
 from support.addresses import packed
 from virtual_wire import Fate
 
-from nfo_sinus_driver.link.errors import DamagedAnswer
-from nfo_sinus_driver.link.errors import LinkError
-from nfo_sinus_driver.link.errors import NeverSilent
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import NotReady
-from nfo_sinus_driver.link.errors import PortError
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import BAUD_RATES
 from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.settings import BAUD_RATES
-from nfo_sinus_driver.link.settings import LineSettings
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
 
 # --- plain transactions ---------------------------------------------------------------------------
 

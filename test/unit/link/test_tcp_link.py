@@ -41,7 +41,7 @@ from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.tcp_link import TcpLink
+from nfo_sinus_driver.link.modbus_tcp import TcpLink
 
 A = register(0x400)
 B = register(0x264)

@@ -24,8 +24,8 @@ from identify_bench import write_and_read_request
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.errors import NoAnswer
-from nfo_sinus_driver.link.errors import Refused
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 

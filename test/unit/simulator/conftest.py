@@ -27,8 +27,8 @@ from support.addresses import words_of
 
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.refusal import Refused
 
 
 class Bench:

@@ -29,7 +29,7 @@ from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.classic_frames import Message
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.receiver import Receiver
+from nfo_sinus_driver.simulator.line import Receiver
 
 #: "A SELECT message to address 1 which gives parameter 25 the value of 100" ([M0 §6.1.3], [M2 §5]).
 EXAMPLE = bytes.fromhex('04 21 02 45 30 30 31 39 3D 30 30 36 34 03 71')

@@ -25,12 +25,12 @@ import pytest
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
 from nfo_sinus_driver.simulator.sinus.serial_side import BAUD_CODES
 from nfo_sinus_driver.simulator.sinus.serial_side import BUS_TYPES
-from nfo_sinus_driver.simulator.trace import Trace
 
 READ = bytes.fromhex('0302940001')
 STOP = bytes.fromhex('03020001')

@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 import pytest
 
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
 from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.receiver import Receiver
 
 ASCII = ModbusAscii()
 TCP = ModbusTcp(0.25)

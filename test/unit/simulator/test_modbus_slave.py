@@ -24,10 +24,10 @@ from support.examples import examples
 
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.receiver import Receiver
 
 RTU = ModbusRtu()
 

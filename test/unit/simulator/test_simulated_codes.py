@@ -24,7 +24,7 @@ import pytest
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
-from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.memory import Reason
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ import pytest
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.simulator.drive import describe
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.report import describe
 
 MODEL = load_family('sinus_g2')
 ON_MODBUS = [p for p in MODEL.values() if 'modbus' in p.addresses]

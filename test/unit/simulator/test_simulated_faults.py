@@ -18,9 +18,9 @@ import pytest
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.simulator.refusal import Reason
-from nfo_sinus_driver.simulator.sinus.variant import CHOICES
-from nfo_sinus_driver.simulator.sinus.variant import Variant
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES
+from nfo_sinus_driver.simulator.sinus.control_unit import Variant
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 MODEL = load_family('sinus_g2')

@@ -21,10 +21,10 @@ import pytest
 
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.sinus.serial_side import BAUD_CODES
 from nfo_sinus_driver.simulator.timing import Timing
-from nfo_sinus_driver.simulator.trace import Trace
 
 RTU = ModbusRtu()
 READ_MODE = bytes.fromhex('0302940001')

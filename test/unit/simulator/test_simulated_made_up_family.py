@@ -23,7 +23,7 @@ from nfo_sinus_driver import families
 from nfo_sinus_driver import simulator as room
 from nfo_sinus_driver.simulator.family import every_verb
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.inject import inject
+from nfo_sinus_driver.simulator.main import inject
 from nfo_sinus_driver.simulator.main import main
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator

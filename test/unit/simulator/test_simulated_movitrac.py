@@ -182,6 +182,17 @@ def test_the_second_set_counts_where_its_selection_is_enabled(bench):
     assert bench.ask(284)[3] & 0x08
 
 
+def test_v_over_f_pattern_3_has_limits_of_its_own(bench):
+    assert bench.write(88, 0) == ACK
+    assert bench.write(85, 8.0) == bench.write(86, 100) == bench.write(87, 90.0) == ACK
+    bench.run(400.0, seconds=3.0)
+    assert bench.read(FREQUENCY) == 90.0
+    assert bench.read(1) == pytest.approx(360, abs=5), 'it is 400 V at 100 Hz'
+    bench.write(SETPOINT, 0)
+    bench.wait(3.0)
+    assert bench.read(FREQUENCY) == 8.0
+
+
 def test_magnetization_before_and_after(bench):
     for index in (277, 278):
         assert bench.write(index, 300) == ACK
@@ -328,6 +339,15 @@ def test_nobody_commands_after_power_on(bench):
     assert bench.read(CONTROL_MODE) == REMOTE_CONTROL
     assert bench.word(281) == 0
     assert bench.read(SETPOINT) == 0
+    assert not bench.running
+
+
+def test_the_keypad_has_chosen_no_direction_after_power_on(bench):
+    bench.unit.press('manual')
+    bench.unit.press('cw')
+    assert bench.running
+    bench.drive.power_cycle(0.0)
+    assert bench.read(MANUAL_OPERATION) == 1
     assert not bench.running
 
 

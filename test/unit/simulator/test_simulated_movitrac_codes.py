@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from movitrac_drive_bench import ACK
 from movitrac_drive_bench import ADDRESS
 from movitrac_drive_bench import CONTROL_MODE
+from movitrac_drive_bench import F_MAX
 from movitrac_drive_bench import FACTORY_SETTING
 from movitrac_drive_bench import HEAT_SINK
 from movitrac_drive_bench import INPUT_48
@@ -73,7 +74,7 @@ def test_read_access_only(bench, index):
     [
         (T11_UP, 2010.0, 0x15),
         (T13_STOP, 10.0, 0x15),
-        (F_MAX := 81, 4.95, 0x16),
+        (F_MAX, 4.95, 0x16),
         (T11_UP, 3.72, 0x1D),
         (T11_UP, 20.25, 0x1D),
         (T11_UP, 102.0, 0x1D),
@@ -127,6 +128,15 @@ def test_the_factory_setting(bench):
     assert bench.read(CONTROL_MODE) == 0
     assert bench.read(207) == 20, 'it still answers as before'
     assert bench.write(T11_UP, 3.0) == ACK
+
+
+def test_power_off_ends_the_factory_setting_half_way(bench):
+    bench.set(t11_up=2.0)
+    bench.write(FACTORY_SETTING, 1)
+    bench.drive.power_cycle(0.0)
+    assert bench.read(FACTORY_SETTING) == 0
+    bench.wait(5.0)
+    assert bench.read(T11_UP) == 2.0
 
 
 def test_no_factory_setting_while_the_output_stage_is_on(bench):
@@ -185,6 +195,17 @@ def test_what_is_not_saved_is_said_and_lost(bench):
     assert bench.read(T11_UP) == 2.0
     assert bench.read(26) == 2.0
     assert bench.read(CONTROL_MODE) == 0
+
+
+def test_what_is_not_saved_counts_no_more_after_power_on(bench):
+    bench.terminal(41, True)
+    bench.set(save_to_eeprom=1)
+    assert bench.write(F_MAX, 20.0) == nack(0x28)
+    bench.wait(2.0)
+    assert bench.read(0) == 10.0, 'half of it, by the analog input'
+    bench.drive.power_cycle(0.0)
+    bench.wait(2.0)
+    assert bench.read(0) == 25.0
 
 
 def test_what_is_written_again_while_it_saves_is_saved(bench):

@@ -129,6 +129,11 @@ def test_auto_reset_starts_the_motor_again_after_a_while(bench):
     trip(bench, OVERCURRENT, cause_present=True)
     bench.wait(5.0)
     assert bench.fault == OVERCURRENT
+    bench.drive.end_fault_causes()
+    bench.wait(2.9)
+    assert bench.fault == OVERCURRENT, 'it counts from when the cause has gone'
+    bench.wait(0.2)
+    assert bench.fault == 0
 
 
 def test_an_external_fault_lasts_as_long_as_its_terminal_is_open(bench):

@@ -31,8 +31,8 @@ import pytest
 
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.inject import inject
 from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.main import inject
 from nfo_sinus_driver.simulator.main import main
 from nfo_sinus_driver.simulator.simulator import Simulator
 

@@ -50,8 +50,8 @@ from optimal_bench import SWITCHED_ON
 from optimal_bench import OptimalBench
 import pytest
 
+from nfo_sinus_driver.simulator.drive import describe
 from nfo_sinus_driver.simulator.main import main
-from nfo_sinus_driver.simulator.report import describe
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 SLAVE_DEVICE_FAILURE = 4

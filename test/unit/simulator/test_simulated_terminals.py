@@ -16,7 +16,7 @@
 
 import pytest
 
-from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.memory import Reason
 
 
 @pytest.mark.parametrize('st_mode', ['Brake', 'Release'])

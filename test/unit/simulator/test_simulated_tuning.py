@@ -18,7 +18,7 @@
 import pytest
 
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.refusal import Reason
+from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
 
 

@@ -28,7 +28,7 @@ import pytest
 from support.said import CALLS
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli import wording as cli
+from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.parameter_writer import Change
@@ -69,6 +69,14 @@ def texts(node: ast.AST) -> Iterator[str]:
     else:
         for child in ast.iter_child_nodes(node):
             yield from texts(child)
+
+
+def told_by(call: ast.Call) -> ast.expr | None:
+    """The cause that a call makes a report of."""
+    place = {'Report': 0, 'report': 0, 'DriveError': 0, 'tell': 1}.get(name_of(call))
+    if place is None or len(call.args) <= place or isinstance(call.args[place], ast.Call):
+        return None
+    return call.args[place]
 
 
 def causes_in(node: ast.AST) -> set[Cause]:
@@ -114,10 +122,11 @@ def test_every_sentence_is_given_what_it_needs() -> None:
     for _, tree in trees(REPORTING):
         named: set[Cause] = set()
         for call in ast.walk(tree):
-            if isinstance(call, ast.Call) and name_of(call) in ('Report', 'report'):
+            what = told_by(call) if isinstance(call, ast.Call) else None
+            if isinstance(call, ast.Call) and what is not None:
                 values = {str(keyword.arg) for keyword in call.keywords}
                 values |= {'status'} if name_of(call) == 'report' else set()
-                causes = causes_in(call.args[0])
+                causes = causes_in(what)
                 given += [(cause, values) for cause in causes]
                 general += [] if causes else [values]
                 named |= causes

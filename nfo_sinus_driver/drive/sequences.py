@@ -11,11 +11,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
-"""Removes the run command of a drive, until the drive says that it stops."""
+"""Starts the motor of a drive, and removes its run command; each is confirmed by its status."""
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
@@ -23,20 +23,23 @@ import enum
 import math
 import time
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import InverterStatus
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.drive import confirmation
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
@@ -53,8 +56,6 @@ _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 
 class _Outcome(enum.Enum):
-    """What became of one attempt to stop."""
-
     CONFIRMED = enum.auto()
     #: Nobody knows whether the drive has heard it: it is repeated at once, for a while.
     UNHEARD = enum.auto()
@@ -75,13 +76,9 @@ class StopSequence:
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        inverter: DriveState,
-        method: Commands,
-        report: Callable[[ControlEvent], None],
+        self, inverter: DriveState, method: Commands, report: Callable[[ControlEvent], None]
     ) -> None:
-        self._bus = bus
+        self._bus = inverter.bus
         self._inverter = inverter
         self._method = method
         self._report = report
@@ -140,7 +137,7 @@ class StopSequence:
             self._outcome = None
             self._unconfirmed = _NO_ANSWER_YET
             self._told_at = math.inf
-            self._due = time.monotonic() + confirmation.TIMEOUT
+            self._due = time.monotonic() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
@@ -163,16 +160,16 @@ class StopSequence:
         :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
-        deadline = time.monotonic() + (confirmation.TIMEOUT if patience is None else patience)
-        while task is not None and not await self._bus.join(task, confirmation.LOOK_PERIOD):
+        deadline = time.monotonic() + (drive_state.TIMEOUT if patience is None else patience)
+        while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
             lost = patience is None and not self._inverter.connected and self._outcome is not None
             if lost or time.monotonic() > deadline:
-                raise DriveError(Report(Cause.STOP_UNCONFIRMED, why=self._unconfirmed))
+                raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
-            raise DriveError(Report(Cause.STOP_UNCONFIRMED_AT_END))
+            raise DriveError(Cause.STOP_UNCONFIRMED_AT_END)
 
     async def _keep_trying(self) -> None:
         complain_at = self._due
@@ -180,14 +177,12 @@ class StopSequence:
         while await self._attempt() is not _Outcome.CONFIRMED:
             if self.blocked_by_fault:
                 await self._fault_gone()
-                self._due = complain_at = time.monotonic() + confirmation.TIMEOUT
+                self._due = complain_at = time.monotonic() + drive_state.TIMEOUT
                 continue
             if time.monotonic() >= complain_at:
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
                 complain_at = time.monotonic() + pause
-                self._inverter.tell(
-                    Severity.ERROR, Report(Cause.CANNOT_STOP, why=self._unconfirmed)
-                )
+                self._inverter.tell(Severity.ERROR, Cause.CANNOT_STOP, why=self._unconfirmed)
             await self._rest()
         self._task = None
         self._report_end()
@@ -216,7 +211,7 @@ class StopSequence:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif self._outcome is _Outcome.BUSY:
-            await self._bus.sleep(confirmation.LOOK_PERIOD)
+            await self._bus.sleep(drive_state.LOOK_PERIOD)
         elif self._outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 
@@ -252,11 +247,6 @@ class StopSequence:
             self._report(ControlEvent.STOPPED)
 
     async def _try_once(self) -> _Outcome:
-        """
-        Write the stop, and look what the drive says.
-
-        :raises LinkError: it was not written, or the status could not be read.
-        """
         control_mode = self._inverter.control_mode
         refusal: Refused | None = None
         try:
@@ -294,3 +284,74 @@ class StopSequence:
             return report_of(refusal)
         keeps_running = seen.keeps_running_since(self._told_at)
         return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None
+
+
+class StartSequence:
+    """Starts the motor of one drive, or says in a :class:`DriveError` why not; on the bus alone."""
+
+    def __init__(self, inverter: DriveState, method: Commands) -> None:
+        self._inverter = inverter
+        self._method = method
+
+    async def check(self) -> str:
+        """See to it that the motor may be started, writing nothing; return the control mode."""
+        inverter = self._inverter
+        seen = await inverter.look(Priority.SERVICE)
+        require_no_fault(inverter, seen)
+        control_mode = await inverter.read_control_mode()
+        expected = inverter.settings.expected_control_mode
+        if expected and control_mode != expected:
+            key = inverter.model.key(Role.CONTROL_MODE)
+            raise DriveError(
+                Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
+            )
+        await self._method.require_startable()
+        return control_mode
+
+    async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+        """
+        Take control and run at set-point 0; after an error a run command may stand all the same.
+
+        :param prepare: does what has to be done before a run command, once the bus has control.
+        """
+        await self.take_control(control_mode)
+        await self._inverter.wait_until(lambda now: now.from_bus)
+        if self._inverter.settings.follows_setpoints:
+            await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await prepare()
+        await self._method.run(self._await_start)
+        await self._await_start(lambda now: now.runs)
+
+    async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
+        """Wait until the drive has made a step on its way to run."""
+        deadline = time.monotonic() + drive_state.TIMEOUT
+        delayed = False
+        while True:
+            seen = await self._inverter.look(Priority.SERVICE)
+            if wanted(seen):
+                return
+            if seen.faulted:
+                raise DriveError(self._inverter.report(Cause.START_FAULTED))
+            # in standby after the start delay it has forgotten the start, and must not wait for
+            # another one
+            if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
+                raise DriveError(Cause.NO_RUN_INPUT)
+            if seen.means(Meaning.START_DELAY) and not delayed:
+                delayed = True
+                deadline += await self._inverter.read_start_delay()
+            if time.monotonic() > deadline:
+                cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
+                raise DriveError(self._inverter.report(cause))
+            await self._inverter.bus.sleep(drive_state.LOOK_PERIOD)
+
+    async def take_control(self, control_mode: str) -> None:
+        """
+        Put the drive under bus control, with no run command standing.
+
+        The set-point of an earlier session is removed before, where the drive lets us: one that has
+        kept its run command, too, would turn the motor at once.
+        """
+        if not self._inverter.settings_need_control:
+            with contextlib.suppress(DriveError, Refused):
+                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        await self._method.take_control(self._inverter.wait_until)

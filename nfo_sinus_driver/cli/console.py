@@ -1,0 +1,148 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What the tool says to a person: errors, questions, progress and remarks, columns of text.
+
+Remarks go to standard error, so that the output stays what a script wants.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from collections.abc import Iterable
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import sys
+import threading
+import unicodedata
+
+from tqdm import tqdm
+
+from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.wording import Calls
+from nfo_sinus_driver.wording import sentence
+
+#: What takes less needs no bar, s.
+_DELAY = 0.3
+_FORMAT = '{desc} {bar} {n_fmt}/{total_fmt}, {remaining} left'
+
+# its own watch thread and process lock are for more than one bar in one program
+tqdm.monitor_interval = 0
+tqdm.set_lock(threading.RLock())
+
+
+@contextlib.contextmanager
+def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
+    """Show a bar, if standard error is a terminal; what it yields is called for every step."""
+    with tqdm(
+        desc=what,
+        total=total,
+        bar_format=_FORMAT,
+        delay=_DELAY,
+        disable=None,
+        dynamic_ncols=True,
+        file=sys.stderr,
+        leave=False,
+    ) as bar:
+        yield lambda: bar.update()
+
+
+def remark(text: str) -> None:
+    """Say something to a person, above the bar if there is one."""
+    tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
+    sys.stderr.flush()
+
+
+def put(text: str) -> None:
+    """Print a line of output, above the bar if there is one."""
+    tqdm.write(text, file=sys.stdout)
+    sys.stdout.flush()
+
+
+class CliError(Exception):
+    """It was not done; the message says why and what to do."""
+
+
+class UsageError(Exception):
+    """What was typed makes no sense; the message says what would."""
+
+
+class Interrupted(Exception):
+    """A person or the system ended it."""
+
+    def __init__(self) -> None:
+        super().__init__('interrupted')
+
+
+def listed(head: str, lines: Iterable[str]) -> str:
+    """Return a text with a list below it."""
+    return '\n  '.join((head, *lines))
+
+
+def require_yes(options: argparse.Namespace, question: str) -> None:
+    """See to it that a person wants it, by asking or by ``--yes``; else an error."""
+    if options.yes:
+        return
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise UsageError(f'{question} Nobody can be asked here: say so with --yes')
+    print(f'{question} [y/N] ', end='', file=sys.stderr, flush=True)
+    answer = sys.stdin.readline()
+    if not answer.endswith('\n'):
+        print(file=sys.stderr)
+    if answer.strip().lower() not in ('y', 'yes'):
+        raise CliError('nothing was done')
+
+
+def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
+    """Return rows as lines with aligned columns, some of them to the ``right``."""
+    widths = [max(_width(cell) for cell in column) for column in zip(*rows, strict=True)]
+    return [
+        '  '.join(
+            _pad(cell, width, to_right=place in right)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _width(text: str) -> int:
+    return sum(not unicodedata.combining(character) for character in text)
+
+
+def _pad(text: str, width: int, *, to_right: bool) -> str:
+    blank = ' ' * (width - _width(text))
+    return blank + text if to_right else text + blank
+
+
+_CALLS = Calls(
+    acknowledge='type nfo-sinus ack',
+    enable='run it again',
+    program='command',
+    drive_timeout='--drive-timeout',
+    set_drive_timeout='give --drive-timeout',
+    set_control_mode='give another --control-mode',
+    set_model='give the right --model',
+)
+
+
+def say(what: Report | Exception | None) -> str:
+    """Return what there is to say; an error that is no drive's speaks for itself."""
+    if what is None:
+        return ''
+    if isinstance(what, DriveError):
+        what = what.report
+    return sentence(what, _CALLS) if isinstance(what, Report) else str(what)

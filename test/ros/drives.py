@@ -1,0 +1,243 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tests know of the drives of a family: how they are set, what they show, who has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from typing import NamedTuple
+
+from nfo_sinus_driver.simulator.control import Client as Simulated
+
+State = Mapping[str, Any]
+
+
+class Fault(NamedTuple):
+    """A fault by its code, what the drive calls it, and words of what is said of it."""
+
+    code: int
+    text: str
+    explained: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f'{self.code} {self.text}'
+
+
+@dataclass(frozen=True)
+class Drives:
+    """
+    The drives of one family, in the words of their simulator.
+
+    :ivar control_method: the usual one, and its constant in `DriveStatus`.
+    :ivar up: the setting for the ramp up, and that for the ramp down.
+    :ivar overload: a fault, likewise the others.
+    :ivar silence: the text of the fault of its own time-out.
+    :ivar no_timeout: the options of a simulated drive that runs on when the bus is silent.
+    :ivar stopped: the text that it shows when nobody has it run.
+    :ivar running: the text while it runs under control of the bus.
+    :ivar most: the highest set-point, Hz.
+    :ivar without_run_input: what is said where the input that has to be closed is open.
+    :ivar tells_run_input: it is read whether that input is closed, before anything is enabled.
+    :ivar coasts: a quick stop releases the motor.
+    """
+
+    control_method: str
+    up: str
+    down: str
+    overload: Fault
+    overheating: Fault
+    overvoltage: Fault
+    hot_motor: Fault
+    silence: str
+    stopped: str
+    running: str
+    most: float
+    without_run_input: str
+    no_timeout: tuple[str, ...] = ()
+    tells_run_input: bool = False
+    coasts: bool = True
+
+    def ramps(self, up: float, down: float | None = None) -> tuple[str, ...]:
+        """Return the options of a simulated drive with these ramps, s; one says both."""
+        down = up if down is None else down
+        return '--set', f'{self.up}={up:g}', '--set', f'{self.down}={down:g}'
+
+    def quick_stopped(self) -> str:
+        """Return what is answered to a quick stop of a motor that runs."""
+        ramps = 'stopping: it ramps down (this drive has no quick stop)'
+        return 'released: the motor coasts' if self.coasts else ramps
+
+    def commanded(self, state: State) -> bool:
+        """Tell whether a run command of the bus stands."""
+        raise NotImplementedError
+
+    def taken(self, state: State) -> bool:
+        """Tell whether the bus has control."""
+        raise NotImplementedError
+
+    def left(self, state: State) -> bool:
+        """Tell whether a driver that has ended left the drive as it should."""
+        raise NotImplementedError
+
+    def stopping(self, state: State) -> bool:
+        """Tell whether the drive drives its motor to a stop, or not at all."""
+        raise NotImplementedError
+
+    def timeout(self, seconds: float) -> tuple[str, ...]:
+        """Return the options of a simulated drive whose own time-out stops the motor so soon."""
+        raise NotImplementedError
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        """Tell whether its own time-out is set so, and stops the motor."""
+        raise NotImplementedError
+
+    def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
+        """Have a person stop it at its keypad, who leaves it when that was noticed."""
+        raise NotImplementedError
+
+    def run_by_terminals(self, drive: Simulated) -> None:
+        """Have somebody else change who controls it, and run it by its terminals."""
+        raise NotImplementedError
+
+    def end_run_by_terminals(self, drive: Simulated) -> None:
+        """Have the same end that, and leave it so that it can be enabled."""
+        raise NotImplementedError
+
+
+class Sinus(Drives):
+    """Those with MODE, and a run command that stands until another comes."""
+
+    def commanded(self, state: State) -> bool:
+        return bool(state['scmd'])
+
+    def taken(self, state: State) -> bool:
+        return bool(state['mode'] == 3)
+
+    def left(self, state: State) -> bool:
+        # MODE = Ext can start the motor
+        return state['mode'] == 1 and not state['scmd'] and not state['mode_ext_writes']
+
+    def stopping(self, state: State) -> bool:
+        return state['state'] in (
+            'SHUTDOWN',
+            'STOPPING',
+            'DISABLE',
+            'QUICK_STOP',
+            'SWITCHED_ON',
+            'READY_TO_SWITCH_ON',
+            'SWITCH_ON_DISABLED',
+            'FAULT_REACTION_ACTIVE',
+            'FAULTED',
+        )
+
+    def timeout(self, seconds: float) -> tuple[str, ...]:
+        return '--set', f'serial.sio_tot={seconds:g}', '--set', 'serial.auto_stop=ON'
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        parameters = state['parameters']
+        return parameters['serial.sio_tot'] == seconds and parameters['serial.auto_stop'] is True
+
+    def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
+        drive.inject('keypad', 'stop')
+        noticed()
+
+    def run_by_terminals(self, drive: Simulated) -> None:
+        drive.inject('keypad', 'ext')
+
+    def end_run_by_terminals(self, drive: Simulated) -> None:
+        drive.inject('keypad', 'stop')
+
+
+class Movitrac(Drives):
+    """Those with function bits, which count while P841 is Remote control."""
+
+    def commanded(self, state: State) -> bool:
+        # CW and CCW
+        return bool(state['function_bits'] & 3)
+
+    def taken(self, state: State) -> bool:
+        return state['parameters']['serial.control_mode'] == 'Remote control'
+
+    def left(self, state: State) -> bool:
+        # P841 stays, for another one can start the motor
+        return not state['function_bits'] and not state['setpoint']
+
+    def stopping(self, state: State) -> bool:
+        return state['phase'] != 'running'
+
+    def timeout(self, seconds: float) -> tuple[str, ...]:
+        return '--set', f'serial.pc_timeout={seconds:g}'
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        return bool(state['parameters']['serial.pc_timeout'] == seconds)
+
+    def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
+        drive.inject('keypad', 'manual')
+        noticed()
+        drive.inject('keypad', 'automatic')
+
+    def run_by_terminals(self, drive: Simulated) -> None:
+        drive.inject('set', 'serial.control_mode', 'Standard')
+        drive.inject('terminal', 41, 'closed')
+
+    def end_run_by_terminals(self, drive: Simulated) -> None:
+        drive.inject('terminal', 41, 'open')
+
+
+_SINUS = {
+    'control_method': 'mode_scmd',
+    'up': 'control.accel',
+    'down': 'control.retard',
+    'overload': Fault(5, 'Overload'),
+    'overheating': Fault(3, 'Temp Hi'),
+    'silence': 'Sio Fail',
+    'stopped': 'Stop',
+    'running': 'Bus Run',
+    'most': 150.0,
+    'without_run_input': 'RUN input is not active',
+}
+DRIVES = {
+    'sinus_g2': Sinus(
+        **_SINUS,
+        overvoltage=Fault(8, 'DC High', ('control.retard',)),
+        hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
+        no_timeout=('--set', 'serial.auto_stop=OFF'),
+    ),
+    'sinus_optimal': Sinus(
+        **_SINUS,
+        overvoltage=Fault(8, 'DC High', ('Lengthen the retardation time',)),
+        hot_motor=Fault(4, 'PTC Temp', ('temperature sensor', 'Let the motor cool')),
+        coasts=False,
+    ),
+    'movitrac31': Movitrac(
+        control_method='function_bits',
+        up='ramp.t11_up',
+        down='ramp.t11_down',
+        overload=Fault(104, 'Continuous overload'),
+        overheating=Fault(106, 'Overheating'),
+        overvoltage=Fault(102, 'DC-link voltage', ('Lengthen the ramp (P121, P140)',)),
+        hot_motor=Fault(112, 'Motor overload', ('overloaded', 'let the motor cool')),
+        silence='PC time out',
+        stopped='No enable',
+        running='Enable',
+        most=400.0,
+        without_run_input='terminal 43 (Enable/Stop) is open',
+        no_timeout=('--set', 'serial.pc_timeout=0'),
+        tells_run_input=True,
+    ),
+}
