@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The one interface of every link: how it is set, what it does, and what can go wrong on it."""
 
 from __future__ import annotations

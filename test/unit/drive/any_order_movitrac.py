@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What happens to a MOVITRAC alone; the rules for all are in ``any_order_machine.py``."""
 
 from __future__ import annotations

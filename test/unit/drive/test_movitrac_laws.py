@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The laws, over a MOVITRAC 31 with each switch of the simulated one, on its real link."""
 
 from __future__ import annotations
