@@ -22,6 +22,7 @@ from concurrent.futures import Future
 import itertools
 from typing import Any
 
+from line_rig import MakeLine
 import pytest
 from support.addresses import Words
 from support.wire import understand
@@ -423,6 +424,28 @@ def test_a_drive_that_answers_late_is_followed_all_the_same(make_virtual: MakeVi
     assert succeeded(rig, rig.drive.stop())
 
 
+@pytest.mark.parametrize('count', [4, 8])
+def test_several_at_one_line_are_kept_alive_while_others_are_enabled(
+    make_line: MakeLine, count: int
+) -> None:
+    # an enable asks some forty times, and nobody sends set-points yet
+    rig = make_line(count, protocol='movitrac', drive_timeout=1.5)
+    rig.connect()
+    rig.enable()
+    assert not any(far.faults for far in rig.fars.values())
+    rig.keep(lambda: rig.give_all(20.0))
+    rig.pass_time(20.0)
+    assert not any(far.faults for far in rig.fars.values())
+    assert all(drive.armed for drive in rig.drives.values())
+    assert all(far.motor.frequency > 19 for far in rig.fars.values())
+    stops = [drive.stop() for drive in rig.drives.values()]
+    for stop in stops:
+        rig.answer(stop)
+        assert stop.exception() is None
+    rig.pass_time(3.0)
+    assert not any(far.motor.turning for far in rig.fars.values())
+
+
 # --- what it does not do, and says so -------------------------------------------------------------
 
 
@@ -493,3 +516,15 @@ def test_what_it_has_not_is_answered_so(
     assert not succeeded(rig, future)
     assert MODEL in rig.answer(future) or 'MOVITRAC' in rig.answer(future)
     assert all(words is None for _, words in requests_since(rig, frames))
+
+
+def test_the_last_five_faults_are_told_newest_first(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    rig.connect()
+    for fault in (101, 107, 106, 145, 103, 101):
+        rig.far.trip(fault)
+        rig.far.control_unit.reset()
+    log = rig.drive.error_log()
+    rig.answer(log)
+    assert [entry.code for entry in log.result()] == [101, 103, 145, 106, 107]
+    assert [entry.text for entry in log.result()[:2]] == ['Overcurrent', 'Brake chopper']
