@@ -21,9 +21,9 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drives import DRIVES
-from drives import Drives
 import pytest
+from support.drives import DRIVES
+from support.drives import Drives
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
