@@ -43,6 +43,8 @@ from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
+#: A MOVITRAC has other faults, and none of the procedures: test_movitrac_laws.py.
+_WAYS = {name: way for name, way in WAYS.items() if way.model != 'movitrac31'}
 _TUNING = 28
 #: InvSt when it is finished.
 _DONE = {
@@ -100,7 +102,7 @@ class Rig:
         return said(error.value)
 
 
-@pytest.fixture(params=WAYS.values(), ids=WAYS)
+@pytest.fixture(params=_WAYS.values(), ids=_WAYS)
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     rig = Rig(request.param)
     rig.start()
