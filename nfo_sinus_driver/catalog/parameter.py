@@ -246,7 +246,17 @@ class Parameter:
 
     def step(self, protocol: str = 'modbus') -> Fraction:
         """Return the least difference between two values that the drive takes."""
+        numbers = self._numbers
+        if numbers:
+            return Fraction(math.gcd(*(int(number - numbers[0]) for number in numbers)))
         return min((step for _, step in self.steps), default=self.factor(protocol))
+
+    @property
+    def _numbers(self) -> Sequence[Fraction]:
+        """The labels in order where they are whole numbers, else nothing."""
+        if self.labels and self.kind is int:
+            return sorted(Fraction(label) for label in self.labels.values())
+        return ()
 
     def span(self, protocol: str = 'modbus') -> tuple[Fraction, Fraction]:
         """
@@ -254,6 +264,9 @@ class Parameter:
 
         Where the manual allows more than the type can carry, or says nothing, the type decides.
         """
+        numbers = self._numbers
+        if numbers:
+            return numbers[0], numbers[-1]
         factor = self.factor(protocol)
         carried = self.at(protocol).number
         low, high = carried.minimum * factor, carried.maximum * factor

@@ -218,8 +218,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     low, high = min(low, value), max(high, value)
     if isinstance(value, int):
         # RegAmp is -1 or 1, and nothing between
-        step = 2 if parameter.labels else 1
-        span = IntegerRange(from_value=int(low), to_value=int(high), step=step)
+        span = IntegerRange(from_value=int(low), to_value=int(high), step=max(1, int(step)))
         shown.integer_range = [span]
     else:
         shown.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=step)]

@@ -29,8 +29,8 @@ from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import wait_until
-from drives import Drives
 import pytest
+from support.drives import Drives
 from ways import needs
 
 from nfo_sinus_driver.simulator.control import Client as Simulated

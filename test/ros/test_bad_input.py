@@ -333,7 +333,8 @@ def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
 
 
 def test_a_character_format_needs_no_quotes(bench: Bench) -> None:
-    text = '7E1' if bench.way.protocol in ('modbus_ascii', 'classic') else '8E1'
+    formats = {'modbus_ascii': '7E1', 'classic': '7E1', 'movitrac': '8N1'}
+    text = formats.get(bench.way.protocol, '8E1')
     bench.simulator()
     bench.driver('-p', f'char_format:={text}')
     assert bench.client('/nfo_sinus_bus').parameter('char_format') == text

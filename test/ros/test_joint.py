@@ -66,6 +66,7 @@ def start(bench: Bench, *arguments: str, mode: str = 'Freque') -> tuple:
     return simulator, client
 
 
+@needs('nominal')
 @pytest.mark.parametrize('ratio', [1.0, -5.0])
 def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio: float) -> None:
     # where nobody tells the motor's poles, Hz are no speed

@@ -46,6 +46,8 @@ _NEEDS = {
     'control.hoist_1': 'special.four_quadrant_1',
     'control.hoist_2': 'special.four_quadrant_2',
 }
+#: Switched on at the keypad alone.
+_AT_KEYPAD = 'special.user_menu'
 
 
 class Rig:
@@ -122,7 +124,9 @@ def test_the_table_has_every_setting(rigs: dict[str, Rig]) -> None:
     assert len(bare) == 149
 
 
-@pytest.mark.parametrize('ends', [pytest.param(ends, id=ends.name) for ends in ENDS])
+@pytest.mark.parametrize(
+    'ends', [pytest.param(ends, id=ends.name) for ends in ENDS if ends.name != _AT_KEYPAD]
+)
 def test_both_ends_arrive_and_nothing_beyond_them(rigs: dict[str, Rig], ends: Ends) -> None:
     rig = rigs[ends.card]
     factory = values(rig.client, ends.name)[ends.name]
@@ -161,13 +165,28 @@ def test_both_ends_arrive_and_nothing_beyond_them(rigs: dict[str, Rig], ends: En
     rig.has(ends.name, factory)
 
 
+def test_the_user_menu_is_switched_off_and_no_more_on(rigs: dict[str, Rig]) -> None:
+    rig = rigs['']
+    (ends,) = [ends for ends in ENDS if ends.name == _AT_KEYPAD]
+    assert values(rig.client, ends.name)[ends.name] == ends.low
+    try:
+        rig.set(ends.name, ends.high)
+        assert rig.writes() == [select(ends.index, ends.high_raw)]
+        refused(set_one(rig.client, ends.name, ends.low), ends.name, 'use the keypad', '19')
+        assert rig.writes() == [select(ends.index, ends.low_raw)]
+        rig.has(ends.name, ends.high)
+    finally:
+        rig.drive.inject('set', ends.name, ends.low)
+        assert rig.client.call('refresh_parameters').success
+
+
 def _is_refused(rig: Rig, ends: Ends, present: Value) -> None:
     for value, bound in ((ends.below, ends.low), (ends.above, ends.high)):
         if value is None:
             continue
         result = set_one(rig.client, ends.name, value)
         refused(result, ends.name)
-        if ends.codes:
+        if isinstance(bound, str):
             refused(result, *(str(label) for label, _ in ends.codes))
         else:
             assert bound in _numbers(result.reason, ends.name), result.reason

@@ -230,4 +230,5 @@ def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> N
     assert driver.wait() == 0
     state = drive.state()
     assert state['driven']
-    assert state['mode'] == running['mode'] == 2
+    assert state['mode'] == running['mode']
+    assert not bench.drives.taken(state)

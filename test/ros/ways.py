@@ -21,9 +21,9 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drives import DRIVES
-from drives import Drives
 import pytest
+from support.drives import DRIVES
+from support.drives import Drives
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {
@@ -46,6 +46,7 @@ WITHOUT = {
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
     'quiet': 'its time-out goes on where nobody is: control stays with the bus',
+    'nominal': 'this model does not tell the nominal speed of its motor',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
@@ -60,6 +61,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
 }
 #: What a driver says where nobody answers, and what is to be checked, in order.
 SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
+_SILENCE_OF_MOVITRACS = 'no response', 'power', 'USS 11A', 'P880', 'P842', 'wires'
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ class Way:
         """What a driver says where nobody has its address, and what is to be checked, in order."""
         if self.protocol == 'modbus_tcp':
             return 'has no path to unit', 'table of units', 'serial port'
-        return SILENCE
+        return _SILENCE_OF_MOVITRACS if self.protocol == 'movitrac' else SILENCE
 
     @property
     def noise(self) -> tuple[str, ...]:
@@ -139,10 +141,10 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'parameters', 'quiet', 'timeout'))
+_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'quiet', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
-    'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer',
+    'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer', 'nominal',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _CLASSIC = frozenset(('classic', 'serial'))
@@ -163,7 +165,7 @@ _NOT_OF_THE_OPTIMAL = frozenset((
     'output_voltage', 'dc_link_voltage', 'torque', 'motor_temperature', 'pt1000_temperature',
     'brake_time', 'energy', 'total_energy',
 ))
-_NOT_IN_INDEX_284 = frozenset(('network_reference', 'setpoint_reached'))
+_NOT_IN_INDEX_284 = frozenset(('network_control', 'network_reference', 'setpoint_reached'))
 _NOT_OF_THE_MOVITRAC = frozenset((
     'output_current', 'output_power', 'power_factor', 'torque', 'motor_temperature',
     'pt1000_temperature', 'operating_time', 'running_time', 'brake_time', 'energy', 'total_energy',

@@ -26,6 +26,7 @@ simulated drive can have; FRS is none of them.
 
 from __future__ import annotations
 
+from typing import Any
 from typing import NamedTuple
 from typing import TypeAlias
 
@@ -448,9 +449,11 @@ def _switch(number: str, name: str, index: int, card: str) -> Ends:
     )
 
 
-def _list(number: str, name: str, index: int, card: str, labels: tuple[Value, ...]) -> Ends:
+def _list(number: str, name: str, index: int, card: str, labels: tuple[Any, ...]) -> Ends:
     codes = tuple((label, f'{code:06}00') for code, label in enumerate(labels))
-    wrong: tuple[Value, Value] = ('None', '17 kHz') if isinstance(labels[0], str) else (-1, 3)
+    wrong: tuple[Value, Value] = ('None', '17 kHz')
+    if not isinstance(labels[0], str):
+        wrong = labels[0] - 1, labels[-1] + 1
     (low, low_raw), (high, high_raw) = codes[0], codes[-1]
     return Ends(
         number, name, index, card, low, low_raw, high, high_raw, *wrong, codes=codes

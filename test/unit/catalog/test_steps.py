@@ -144,3 +144,21 @@ def test_a_code_that_is_none() -> None:
     with pytest.raises(ValueError, match='has code 2, which is none of No, Yes'):
         made(labels={0: 'No', 1: 'Yes'}).decode(bytes.fromhex('00000200'))
     assert made(labels={0: 'Coast', 1: 'Ramp'}).decode(bytes.fromhex('00000700')) == '7'
+
+
+@pytest.mark.parametrize(
+    ('family', 'key', 'span', 'step'),
+    [
+        ('movitrac31', 'frequency.f_base_1', (50, 120), 1),
+        ('movitrac31', 'control.pulses_per_revolution', (128, 2048), 128),
+        # one of two numbers, with nothing between them [C46]
+        ('sinus_g2', 'pi_reg.reg_amp', (-1, 1), 2),
+    ],
+)
+def test_labels_that_are_numbers_have_a_span_and_a_step(
+    family: str, key: str, span: tuple[int, int], step: int
+) -> None:
+    parameter = load_family(family)[key]
+    protocol = next(iter(parameter.addresses))
+    assert parameter.span(protocol) == span
+    assert parameter.step(protocol) == step
