@@ -301,6 +301,8 @@ class Laws(History):
         if snapshot is not self._last:
             self._last, self._last_told = snapshot, self._told(snapshot)
         known_since = max(self.settled_since, self._active_at)
+        if self.shown.polls_wait:
+            known_since = max(known_since, self._commanded_at)
         for name in self._differing(truth, self._last_told):
             value, since = self._truth[name]
             patience = self.noticed + self.shown.patience(name)

@@ -65,7 +65,7 @@ class MovitracOrder(AnyOrder):
         'first_fault',
         'first_fault',
         'standard_at_keypad',
-        'manual_operation',
+        'keypad_in_control',
         'run_input_off',
         'opposite_terminal',
         'stop_unheard',
@@ -167,7 +167,9 @@ class MovitracOrder(AnyOrder):
             self.laws.started_by_another()
         self.let(max(wait, 2.5))
 
+    # one that shows Enable all the time does not show who has control
     @WHOLE
+    @precondition(lambda self: self.rig.far.control_unit.variant.stop_status != 'enable')
     @rule(direction=st.sampled_from(('', '', 'cw', 'ccw')), wait=WAITS)
     def manual_operation(self, direction: str = '', wait: float = 1.0) -> None:
         """Take control at the keypad on X4, and turn the motor by it."""
@@ -215,6 +217,10 @@ class MovitracOrder(AnyOrder):
 
     def standard_at_keypad(self, wait: float) -> None:
         self.control_mode_at_keypad('Standard', wait)
+
+    def keypad_in_control(self, wait: float) -> None:
+        if self.rig.far.control_unit.variant.stop_status != 'enable':
+            self.manual_operation('', wait)
 
     def opposite_terminal(self, wait: float) -> None:
         """Give the other direction, too, which is none."""

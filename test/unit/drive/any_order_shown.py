@@ -62,6 +62,7 @@ BITS, SIZE, P841, STATUS = 281, 223, 205, 284
 #: What else may be written of it, in these histories: the PC time-out.
 _TIMEOUT = 285
 _DIRECTIONS = Bit.CW | Bit.CCW
+_RUNNING = (Number.ENABLE, Number.CHANGE_DIRECTION)
 
 Complaints = Iterator[str]
 
@@ -116,6 +117,7 @@ class Shown(abc.ABC):
     :cvar lead: how many transactions a stop lets go ahead: what it has to read itself.
     :ivar powered_by_acknowledgement: it refuses every command while a fault is active, so that a
         motor may have current until the stop that follows the acknowledgement.
+    :cvar polls_wait: what a command has to read takes so long that the polls wait for it.
     :ivar refuses_stop: it may refuse a stop in a fault, and go on by it afterwards.
     """
 
@@ -123,6 +125,7 @@ class Shown(abc.ABC):
     lead = 1
     powered_by_acknowledgement = False
     refuses_stop = False
+    polls_wait = False
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -330,13 +333,11 @@ _MOVITRAC = Times(
     found=7.0,
     response_timeout=0.4,
 )
-#: How many transactions an enable has, and how long each takes at least, s.
-_CHECKS = 45
-_TRANSACTION = 0.018
-
 
 class ShownMovitrac(Shown):
-    """What a MOVITRAC shows."""
+    """What a MOVITRAC shows; who enables it reads what all its terminals are for."""
+
+    polls_wait = True
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
@@ -357,7 +358,7 @@ class ShownMovitrac(Shown):
 
     @property
     def running(self) -> bool:
-        driven = self._unit.number in (Number.ENABLE, Number.CHANGE_DIRECTION)
+        driven = self._unit.number in _RUNNING
         return self.standing and driven and self._far.motor.driven
 
     @property
@@ -377,21 +378,19 @@ class ShownMovitrac(Shown):
 
     def facts(self) -> dict[str, Any]:
         unit = self._unit
-        shows_enable = unit.number in (Number.ENABLE, Number.CHANGE_DIRECTION)
+        # magnetizing is the beginning of a run
+        shows_enable = unit.number in (*_RUNNING, Number.START_MAGNETIZATION)
         remote = self._mode == Mode.REMOTE_CONTROL
         return {
             'code': unit.status_code,
             'fault': bool(self._far.faults),
             'by bus': remote,
-            # magnetizing counts as running, and as nothing that stops
             'running': remote and shows_enable and not self._far.faults,
             'frequency': round(self._far.motor.frequency, 1),
         }
 
     def patience(self, name: str) -> float:
-        # who enables it reads for so long what all its terminals are for, before the next poll
-        checks = _CHECKS * (_TRANSACTION + self._unit.response_time)
-        return checks + (self.times.control_told if name in ('by bus', 'running') else 0.0)
+        return self.times.control_told if name in ('by bus', 'running') else 0.0
 
     def reads_status(self, request: Request) -> bool:
         return request.words is None and request.place == STATUS
