@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """A line whose master is the driver in a process of its own, with somebody who listens to it."""
 
 from __future__ import annotations

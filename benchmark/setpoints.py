@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Enabled drives: their cycle, how soon a set-point is on the line, and how soon a stop is."""
 
 from __future__ import annotations

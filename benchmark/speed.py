@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Cycle, processor, memory and start by number of drives, and other masters on the same line."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What the far end of the line saw: frames, cycles, gaps, and the least time they can take."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Who talks next on one line: the scheduler, what it is given to do, and what it counts."""
 
 from nfo_sinus_driver.bus.statistics import Statistics

@@ -216,17 +216,17 @@ class Parameter:
         if self.labels:
             return codec.encode(int(self._code(value) / factor))
         number = self._number(value)
-        start, step = self._steps_at(number, factor)
-        nearest = _rounded(number, start, step)
-        if not _means(float(number), nearest, factor):
+        raw = self._nearest(number, factor)
+        if not _means(float(number), raw * factor, factor):
             self._check_range(number, protocol)
+            start, step = self._steps_at(number, factor)
             below = start + math.floor((number - start) / step) * step
             raise ValueError(
                 f'{self.key}: {value} lies between two steps of the drive, '
                 f'{_show(below)} and {_show(below + step)}'
             )
-        self._check_range(nearest, protocol)
-        return codec.encode(int(nearest / factor))
+        self._check_range(raw * factor, protocol)
+        return codec.encode(raw)
 
     def on_step(self, number: float) -> bool:
         """Tell whether :attr:`steps` have a number; any is on one where there are none."""
@@ -284,8 +284,14 @@ class Parameter:
         number = self._number(value)
         factor = self.factor(protocol)
         self._check_range(number, protocol)
-        nearest = _rounded(number, *self._steps_at(number, factor))
-        return self.at(protocol).number.encode(int(nearest / factor))
+        return self.at(protocol).number.encode(self._nearest(number, factor))
+
+    def _nearest(self, number: Fraction, factor: Fraction) -> int:
+        """Return the raw count of the step that is nearest to a number."""
+        if not self.steps:
+            # each count is one: set-points come often
+            return round(number / factor)
+        return int(_rounded(number, *self._steps_at(number, factor)) / factor)
 
     def _steps_at(self, number: Fraction, count: Fraction) -> tuple[Fraction, Fraction]:
         """

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Commands one drive, and stops it; signals that would end the tool wait until it may end."""
 
 from __future__ import annotations

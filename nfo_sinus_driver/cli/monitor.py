@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The verb ``monitor``: what drives and line do, again and again; it only reads."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The verbs ``run``, until somebody or something ends it, ``stop`` and ``ack``."""
 
 from __future__ import annotations

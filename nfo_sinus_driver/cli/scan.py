@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The verb ``scan``: who answers on the line, and the parameter file of a driver for them."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What is printed while a motor is commanded; nobody ever waits for a terminal or a reader."""
 
 from __future__ import annotations

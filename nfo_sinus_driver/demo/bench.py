@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Starts a simulated drive and the driver for it: what ``make run`` and ``make demo`` share."""
 
 from __future__ import annotations

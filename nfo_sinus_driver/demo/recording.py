@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Records a run: what its topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
 
 from __future__ import annotations

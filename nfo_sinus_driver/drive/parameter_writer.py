@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Writes parameters that may be written, all or none, and believes only what it reads back."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The settings of one drive: read once, watched for ever, changed on request, as wanted or not."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The watch over one drive: polls and measures, judges what it sees, notices when it is lost."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Starts the motor of a drive, and removes its run command; each is confirmed by its status."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """One set-point, or a stop, for all drives of a Classic line by one broadcast [M0 §6.1.4]."""
 
 from __future__ import annotations

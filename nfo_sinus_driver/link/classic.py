@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """
 Messages of the Classic protocol of NFO, without I/O, and why one refuses [M0 §6.1], [M2 §5].
 

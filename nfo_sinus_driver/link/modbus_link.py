@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What every Modbus link does: ask for what is wanted, and who a unit says it is [M0 §6.2.4]."""
 
 from __future__ import annotations

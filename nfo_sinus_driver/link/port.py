@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What carries the bytes of a serial line: its port, or what pyserial reaches by URL."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Modbus over one serial line: exact time, and no belief in a doubtful answer."""
 
 from __future__ import annotations

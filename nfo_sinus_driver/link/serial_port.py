@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """A serial port as a raw descriptor: opened for us alone, set as asked, read without delay."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """ROS 2 and nothing else: parameters, topics, services, action, diagnostics, lifecycle."""
 
 import os

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Who serves one node: its thread sleeps until something is asked of the node, and of no other."""
 
 from __future__ import annotations

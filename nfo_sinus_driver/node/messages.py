@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Turns what a drive and a line tell into messages, and the joint that a motor turns."""
 
 from __future__ import annotations

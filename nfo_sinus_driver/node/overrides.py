@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Who gets which ROS arguments, and what nobody takes: a misspelt parameter or node."""
 
 from __future__ import annotations

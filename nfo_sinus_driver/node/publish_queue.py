@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What is to be published, soon or by the clock: a thread does it, so that no bus waits for ROS."""
 
 from __future__ import annotations

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Thirty-two drives on one line: they do what one does, and cost no more than the line."""
 
 from __future__ import annotations

@@ -20,9 +20,28 @@ from collections.abc import Mapping
 
 _HARDEST = {
     'sinus_g2': {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'},
+    'movitrac31': {
+        'status_numbers': 'bcd',
+        'enable_bit': 'either',
+        'timeout_stop': 'ramps',
+        'outside_remote_control': 'taken',
+        'stop_status': 'enable',
+        'bits_after_power_on': 'kept',
+        'bits_in_fault': 'kept',
+    },
+}
+_RAMPS = {
+    'sinus_g2': ('control.accel', 'control.retard'),
+    'sinus_optimal': ('control.accel', 'control.retard'),
+    'movitrac31': ('ramp.t11_up', 'ramp.t11_down'),
 }
 
 
 def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
     """Return its options for a drive family; none where drives of it are so anyway."""
     return _HARDEST.get(model, {})
+
+
+def ramps(model: str, up: float, down: float) -> dict[str, float]:
+    """Return the settings of a drive family for its ramps, s."""
+    return dict(zip(_RAMPS[model], (up, down), strict=True))

@@ -174,7 +174,9 @@ class FunctionBits(ControlMethod):
         Remove function bits and set-point, then set P841 to Remote control if it is not.
 
         With another P841 the drive may refuse or ignore the others, so they are written again
-        [C110].
+        [C110]. Where a direction and a set-point are left behind by that, by which the motor would
+        turn at once, it goes by way of Remote setpoint: there the set-point counts, and the bits do
+        not.
 
         :raises NotPossible: it keeps other function bits, or another set-point.
         """
@@ -182,6 +184,9 @@ class FunctionBits(ControlMethod):
             for write in (Write(BITS, 0), Write(SIZE, 0.0)):
                 with contextlib.suppress(Refusal):
                     yield write
+            if (yield from _would_turn()):
+                yield Write(CONTROL_MODE, words.REMOTE_SETPOINT, stored=True)
+                yield from self.zero_setpoint('')
             yield Write(CONTROL_MODE, words.REMOTE_CONTROL, stored=True)
         yield Write(BITS, 0, head=True)
         yield from self.zero_setpoint('')
@@ -252,6 +257,13 @@ class FunctionBits(ControlMethod):
         for bits in (Bits.RESET, Bits(0)):
             yield Write(BITS, int(bits))
         return ''
+
+
+def _would_turn() -> Steps[bool]:
+    """Tell whether function bits and set-point would turn the motor if they counted."""
+    bits = yield from _read_if_there(BITS)
+    directed = bits is not None and int(bits) & (Bits.CLOCKWISE | Bits.COUNTER_CLOCKWISE)
+    return bool(directed) and bool((yield from _read_if_there(SIZE)))
 
 
 def _read_if_there(key: str) -> Steps[Value | None]:

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The serial interface of a Sinus: settings in effect, the watch on silence, its own faults."""
 
 from __future__ import annotations

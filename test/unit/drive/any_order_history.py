@@ -29,40 +29,16 @@ import math
 from typing import Any
 
 from any_order_rig import Rig
-
-from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from any_order_shown import shown_by
 
 #: How the driver is set.
 POLL_RATE = 5.0
 SETPOINT_TIMEOUT = 1.0
 SHUTDOWN_TIMEOUT = 1.0
-#: Two polls and a transaction, and what they themselves take: while active, and while not, s.
-NOTICED = 0.5
-NOTICED_IDLE = 1.2
-#: How seldom the control mode may be read, s.
-CONTROL_MODE_PERIOD = 1.0
-#: A command is carried out within this, s.
-CARRIED_OUT = 0.06
-#: Three polls without a response and the drive is lost: while active, and while not, s.
-LOST = 3.0
-LOST_IDLE = 4.0
-#: A run command that could not be taken back is, so long after the line came back, s.
-TAKEN_BACK = 1.7
-#: A drive that was lost is found again within this, s.
-FOUND = 5.0
-
 #: How much longer everything may take while answers are spoiled by chance, s.
 NOISY = 2.0
-
 #: A stop that a fault keeps a drive from taking is not repeated within this, s.
 REFUSED = 0.3
-
-#: By these the bus has control.
-BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
-#: The function that reads, and where InvSt stands [M0 §7], [M1].
-READ, INV_ST = 3, 0x02A5
-#: Bit 0 of the control word [M0 table 14].
-SWITCH_ON = 1 << 0
 
 #: Commands that end a ride.
 STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
@@ -89,7 +65,8 @@ class History:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._far = rig.far
-        self._optimal = rig.settings.model == 'sinus_optimal'
+        self.shown = shown_by(rig)
+        self.times = self.shown.times
         self._method = rig.settings.method
         self._follows = rig.settings.reference == 'fieldbus'
         rig.gave = self.gave
@@ -146,7 +123,7 @@ class History:
             ours = self._steady and self.standing and not self._foreign
             if name != 'quick_stop' and ours and not self._refused_just_now:
                 self._stop_due = len(self._rig.link.frames)
-            self.lose(CARRIED_OUT)
+            self.lose(self.times.carried_out)
         elif name == 'acknowledge':
             self._acknowledged += 1
         if name in ('deactivate', 'disconnect', 'stop_for_good'):
@@ -156,9 +133,9 @@ class History:
 
     def _may_be_confirmed(self, stop: Command) -> bool:
         """Tell whether the status was read since a stop was written that has no answer yet."""
-        sent = [bytes.fromhex(frame['hex']) for frame in self._rig.link.frames[stop.frames :]]
-        after = itertools.dropwhile(lambda frame: frame[1] == READ, sent)
-        return any(int.from_bytes(frame[2:4], 'big') == INV_ST for frame in after)
+        sent = self.shown.requests_since(stop.frames)
+        after = itertools.dropwhile(lambda request: request.words is None, sent)
+        return any(map(self.shown.reads_status, after))
 
     @property
     def _refused_just_now(self) -> bool:
@@ -170,7 +147,7 @@ class History:
         if not self.watched:
             self.watched = True
             self._watched_at = self.now
-            self._no_run_from = max(self._no_run_from, self.now + CARRIED_OUT)
+            self._no_run_from = max(self._no_run_from, self.now + self.times.carried_out)
 
     def activated(self) -> None:
         """Take note that it polls at full rate from now on."""
@@ -207,7 +184,7 @@ class History:
         """Take note that the drive controls another quantity now."""
         self.disturbed_at = self.now
         if not self.pending('enable'):
-            self.lose(self.noticed + CONTROL_MODE_PERIOD)
+            self.lose(self.noticed + self.shown.patience('control mode'))
 
     def killed(self) -> None:
         """Take note that the driver is no more."""
@@ -228,7 +205,7 @@ class History:
     @property
     def noticed(self) -> float:
         """Within which time something is noticed, s."""
-        return NOTICED if self.active else NOTICED_IDLE
+        return self.times.noticed if self.active else self.times.noticed_idle
 
     @property
     def settled_since(self) -> float:
@@ -240,32 +217,14 @@ class History:
     # --- what the simulated drive says ------------------------------------------------------------
 
     @property
-    def by_bus(self) -> bool:
-        """The bus controls the drive."""
-        return self._far.control_unit.source in BUS_SOURCES
-
-    @property
     def running(self) -> bool:
         """The drive carries out a run command that came over the bus."""
-        unit = self._far.control_unit
-        if self._optimal:
-            return self.by_bus and bool(unit._running)
-        return self.by_bus and unit.state == 'OPERATION_ENABLED'
-
-    @property
-    def tuning(self) -> bool:
-        """The drive measures its motor, which has current."""
-        return not self._optimal and self._far.control_unit.tuning is not None
+        return self.shown.running
 
     @property
     def standing(self) -> bool:
         """A run command that came over the bus stands in it, carried out or not."""
-        unit = self._far.control_unit
-        if self._optimal:
-            return self.by_bus and bool(unit.scmd or unit._steps.run)
-        if unit.source is Source.SCMD:
-            return bool(unit.scmd & 1)
-        return self.by_bus and bool(unit.word & SWITCH_ON)
+        return self.shown.standing
 
     @property
     def turning(self) -> bool:
@@ -276,8 +235,8 @@ class History:
     def _present_conditions(self) -> Iterator[bool]:
         """Return what has to stay as it is for the motor to run on."""
         yield not self._far.faults
-        yield self.by_bus
-        yield self._far.control_unit.run_input
+        yield self.shown.by_bus
+        yield self.shown.may_run
         yield self._far.control_unit.initialised
 
     @property
@@ -299,7 +258,7 @@ class History:
             if self._whole_since is None:
                 self._whole_since = self.now
                 self._broken_since = None
-                back = FOUND if not self._ours else TAKEN_BACK
+                back = self.times.found if not self._ours else self.times.taken_back
                 self._no_run_from = max(self._no_run_from, self.now + back)
             return
         self._whole_since = self._stop_due = None
@@ -307,17 +266,17 @@ class History:
             command.undisturbed = False
         if self._broken_since is None:
             self._broken_since = self.now
-        lost = LOST if self.active else LOST_IDLE
+        lost = self.times.lost if self.active else self.times.lost_idle
         for_good = self.now - self._broken_since > lost and not self._rig.link.losses
         if for_good and (self.enabled_at is not None or self._ended_by_fault is not None):
-            self.lose(TAKEN_BACK)
+            self.lose(self.times.taken_back)
         # nobody can stop it now
-        self._no_run_from = max(self._no_run_from, self.now + TAKEN_BACK)
+        self._no_run_from = max(self._no_run_from, self.now + self.times.taken_back)
 
     def _watch_noise(self) -> None:
         """Ask nothing to be prompt while answers are spoiled by chance; but all to be done."""
         if self._broken_since is not None:
-            back = FOUND if not self._ours else TAKEN_BACK
+            back = self.times.found if not self._ours else self.times.taken_back
             self._no_run_from = max(self._no_run_from, self.now + back + NOISY)
         self._whole_since = self._broken_since = self._stop_due = None
         for command in self._commands:
@@ -338,14 +297,11 @@ class History:
         given = self._stood and not self._foreign
         unmoved = not given or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
-            self.lose(self.noticed)
+            self.lose(self.noticed + (self.times.control_told if ended[1] else 0.0))
         if ended[0]:
             self._faulted_at = self.now
-            by_itself = all(map(self._has_tries, self._far.faults.codes))
+            by_itself = all(map(self.shown.has_tries, self._far.faults.codes))
             self._ended_by_fault = enabled_at if by_itself and sum(ended) == 1 else None
-
-    def _has_tries(self, code: int) -> bool:
-        return not self._optimal and self._far.control_unit.self_restart._has_tries(code)
 
     def _forgive_fault(self) -> None:
         """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""

@@ -25,27 +25,15 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from any_order_history import CARRIED_OUT
-from any_order_history import CONTROL_MODE_PERIOD
-from any_order_history import FOUND
-from any_order_history import LOST
-from any_order_history import LOST_IDLE
-from any_order_history import NOTICED
-from any_order_history import NOTICED_IDLE
 from any_order_history import SETPOINT_TIMEOUT
 from any_order_history import STOPS
-from any_order_history import SWITCH_ON
 from any_order_history import Command
 from any_order_history import History
-from any_order_rig import RESPONSE_TIMEOUT
 from any_order_rig import Rig
-from support import trace_laws
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
@@ -54,14 +42,6 @@ LONGEST_COMMAND = 12.0
 
 #: For so many transactions a motor may have current that an acknowledgement has let go.
 POWERED = 2
-
-#: ParameterAccess of one word or two [M0 §7], [M1].
-MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
-#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
-SETPOINTS = (0x03FC, 0x025C, 0x0408, 0x0410)
-MODE_STOP, MODE_BUS = 1, 3
-RUN_FIELDBUS = 0x101
-FORWARD, REVERSE = 1 << 3, 1 << 13
 
 
 class Broken(AssertionError):
@@ -84,7 +64,6 @@ class Laws(History):
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
         rig.looked, rig.wrote, rig.changed = self.look, self._wrote, self._answered
-        self._control_modes = rig.far.memory.model['control.mode'].labels
         self._truth: dict[str, tuple[Any, float]] = {}
         self._seen: dict[str, Any] = {}
         #: When what is told of a fact was right last, if it is wrong now.
@@ -116,7 +95,7 @@ class Laws(History):
 
     def end(self) -> None:
         """Judge everything that was on the line."""
-        found = trace_laws.violations(self._rig.link.frames, -math.inf, self._rig.settings.model)
+        found = self.shown.wrong_line()
         acknowledging = [complaint for complaint in found if 'acknowledges' in complaint]
         if len(acknowledging) > self._acknowledged or len(found) > len(acknowledging):
             raise Broken(f'on the line: {found}')
@@ -131,8 +110,7 @@ class Laws(History):
         if not self.watched or self._method == 'monitor':
             return
         self._foreign = self._foreign and standing
-        refuses = self._far.control_unit.variant.refuses_in_fault != NOTHING
-        if refuses and self._method == 'mode_scmd' and self._far.faults:
+        if self.shown.refuses_stop and self._far.faults:
             # it refuses the stop, so that it may go on until it was seen to
             self._no_run_from = max(self._no_run_from, self.now + self.noticed)
         if (standing or running) and self.enabled_at is None:
@@ -152,8 +130,7 @@ class Laws(History):
         # one that ran before had no fault to acknowledge
         started = self._running_since is not None and self._running_since > begun
         by_us = started and self.disturbed_at < begun and self.enabled_at is None
-        waits = not self._optimal and self._far.control_unit.self_restart.waiting
-        by_itself = waits or self._ended_by_fault is not None
+        by_itself = self.shown.restarts_itself or self._ended_by_fault is not None
         if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
             self._turned_from = None
             return
@@ -162,7 +139,7 @@ class Laws(History):
             self._turned_from = frames
         if self._whole_since is None or self._whole_since > begun:
             return
-        if self._far.control_unit.variant.refuses_in_fault != ALL:
+        if not self.shown.powered_by_acknowledgement:
             if self.turning:
                 raise Broken('an acknowledgement turns the motor')
         elif frames > self._turned_from + POWERED:
@@ -192,7 +169,8 @@ class Laws(History):
         whole_since = self._whole_since
         if whole_since is None:
             return
-        late = max(at + SETPOINT_TIMEOUT, whole_since + 2 * RESPONSE_TIMEOUT) + NOTICED
+        late = max(at + SETPOINT_TIMEOUT, whole_since + 2 * self.times.response_timeout)
+        late += self.times.noticed
         if self.now > late:
             raise Broken(f'it turns by a set-point from {at:.3f} at {self.now:.3f}')
 
@@ -216,7 +194,7 @@ class Laws(History):
     def _judge_commands(self) -> None:
         if self._commands:
             self._commanded_at = self.now
-        if self.tuning:
+        if self.shown.tuning:
             self._tuned_at = self.now
         for command in tuple(self._commands):
             if command.future.done():
@@ -238,14 +216,14 @@ class Laws(History):
         elif command.name in STOPS and self._method != 'monitor':
             # what another master starts while the drive is lost is seen once it is found again
             since = max(self.disturbed_at, self.settled_since if self._foreign else -math.inf)
-            untouched = since + NOTICED_IDLE < command.at and self.enabled_at is None
+            untouched = since + self.times.noticed_idle < command.at and self.enabled_at is None
             if error is None and untouched and self.running:
                 raise Broken(f'{command.name} is answered although it runs')
-            if error is None and self.tuning:
+            if error is None and self.shown.tuning:
                 raise Broken(f'{command.name} is answered although it tunes')
             # a tuning that has just ended may have refused what came before its end
             tuned = self._tuned_at >= command.at
-            local = not self.by_bus or bool(self._far.faults) or tuned
+            local = not self.shown.by_bus or bool(self._far.faults) or tuned
             if error is not None and untouched and command.undisturbed and not local:
                 raise Broken(f'{command.name} failed for no reason: {error}')
 
@@ -256,7 +234,7 @@ class Laws(History):
             return
         ours = self.enabled_at is not None and self.enabled_at <= command.at
         if ours and not self.pending('enable'):
-            self.lose(CARRIED_OUT)
+            self.lose(self.times.carried_out)
 
     def _judge_silence(self) -> None:
         """Keep the drive's own time-out from striking."""
@@ -268,64 +246,26 @@ class Laws(History):
 
     # --- what is written --------------------------------------------------------------------------
 
-    def _wrote(self, register: int, words: tuple[int, ...]) -> None:
+    def _wrote(self, place: int, words: tuple[int, ...]) -> None:
         if self._method == 'monitor':
-            raise Broken(f'monitor wrote {register:04X}h')
-        word = words[-1] if register == MASK else words[0]
-        controls = register in (CONTROL, MASK)
-        if controls and not self._optimal and word & FORWARD and word & REVERSE:
-            raise Broken('both directions at once')
-        if register == MODE and word not in (MODE_STOP, MODE_BUS):
-            raise Broken(f'MODE = {word}')
-        if controls and self._method != 'drive_control':
-            raise Broken('a control word in mode_scmd')
-        if register == SCMD and self._method != 'mode_scmd':
-            raise Broken('SCMD in drive_control')
-        if register == MODE and self._method == 'drive_control' and word != MODE_STOP:
-            raise Broken('MODE = 3 in drive_control')
-        self._note_stop(register, word)
+            raise Broken(f'monitor wrote {place:04X}h')
+        for complaint in self.shown.wrong(place, words):
+            raise Broken(complaint)
+        self._note_stop(place, words)
 
-    def _note_stop(self, register: int, word: int) -> None:
+    def _note_stop(self, place: int, words: tuple[int, ...]) -> None:
         """Let a stop go ahead of everything but what it has to read itself."""
-        stops = (
-            (register == SCMD and word == 0)
-            or (register == MODE and word == MODE_STOP)
-            or (register in (CONTROL, MASK) and not word & SWITCH_ON)
-            # a stop that a fault keeps the drive from taking goes on with the set-point
-            or (register in SETPOINTS and not word and bool(self._far.faults))
-        )
         due = self._stop_due
-        if stops:
+        if self.shown.stops(place, words):
             self._stop_due = None
             self._stop_tried_at = self.now
         if due is None:
             return
         before = len(self._rig.link.frames) - due
-        most = 2 if self._optimal and self._method == 'drive_control' else 1
-        if before > most:
+        if before > self.shown.lead:
             raise Broken(f'{before} transactions went ahead of a stop')
 
     # --- what is told -----------------------------------------------------------------------------
-
-    def _facts(self) -> dict[str, Any]:
-        """Return what is true of the drive now, by the names of what is told of it."""
-        far = self._far
-        truth = {
-            'code': far.control_unit.status_code,
-            'fault': bool(far.faults),
-            'by bus': self.by_bus,
-            # nobody says what a tuning shows of it
-            'running': None if self.tuning else self.running,
-            'limit': far.motor.limited,
-            'frequency': round(far.motor.frequency, 1),
-        }
-        if self._optimal:
-            truth['run input missing'] = not far.control_unit.run_input
-            truth['sleeping'] = bool(far.control_unit._sleeping)
-        else:
-            code = far.memory.raw('control.mode')
-            truth['control mode'] = self._control_modes[code]
-        return truth
 
     @staticmethod
     def _told(snapshot: Snapshot) -> dict[str, Any]:
@@ -336,7 +276,7 @@ class Laws(History):
         return {
             'code': seen.code,
             'fault': snapshot.kind.value == 'fault',
-            'by bus': _has(seen, 'NETWORK_CONTROL'),
+            'by bus': seen.from_bus,
             'running': seen.runs and seen.from_bus,
             'limit': _has(seen, 'LIMIT_ACTIVE'),
             'run input missing': _has(seen, 'RUN_INPUT_MISSING'),
@@ -346,7 +286,7 @@ class Laws(History):
         }
 
     def _judge_status(self) -> None:
-        truth = self._facts()
+        truth = self.shown.facts()
         if truth != self._seen:
             self._seen = truth
             for name, value in truth.items():
@@ -363,12 +303,13 @@ class Laws(History):
         known_since = max(self.settled_since, self._active_at)
         for name in self._differing(truth, self._last_told):
             value, since = self._truth[name]
-            patience = self.noticed + (CONTROL_MODE_PERIOD if name == 'control mode' else 0.0)
+            patience = self.noticed + self.shown.patience(name)
             agreed_at = self._agreed_at.get(name, known_since)
             if self.now - max(since, known_since, agreed_at) > patience:
                 raise Broken(f'{name} is told as {self._last_told[name]}, and it is {value}')
         running, since = self._truth['running']
-        long_since = self.now - max(since, known_since) > self.noticed
+        late = self.noticed + self.shown.patience('running')
+        long_since = self.now - max(since, known_since) > late
         if snapshot.enabled and not running and long_since:
             raise Broken('it is told as enabled, and it does not run')
 
@@ -386,14 +327,15 @@ class Laws(History):
 
     def _judge_connected(self, snapshot: Snapshot) -> None:
         if self._broken_since is not None and snapshot.connected:
-            lost = LOST if self.active and self._active_at < self._broken_since else LOST_IDLE
+            was_active = self.active and self._active_at < self._broken_since
+            lost = self.times.lost if was_active else self.times.lost_idle
             # commands without a response go before the polls
             since = max(self._broken_since, self._commanded_at)
             if self.now - since > lost and not self._rig.link.losses:
                 raise Broken('it is told as connected, and it is not')
         if self._whole_since is None or snapshot.connected:
             return
-        if self.now - max(self._whole_since, self._watched_at) > FOUND:
+        if self.now - max(self._whole_since, self._watched_at) > self.times.found:
             raise Broken('it is told as not connected, and it is there')
 
 

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any
 from typing import ClassVar
@@ -23,119 +24,83 @@ from typing import ClassVar
 from any_order_history import POLL_RATE
 from any_order_history import SETPOINT_TIMEOUT
 from any_order_history import SHUTDOWN_TIMEOUT
-from any_order_laws import MODE_BUS
-from any_order_laws import RUN_FIELDBUS
 from any_order_laws import Laws
 from any_order_rig import Rig
+from framed_link import link_of
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine
-from hypothesis.stateful import initialize
 from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 import pytest
 
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Refused as Refusal
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL
-from nfo_sinus_driver.simulator.sinus.control_unit import DROPS
-from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
-from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
-from nfo_sinus_driver.simulator.sinus.control_unit import SCMD
-from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
-from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
 WAITS = st.sampled_from((0.0, 0.004, 0.02, 0.1, 0.4, 1.0, 2.5))
 SETPOINTS = st.sampled_from((20.0, -20.0, 0.0, 5.0, 50.0, 400.0, -1e5, 0.004))
-#: Faults of the motor, the mains, the serial line and the fieldbus; 15 wants no acknowledgement.
-FAULTS = st.sampled_from((5, 7, 12, 14, 15))
+#: Faults of the drive, and how long it is silent after power-on, as its machine says.
+FAULTS = st.runner().flatmap(lambda machine: st.sampled_from(machine.faults))
+BOOT_TIMES = st.runner().flatmap(lambda machine: st.sampled_from(machine.boot_times))
+#: What ends a ride, likewise.
+ENDERS = st.runner().flatmap(lambda machine: st.sampled_from(machine.enders))
 
-_CONTROL = 'fieldbus.drive_control'
-_whole = precondition(lambda self: self.rig.link.whole)
-_driven = precondition(lambda self: self.laws.watched)
+WHOLE = precondition(lambda self: self.rig.link.whole)
+DRIVEN = precondition(lambda self: self.laws.watched)
 
 
 class AnyOrder(RuleBasedStateMachine):
-    """The rules; each ends with some time that passes."""
+    """
+    The rules for drives of any family; each ends with some time that passes.
 
-    model: ClassVar[str] = 'sinus_g2'
-    method: ClassVar[str] = 'mode_scmd'
+    :cvar faults: codes of some of its faults.
+    :cvar boot_times: how long it may be silent after power-on, s.
+    :cvar enders: what ends a ride, the names of methods that take the time to wait.
+    """
+
+    model: ClassVar[str]
+    method: ClassVar[str]
     reference: ClassVar[str] = 'fieldbus'
+    faults: ClassVar[Sequence[int]]
+    boot_times: ClassVar[Sequence[float]]
+    enders: ClassVar[Sequence[str]]
 
     def __init__(self) -> None:
         super().__init__()
         self.rig: Rig
         self.laws: Laws
 
-    @initialize(
-        control_mode=st.sampled_from(('Freque', 'Freque', 'Speed', 'Torque', 'PI-Reg')),
-        brake=st.booleans(),
-        slow=st.booleans(),
-        delay=st.sampled_from((0, 0, 1)),
-        drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
-        restart_after=st.sampled_from((None, None, 0, 1, 2)),
-        keeps=st.booleans(),
-        refuses=st.sampled_from((ALL, ALL, SCMD, NOTHING)),
-        tunes_on=st.booleans(),
-    )
-    def begin(
-        self,
-        control_mode: str = 'Freque',
-        brake: bool = True,
-        slow: bool = False,
-        delay: int = 0,
-        drive_timeout: float = 0.0,
-        restart_after: int | None = None,
-        keeps: bool = True,
-        refuses: str = ALL,
-        tunes_on: bool = True,
-    ) -> None:
-        """
-        Begin; a G2 ends its faults by itself after some seconds, if there are any.
-
-        :param keeps: the drive keeps its run command through a fault.
-        :param refuses: what it refuses while one is active.
-        :param tunes_on: it refuses to stop while it tunes.
-        """
-        optimal = self.model == 'sinus_optimal'
-        if optimal and control_mode not in ('Freque', 'Speed'):
-            control_mode = 'Freque'
-        parameters: dict[str, Any] = {
-            'control.mode': control_mode,
-            'control.st_mode': 'Brake' if brake else 'Release',
-            'control.accel': 0.3,
-            'control.retard': 3.0 if slow else 0.3,
-            'control.run_dly': delay,
-        }
-        if restart_after is not None and not optimal:
-            parameters.update(dict.fromkeys(TRIES.values(), 3))
-            parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
-        variant = {
-            'run_command_in_fault': KEEPS if keeps else DROPS,
-            'refuses_in_fault': refuses,
-            'stop_in_tuning': REFUSED if tunes_on else TAKEN,
-        }
-        far = simulated_drive(self.model, settings=parameters, **variant)
+    def begin_with(self, far: SimulatedDrive, **settings: Any) -> None:
+        """Begin with a drive, and with these settings of the driver."""
         self.rig = Rig(
             far,
             DriveSettings(
                 model=self.model,
                 control_method=self.method,
                 reference=self.reference,
-                expected_control_mode=control_mode if optimal else '',
                 poll_rate=POLL_RATE,
                 telemetry_rate=1.0,
                 setpoint_timeout=SETPOINT_TIMEOUT,
                 shutdown_timeout=SHUTDOWN_TIMEOUT,
-                drive_timeout=0.0 if optimal or self.method == 'monitor' else drive_timeout,
+                **settings,
             ),
+            link_of(far),
         )
         self.laws = Laws(self.rig)
         self.connect()
         self.activate()
+
+    def begin_for_each_event(self) -> None:
+        """Begin in the way that shows most of what ends a ride; each family its own."""
+        raise NotImplementedError
+
+    def put_right(self) -> None:
+        """Put right what keeps the motor from running, but for a fault; each family its own."""
+
+    def forget_faults(self) -> None:
+        """Let the drive end its faults by itself, or as its keypad can."""
+        raise NotImplementedError
 
     def teardown(self) -> None:
         if hasattr(self, 'rig'):
@@ -167,29 +132,29 @@ class AnyOrder(RuleBasedStateMachine):
             self.laws.connected()
         self.let(wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def activate(self, wait: float = 0.1) -> None:
         self.rig.drive.activate()
         self.laws.activated()
         self.let(wait)
 
-    def _give(self, name: str, wait: float) -> None:
+    def give(self, name: str, wait: float) -> None:
         # dozens of calls at one moment delay the polls, and show nothing
         if not self.laws.pending(name):
             self.laws.command(name, getattr(self.rig.drive, name)())
         self.let(wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def enable(self, wait: float = 1.0) -> None:
-        self._give('enable', wait)
+        self.give('enable', wait)
 
-    @_driven
+    @DRIVEN
     @rule(value=SETPOINTS, wait=WAITS)
     def run(self, value: float = 20.0, wait: float = 1.0) -> None:
         """Enable it and send set-points, as a program does."""
-        self._give('enable', 0.4)
+        self.give('enable', 0.4)
         self.send(value, wait)
 
     @rule(value=SETPOINTS, wait=WAITS)
@@ -211,6 +176,7 @@ class AnyOrder(RuleBasedStateMachine):
             self._answered('acknowledge')
         if not far.control_unit.run_input:
             self.run_input_on()
+        self.put_right()
         self._answered('enable')
         self.send(value, wait)
 
@@ -228,17 +194,17 @@ class AnyOrder(RuleBasedStateMachine):
             self.laws.command(name, future)
             self.rig.answer(future)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def enable_without_run_input(self, wait: float = 0.4) -> None:
         self.run_input_off()
         self._answered('enable')
         self.let(wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def stop(self, wait: float = 0.4) -> None:
-        self._give('stop', wait)
+        self.give('stop', wait)
 
     @rule(wait=WAITS)
     def stop_while_reading(self, wait: float = 0.4) -> None:
@@ -246,10 +212,10 @@ class AnyOrder(RuleBasedStateMachine):
         self.ride()
         reading = self.rig.drive.parameters.read()
         self.let(0.05)
-        self._give('stop', wait)
+        self.give('stop', wait)
         self.rig.answer(reading)
 
-    @_driven
+    @DRIVEN
     @rule(
         names=st.sampled_from(
             (
@@ -272,27 +238,27 @@ class AnyOrder(RuleBasedStateMachine):
     ) -> None:
         """Let two clients call at the same moment, perhaps while a third one is being served."""
         if begun:
-            self._give(begun, after)
+            self.give(begun, after)
         for name in names:
             self.laws.command(name, getattr(self.rig.drive, name)())
         self.let(wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def quick_stop(self, wait: float = 0.4) -> None:
-        self._give('quick_stop', wait)
+        self.give('quick_stop', wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def acknowledge(self, wait: float = 0.4) -> None:
-        self._give('acknowledge', wait)
+        self.give('acknowledge', wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def deactivate(self, wait: float = 0.4) -> None:
-        self._give('deactivate', wait)
+        self.give('deactivate', wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def clean_up(self, wait: float = 0.4) -> None:
         future = self.rig.drive.disconnect(SHUTDOWN_TIMEOUT)
@@ -300,7 +266,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.answer(future)
         self.let(wait)
 
-    @_driven
+    @DRIVEN
     @rule(wait=WAITS)
     def shut_down(self, wait: float = 0.4) -> None:
         """End the driver as a signal does, and start another."""
@@ -325,25 +291,7 @@ class AnyOrder(RuleBasedStateMachine):
         if self.laws.watched:
             self.activate()
 
-    @_driven
-    @precondition(lambda self: self.model == 'sinus_g2' and self.method == 'mode_scmd')
-    @rule(
-        procedure=st.sampled_from(Procedure),
-        after=st.sampled_from((0.02, 0.4, 1.0)),
-        give=st.sampled_from(('', 'stop', 'stop', 'quick_stop', 'deactivate', 'enable')),
-        wait=WAITS,
-    )
-    def tune(
-        self, procedure: Procedure, after: float = 0.4, give: str = 'stop', wait: float = 1.0
-    ) -> None:
-        """Tune a motor that stands; do something else meanwhile."""
-        if not self.laws.pending('tune'):
-            self.laws.command('tune', self.rig.drive.tune(procedure))
-        self.let(after)
-        if give:
-            self._give(give, wait)
-
-    @_driven
+    @DRIVEN
     @rule(code=FAULTS, between=st.sampled_from((0.0, 0.1, 0.4)), wait=WAITS)
     def fault_in_a_ride_acknowledged(
         self, code: int, between: float = 0.4, wait: float = 1.0
@@ -352,7 +300,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.ride()
         self.fault(code, wait=between)
         if self.laws.watched:
-            self._give('acknowledge', wait)
+            self.give('acknowledge', wait)
 
     @precondition(lambda self: self.reference == 'fieldbus')
     @rule(value=SETPOINTS, wait=WAITS)
@@ -372,16 +320,6 @@ class AnyOrder(RuleBasedStateMachine):
             self.rig.send(value)
         self.let(wait)
 
-    @_driven
-    @precondition(lambda self: self.model == 'sinus_g2')
-    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
-    def set_control_mode(self, mode: str, wait: float = 0.4) -> None:
-        if self.method != 'monitor':
-            self.until_noticed()
-            change = self.rig.drive.parameters.change({'control.mode': mode})
-            self.rig.answer(change)
-            self.let(wait)
-
     # --- what the drive does ----------------------------------------------------------------------
 
     @rule(code=FAULTS, standing=st.booleans(), wait=WAITS)
@@ -399,47 +337,15 @@ class AnyOrder(RuleBasedStateMachine):
     @precondition(lambda self: self.rig.far.faults and self.rig.link.whole)
     @rule(wait=WAITS)
     def end_fault(self, wait: float = 1.0) -> None:
-        """Let the drive forget its fault, by its keypad or as RstDly says."""
+        """Let the drive forget its fault, by its keypad or by itself."""
         self.until_noticed()
         self.laws.disturbed()
         self.rig.far.end_fault_causes()
-        self.rig.far.faults.acknowledge()
-        self.rig.far.faults.acknowledge_serial()
-        self.rig.far.set_run_input(self.rig.far.control_unit.run_input)
+        self.forget_faults()
         self.let(wait)
 
-    @rule(key=st.sampled_from(('stop', 'start', 'ext')), wait=WAITS)
-    def press(self, key: str, wait: float = 0.4) -> None:
-        self.laws.disturbed()
-        self.rig.far.control_unit.press(key)
-        self.let(wait)
-
-    @rule(mode=st.sampled_from((1, 2, 3)), wait=WAITS)
-    def write_mode(self, mode: int, wait: float = 0.4) -> None:
-        """Let somebody else write MODE."""
-        self._by_another(('fieldbus.mode', mode))
-        if mode == MODE_BUS:
-            self.laws.forgotten()
-        self.let(wait)
-
-    @_whole
-    @precondition(lambda self: self.reference == 'fieldbus' and not self.laws.enabling)
-    @rule(wait=WAITS)
-    def run_by_another(self, wait: float = 1.0) -> None:
-        """Let another master run the motor, the way this driver would."""
-        self.until_noticed()
-        setpoint = self.rig.far.control_unit.setpoint_key
-        if self.method == 'drive_control':
-            words = (0xC076, 0xC077, 0xC07F)
-            self._by_another(*((_CONTROL, word) for word in words), (setpoint, 100))
-        else:
-            command = 'fieldbus.smode' if self.model == 'sinus_optimal' else 'fieldbus.scmd'
-            mode = ('fieldbus.mode', MODE_BUS)
-            self._by_another(mode, (setpoint, 100), (command, RUN_FIELDBUS))
-        self.laws.started_by_another()
-        self.let(wait)
-
-    def _by_another(self, *writes: tuple[str, int]) -> None:
+    def by_another(self, *writes: tuple[str, int]) -> None:
+        """Let another master write raw numbers, until the drive refuses one."""
         self.laws.disturbed()
         for key, raw in writes:
             try:
@@ -453,7 +359,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.far.set_run_input(False)
         self.let(wait)
 
-    @_whole
+    @WHOLE
     @precondition(lambda self: not self.rig.far.control_unit.run_input)
     @rule(wait=WAITS)
     def run_input_on(self, wait: float = 1.0) -> None:
@@ -468,46 +374,33 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.far.motor.load = share
         self.let(wait)
 
-    @rule(boot=st.sampled_from((0.05, 0.5, 2.0)), wait=WAITS)
+    @rule(boot=BOOT_TIMES, wait=WAITS)
     def power_cycle(self, boot: float, wait: float = 1.0) -> None:
         self.laws.disturbed()
         self.rig.far.power_cycle(boot)
         self.let(wait)
 
-    @_whole
-    @precondition(lambda self: self.model == 'sinus_g2')
-    @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
-    def set_control_mode_at_keypad(self, mode: str, wait: float = 1.0) -> None:
-        self.until_noticed()
-        if self.rig.far.peek('control.mode') != mode:
-            self.rig.far.set_from_keypad('control.mode', mode)
-            self.laws.control_mode_changed()
-        # it is not read with every poll
-        self.let(max(wait, 2.5))
-
     @rule(
-        event=st.sampled_from(('fault', 'fault', 'stop', 'ext', 'mode', 'run_input', 'unheard')),
+        event=ENDERS,
         after=st.sampled_from((0.2, 0.2, 1.0)),
         wait=st.sampled_from((1.0, 2.5)),
     )
     def end_ride(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
         """Let something that ends a ride happen in one."""
         self.ride(wait=after)
-        if event == 'fault':
-            self.fault(5, wait=wait)
-        elif event == 'mode':
-            self.write_mode(1, wait)
-        elif event == 'run_input':
-            self.run_input_off(wait)
-        elif event == 'unheard':
-            self.rig.link.unheard = 1
-            self.stop(wait)
-        else:
-            self.press(event, wait)
+        getattr(self, event)(wait=wait)
+
+    def first_fault(self, wait: float) -> None:
+        self.fault(self.faults[0], wait=wait)
+
+    def stop_unheard(self, wait: float) -> None:
+        """Stop while the next request is lost."""
+        self.rig.link.unheard = 1
+        self.stop(wait)
 
     # --- what the line does -----------------------------------------------------------------------
 
-    @_whole
+    @WHOLE
     @rule(state=st.sampled_from(('silent', 'deaf', 'noise', 'late', 'gone')), wait=WAITS)
     def break_line(self, state: str, wait: float = 1.0) -> None:
         self.rig.link.state = state
@@ -524,7 +417,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.ride()
         self.break_line(state, wait=0.02)
         if give and self.laws.watched:
-            self._give(give, 0.0)
+            self.give(give, 0.0)
         self.let(seconds)
         self.mend_line(wait)
 
@@ -538,13 +431,13 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.link.mend()
         self.let(wait)
 
-    @_whole
+    @WHOLE
     @rule(losses=st.integers(1, 3), wait=WAITS)
     def lose_answers(self, losses: int, wait: float = 0.4) -> None:
         self.rig.link.losses = losses
         self.let(wait)
 
-    @_whole
+    @WHOLE
     @rule(share=st.sampled_from((0.01, 0.03, 0.1)), seed=st.integers(0, 999), wait=WAITS)
     def noise(self, share: float = 0.1, seed: int = 0, wait: float = 1.0) -> None:
         """Damage or lose answers by chance, until the line is mended."""
@@ -560,7 +453,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.ride()
         self.noise(share, seed, 2.5)
         if self.laws.watched:
-            self._give(give, 1.0)
+            self.give(give, 1.0)
 
     @rule(seconds=st.sampled_from((0.05, 0.3, 2.0)), wait=WAITS)
     def hold_silent(self, seconds: float, wait: float = 1.0) -> None:

@@ -16,33 +16,42 @@
 
 from __future__ import annotations
 
-from any_order_machine import AnyOrder
+from any_order_movitrac import MovitracOrder
+from any_order_sinus import SinusOrder
 
 
-class G2ModeScmd(AnyOrder):
+class G2ModeScmd(SinusOrder):
     pass
 
 
-class G2DriveControl(AnyOrder):
+class G2DriveControl(SinusOrder):
     method = 'drive_control'
 
 
-class OptimalModeScmd(AnyOrder):
+class OptimalModeScmd(SinusOrder):
     model = 'sinus_optimal'
 
 
-class OptimalDriveControl(AnyOrder):
+class OptimalDriveControl(SinusOrder):
     model = 'sinus_optimal'
     method = 'drive_control'
     reference = 'terminal'
 
 
-class G2Monitor(AnyOrder):
+class G2Monitor(SinusOrder):
     method = 'monitor'
 
 
-class OptimalMonitor(AnyOrder):
+class OptimalMonitor(SinusOrder):
     model = 'sinus_optimal'
+    method = 'monitor'
+
+
+class Movitrac(MovitracOrder):
+    pass
+
+
+class MovitracMonitor(MovitracOrder):
     method = 'monitor'
 
 
@@ -53,4 +62,6 @@ MACHINES = (
     OptimalDriveControl,
     G2Monitor,
     OptimalMonitor,
+    Movitrac,
+    MovitracMonitor,
 )

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """
 A drive, its bus and the simulated drive in virtual time: one thread, nothing waits, all repeats.
 
@@ -79,9 +80,9 @@ _SENDING_PERIOD = 0.1
 
 
 @functools.lru_cache(maxsize=4096)
-def _framed(request: bytes) -> str:
+def _framed(request: bytes) -> bytes:
     """Return the frame of a request; most are sent again and again."""
-    return (request + crc(request).to_bytes(2, 'little')).hex()
+    return request + crc(request).to_bytes(2, 'little')
 
 
 class Clock:
@@ -139,9 +140,9 @@ class _Told:
         raise AssertionError
 
 
-class DirectLink:
+class FaultyLine:
     """
-    The line to one simulated drive.
+    What is wrong with the line to one simulated drive.
 
     :ivar state: ``whole``; ``silent``: nobody hears; ``deaf``: carried out, but no answer comes;
         ``noise``: carried out, the answer is damaged; ``late``: it comes when nobody waits for it
@@ -151,9 +152,8 @@ class DirectLink:
     :ivar noise: the share of the answers that are damaged or lost, by chance.
     :ivar doubled: how many answers come twice yet: each spoils the next.
     :ivar frames: every request, for :mod:`support.trace_laws`.
+    :ivar asked_at: when the last one went out.
     """
-
-    protocol = PROTOCOLS['modbus_rtu']
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -163,7 +163,6 @@ class DirectLink:
         self._random = Random(0)
         self.frames: list[dict[str, Any]] = []
         self.asked_at = rig.clock.now
-        self._not_ready_until = 0.0
 
     @property
     def whole(self) -> bool:
@@ -184,6 +183,33 @@ class DirectLink:
         self.state = 'whole'
         self.noise = 0.0
         self.losses = self.unheard = self.doubled = 0
+
+    def _begin_request(self, frame: bytes) -> None:
+        """Take note of a request that goes out."""
+        self.asked_at = self._rig.clock.now
+        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': frame.hex()})
+
+    def _is_heard(self) -> bool:
+        """Tell whether the drive hears a request."""
+        if self.unheard or self.state == 'silent' or not self._rig.far.listening:
+            self.unheard -= self.unheard > 0
+            return False
+        self._rig.far.heard()
+        return True
+
+    def _require_port(self) -> None:
+        if self.state == 'gone':
+            raise PortError('the port is gone')
+
+
+class DirectLink(FaultyLine):
+    """The line, without frames: what is asked is done at once, and the clock goes on."""
+
+    protocol = PROTOCOLS['modbus_rtu']
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self._not_ready_until = 0.0
 
     def open(self) -> None:
         self._require_port()
@@ -246,23 +272,16 @@ class DirectLink:
             self.read(unit, source)
         return self.write(unit, address, data)
 
-    def _require_port(self) -> None:
-        if self.state == 'gone':
-            raise PortError('the port is gone')
-
     def _exchange(
         self, request: bytes, length: int, carry_out: Callable[[SimulatedDrive], Words]
     ) -> Words:
         rig = self._rig
         self._require_port()
-        self.asked_at = rig.clock.now
-        self.frames.append({'direction': 'request', 'gap': 0.0, 'hex': _framed(request)})
+        self._begin_request(_framed(request))
         rig.elapse(_GAP + (len(request) + 2) * _CHARACTER)
-        if self.unheard or self.state == 'silent' or not rig.far.listening:
-            self.unheard -= self.unheard > 0
+        if not self._is_heard():
             rig.elapse(RESPONSE_TIMEOUT)
             raise NoAnswer('nobody answers')
-        rig.far.heard()
         refusal = None
         try:
             words = carry_out(rig.far)
@@ -303,12 +322,18 @@ class Rig:
     The driver of one drive, and the drive.
 
     :param far: the simulated drive.
+    :param link: makes the line between them.
     :ivar looked: called whenever something may have happened.
     :ivar changed: whether something else has happened since that a look would judge.
     :ivar wrote: called with each write, register and words, before it is sent.
     """
 
-    def __init__(self, far: SimulatedDrive, settings: DriveSettings) -> None:
+    def __init__(
+        self,
+        far: SimulatedDrive,
+        settings: DriveSettings,
+        link: Callable[[Rig], Any] = DirectLink,
+    ) -> None:
         self.clock = Clock()
         self._stack = contextlib.ExitStack()
         self._stack.enter_context(self.clock.in_driver())
@@ -319,7 +344,7 @@ class Rig:
         self.looked: Callable[[], None] = lambda: None
         self.changed: Callable[[], bool] = lambda: True
         self.wrote: Callable[[int, Words], None] = lambda register, words: None
-        self.link = DirectLink(self)
+        self.link = link(self)
         self._broken: AssertionError | None = None
         self._sent: float | None = None
         self._send_at = 0.0

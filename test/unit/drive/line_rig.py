@@ -26,21 +26,23 @@ from typing import Any
 from unittest import mock
 
 from any_order_rig import Clock
+from noise_rig import Kind
 from noise_rig import TimedNotes
+from noise_rig import modbus_rtu
+from noise_rig import movitrac
 from support.said import Said
 from support.said import said
+from support.variants import ramps
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 
 _TURNAROUND = 0.002
 #: The longest step in which nobody looks at anything, s.
@@ -48,6 +50,16 @@ _SLICE = 0.02
 #: How often a program sends its set-points, s.
 _SENDING_PERIOD = 0.1
 _CLASSIC_FORMAT = '7E1'
+
+
+def _kind(protocol: str, baud: int) -> Kind:
+    """Return a kind of line by the name of its protocol."""
+    if protocol == 'movitrac':
+        return movitrac()
+    if protocol == 'modbus_rtu':
+        return modbus_rtu(baud)
+    settings = LineSettings(baud, _CLASSIC_FORMAT)
+    return Kind('sinus_g2', settings, ClassicLink, Classic(), 0.2, {})
 
 
 class Line:
@@ -59,10 +71,10 @@ class Line:
     :ivar lost: called with each request and a drive that would hear it; true: it does not.
     """
 
-    def __init__(self, rig: LineRig, settings: LineSettings, protocol: ModbusRtu | Classic) -> None:
+    def __init__(self, rig: LineRig, kind: Kind) -> None:
         self._rig = rig
-        self._settings = settings
-        self._protocol = protocol
+        self._settings = kind.settings
+        self._protocol = kind.spoken
         #: Frames by the moment of their last byte; those to the drives, and those from them.
         self._coming: list[tuple[float, int, bool, bytes]] = []
         self._order = itertools.count()
@@ -133,19 +145,20 @@ class LineRig:
         self._stack.enter_context(self.clock.in_driver())
         # the motors need not be exact here, and the time is long
         self._stack.enter_context(mock.patch.object(simulated, '_STEP', 0.05))
-        classic = protocol == 'classic'
-        line = LineSettings(baud, _CLASSIC_FORMAT) if classic else LineSettings(baud_rate=baud)
+        kind = _kind(protocol, baud)
         self.fars = {
             address: simulated_drive(
+                kind.model,
                 address=address,
-                settings={'control.accel': 0.5, 'control.retard': 0.5, **(parameters or {})},
+                settings={**ramps(kind.model, 0.5, 0.5), **(parameters or {})},
             )
             for address in range(1, count + 1)
         }
         for far in self.fars.values():
             far.advance_to(self.clock.now)
-        self.line = Line(self, line, Classic() if classic else ModbusRtu())
-        self.bus = Bus(ClassicLink(self.line, line) if classic else RtuLink(self.line, line))
+        self.line = Line(self, kind)
+        self.bus = Bus(kind.link(self.line, kind.settings))
+        settings = {'model': kind.model, **settings}
         self.notes = {address: TimedNotes(self.clock) for address in self.fars}
         self.drives = {
             address: Drive(

@@ -12,22 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The driver of one drive over a real Modbus RTU link, in virtual time, on a line with noise."""
+"""The driver of one drive over a real link, in virtual time, on a line with noise."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
+from collections.abc import Mapping
 import heapq
 import itertools
 import random
 from typing import Any
+from typing import NamedTuple
 from unittest import mock
 
 from any_order_rig import Clock
 from any_order_rig import Notes
 from any_order_rig import Rig
 from support.said import says
+from support.variants import ramps
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Cause
@@ -37,14 +40,45 @@ from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.movitrac_link import MovitracLink
 from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.simulator import drive as simulated
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
+from nfo_sinus_driver.simulator.movitrac import Movitrac
 
 _TURNAROUND = 0.002
 #: The driver gave the motor up, whether or not it could tell the drive.
 _ENDS = ('lost: ', 'stopped: ', 'stopping: ')
+
+
+class Kind(NamedTuple):
+    """
+    A kind of line, and the drive at it.
+
+    :ivar link: the driver's end of it, on a port.
+    :ivar spoken: the same for the drive.
+    :ivar wait: how long an answer is waited for at most, s.
+    :ivar variant: what the drive does where the manual is open.
+    """
+
+    model: str
+    settings: LineSettings
+    link: Callable[[Any, LineSettings], Any]
+    spoken: Any
+    wait: float
+    variant: Mapping[str, str]
+
+
+def modbus_rtu(baud: int) -> Kind:
+    """Return a G2 on Modbus RTU."""
+    return Kind('sinus_g2', LineSettings(baud_rate=baud), RtuLink, ModbusRtu(), 0.2, {})
+
+
+def movitrac(**variant: str) -> Kind:
+    """Return a MOVITRAC on its own line; it may be set to answer up to 0.2 s late (P843)."""
+    settings = LineSettings(9600, '8N1')
+    return Kind('movitrac31', settings, MovitracLink, Movitrac(), 0.4, variant)
 
 
 class Line:
@@ -58,11 +92,11 @@ class Line:
         drive's, or ``None``.
     """
 
-    def __init__(self, rig: NoiseRig, settings: LineSettings, seed: int) -> None:
+    def __init__(self, rig: NoiseRig, line: Kind, seed: int) -> None:
         self._rig = rig
-        self._settings = settings
+        self._settings = line.settings
         self._random = random.Random(seed)
-        self._protocol = ModbusRtu()
+        self._protocol = line.spoken
         #: Frames by the moment of their last byte; those to the drive, and those from it.
         self._coming: list[tuple[float, int, bool, bytes]] = []
         self._order = itertools.count()
@@ -102,7 +136,7 @@ class Line:
         far = self._rig.far
         far.advance_to(self._rig.clock.now)
         request = self._protocol.unwrap(frame)
-        if request is None or not far.listening or request.address != far.address:
+        if request is None or not far.listening or not self._protocol.concerns(far, request):
             return
         far.heard()
         answer = self.meet(frame) or self._protocol.answer(far, request)
@@ -142,20 +176,23 @@ class NoiseRig(Rig):
 
     notes: TimedNotes
 
-    def __init__(self, baud: int = 57600, seed: int = 0, **settings: Any) -> None:
-        self._line_settings = LineSettings(baud_rate=baud)
+    def __init__(
+        self, kind: Kind | None = None, seed: int = 0, **settings: Any
+    ) -> None:
+        self._kind = kind or modbus_rtu(57600)
         self._seed = seed
         # the motor need not be exact here, and the time is long
         self._coarse = mock.patch.object(simulated, '_STEP', 0.05)
         self._coarse.start()
-        far = simulated_drive(settings={'control.accel': 0.5, 'control.retard': 0.5})
-        super().__init__(far, DriveSettings(**settings))
+        model = self._kind.model
+        far = simulated_drive(model, settings=ramps(model, 0.5, 0.5), **self._kind.variant)
+        super().__init__(far, DriveSettings(model=model, **settings))
 
     def begin(self) -> None:
         """Start a driver."""
         self.notes = TimedNotes(self.clock)
-        self.line = Line(self, self._line_settings, self._seed)
-        self.bus = Bus(RtuLink(self.line, self._line_settings))
+        self.line = Line(self, self._kind, self._seed)
+        self.bus = Bus(self._kind.link(self.line, self._kind.settings))
         self.drive = Drive(self.bus, self.settings, self.notes)
 
     def close(self) -> None:

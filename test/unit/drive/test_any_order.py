@@ -65,15 +65,15 @@ CAMPAIGN = settings(
 def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
     """Whatever hypothesis makes up, each event has its history, and so has what follows it."""
     state = machine()
-    # a start that is delayed shows a run command that stands before the motor runs by it
-    state.begin(delay=1)
+    state.begin_for_each_event()
     try:
-        for event in ('fault', 'stop', 'ext', 'mode', 'run_input', 'unheard'):
+        for event in dict.fromkeys(machine.enders):
             state.end_ride(event, after=0.2, wait=1.0)
             if state.rig.far.faults:
                 state.end_fault(wait=1.0)
             if not state.rig.far.control_unit.run_input:
                 state.run_input_on(wait=1.0)
+            state.put_right()
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
     finally:

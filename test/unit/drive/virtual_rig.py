@@ -21,12 +21,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import any_order_rig
+from framed_link import link_of
 from support.addresses import Words
+from support.addresses import packed
 from support.addresses import words_of
 from support.said import says
 from support.variants import hardest
+from support.variants import ramps
 from support.wire import understand
 
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
@@ -54,12 +58,14 @@ class VirtualRig(any_order_rig.Rig):
         variant: Mapping[str, str] | None = None,
         **settings: Any,
     ) -> None:
-        parameters = {'control.accel': 0.3, 'control.retard': 0.3, **(parameters or {})}
-        settings = {'control_method': 'mode_scmd', 'poll_rate': 20.0, **settings}
         model = settings.setdefault('model', 'sinus_g2')
+        method = next(iter(load_family(model).profile.methods))
+        parameters = {**ramps(model, 0.3, 0.3), **(parameters or {})}
+        settings = {'control_method': method, 'poll_rate': 20.0, **settings}
         options = hardest(model) if variant is None else variant
         far = simulated_drive(model, settings=parameters, **options)
-        super().__init__(far, DriveSettings(**settings))
+        super().__init__(far, DriveSettings(**settings), link_of(far))
+        self._protocol = self.link.protocol.name
         self.before: Callable[[int, Words | None], None] = lambda register, words: None
         self.before_both: Callable[[int, Words], None] = lambda *what: self.before(*what)
         read, write = self.link.read, self.link.write
@@ -115,10 +121,11 @@ class VirtualRig(any_order_rig.Rig):
         self.before = meet
 
     def written(self, register: int) -> list[int]:
-        """Return what was written to a register of one word, in order."""
-        requests = [understand(bytes.fromhex(one['hex']), 'modbus_rtu') for one in self.link.frames]
+        """Return what was written to a register, as one number each time, in order."""
+        frames = [bytes.fromhex(one['hex']) for one in self.link.frames]
+        requests = [understand(frame, self._protocol) for frame in frames]
         return [
-            one.words[0]
+            int.from_bytes(packed(*one.words), 'big')
             for one in requests
             if one is not None and one.words is not None and one.place == register
         ]

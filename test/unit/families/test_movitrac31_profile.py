@@ -186,8 +186,56 @@ def test_control_is_stored_once_nothing_is_left_behind(early: Refusal | None) ->
         (Read(MODE), STANDARD),
         (Write(BITS, 0), early),
         (Write(SIZE, 0.0), early),
+        (Read(BITS), 0),
         (Write(MODE, REMOTE, stored=True), None),
         # written again, for they may have been ignored [C110]
+        (Write(BITS, 0, head=True), None),
+        *SIZE_0,
+        (Read(BITS), 0),
+    )
+
+
+@pytest.mark.parametrize('early', [None, REFUSED])
+def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) -> None:
+    # with Remote setpoint it can be changed, and the bits do not count yet
+    begun = (
+        (Read(MODE), STANDARD),
+        (Write(BITS, 0), early),
+        (Write(SIZE, 0.0), early),
+        (Read(BITS), FORWARD),
+        (Read(SIZE), 20.0),
+        (Write(MODE, 'Remote setpoint', stored=True), None),
+    )
+    play(
+        method.take_control(),
+        *begun,
+        *((Write(SIZE, 0.0), None), (Read(SIZE), 0.0), (Read(BITS), FORWARD)),
+        (Write(MODE, REMOTE, stored=True), None),
+        (Write(BITS, 0, head=True), None),
+        *SIZE_0,
+        (Read(BITS), 0),
+    )
+    with pytest.raises(NotPossible, match='keeps a set-point of 20'):
+        play(
+            method.take_control(),
+            *begun,
+            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0), (Read(BITS), FORWARD)),
+        )
+
+
+@pytest.mark.parametrize(
+    ('bits', 'size'), [(ENABLE, 20.0), (FORWARD, 0.0), (REFUSED, 20.0), (FORWARD, REFUSED)]
+)
+def test_what_is_left_behind_may_turn_nothing(bits: Any, size: Any) -> None:
+    asked = bits is not REFUSED and bits & FORWARD != ENABLE
+    play(
+        method.take_control(),
+        (Read(MODE), STANDARD),
+        (Write(BITS, 0), None),
+        (Write(SIZE, 0.0), None),
+        (Read(BITS), bits),
+        *(((Read(SIZE), size),) if asked else ()),
+        (Write(MODE, REMOTE, stored=True), None),
         (Write(BITS, 0, head=True), None),
         *SIZE_0,
         (Read(BITS), 0),
@@ -221,6 +269,7 @@ def test_a_drive_that_refuses_remote_control() -> None:
             (Read(MODE), STANDARD),
             (Write(BITS, 0), None),
             (Write(SIZE, 0.0), None),
+            (Read(BITS), 0),
             (Write(MODE, REMOTE, stored=True), REFUSED),
         )
 

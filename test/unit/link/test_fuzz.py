@@ -25,10 +25,12 @@ from fuzz.campaign import Part
 import pytest
 
 from nfo_sinus_driver.link import classic
+from nfo_sinus_driver.link import lawicel
 from nfo_sinus_driver.link import modbus_ascii
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import rtu
+from nfo_sinus_driver.link import sdo
 
 #: Fixed, so that every run goes through the same.
 SEED = 11
@@ -88,6 +90,14 @@ def test_a_wrong_sum_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_ack_behind_remains_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(movitrac, 'is_glitch', lambda junk: True)
     assert 'was believed behind' in _find('movitrac')[0].what
+
+
+def test_what_a_can_bus_says_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lawicel, '_STAMP', 0)
+    assert 'instead of' in _find('lawicel')[0].what
+    # a segment told twice is taken twice
+    monkeypatch.setattr(sdo, '_TOGGLE', 0)
+    assert 'instead of' in _find('sdo')[0].what
 
 
 def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

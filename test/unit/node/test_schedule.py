@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What is done by the clock: when it becomes due, and that nothing keeps it from coming again."""
 
 from __future__ import annotations

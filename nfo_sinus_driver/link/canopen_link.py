@@ -1,0 +1,324 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of nodes on a CAN bus, by the service data objects of CANopen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+from dataclasses import replace
+import re
+import time
+
+from nfo_sinus_driver.link import lawicel
+from nfo_sinus_driver.link import nmt
+from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link.can import FUNCTION_CODE
+from nfo_sinus_driver.link.can import CanPort
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import LineProtocol
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.lawicel_port import LawicelPort
+from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.sdo import Download
+from nfo_sinus_driver.link.sdo import Kind
+from nfo_sinus_driver.link.sdo import Transfer
+from nfo_sinus_driver.link.sdo import Upload
+from nfo_sinus_driver.link.socketcan import SocketCan
+
+#: Bit rate of the serial port of an adapter; those on USB do not care.
+_ADAPTER_RATE = 115_200
+#: What the default SDO server of a node may be asked at any time: device type, error register, how
+#: many entries the identity has, and the vendor. Each node has them (CiA 301); one that has not
+#: says so by an abort, which names the object, so that tells as much. With four of them one is
+#: always certain, see LateReplies.
+_EVERYWHERE = ((0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1))
+#: The name of a network interface, which no path of a device has.
+_INTERFACE = re.compile(r'[^/:\s]+')
+#: How often nodes hear that the client is there, s, as long as it talks to any of them.
+_HEARTBEAT = 0.1
+#: Bits of a frame with eight bytes, at least.
+_FRAME_BITS = 108
+#: The longest value that comes in one answer, bytes.
+_EXPEDITED = 4
+
+
+class _Ambiguous(DamagedAnswer):
+    """An answer came that may belong to an earlier write."""
+
+
+class CanopenLink:
+    """
+    A client of the default SDO server of each node on one bus; one request at a time.
+
+    An answer names node and object, and whether something was read or written; only segments do
+    not name the object. So what could be taken for another is a late answer about the very same
+    object, or a segment: after a missing answer its kind is in quarantine (:class:`LateReplies`),
+    and the object is only read when the node has answered about another one. A write is never kept
+    waiting, for it may be a stop; but if an earlier one of the same object may still be answered,
+    the answer is not believed: something is read, and :class:`DamagedAnswer` says that nobody
+    knows.
+
+    CAN itself sees to it that no frame is damaged, but one may be told twice, the second time right
+    behind the first. So what is the same as the answer before, and comes before the request can
+    have been answered, is believed only if no other comes for as long as the node may take.
+
+    What is promised: no value of another object or node is taken, no answer up to three time-outs
+    late to a question asked before, no answer to another write. Not told apart is an answer that is
+    told twice just when the next one is lost.
+
+    A value is as long as the node says, whatever the table says [C102].
+
+    A node is made operational before the first write to it, and again when it has started anew:
+    reading changes nothing. From then on the client's heartbeat is sent along with what it asks,
+    by the thread that asks: a node that watches over it (1016h) notices when that thread is gone.
+    """
+
+    #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
+    protocol = LineProtocol(
+        name='canopen',
+        addressing='canopen',
+        units=range(1, 128),
+        baud_rate=125_000,
+        char_format='8N1',
+        baud_rates=tuple(lawicel.BIT_RATES),
+        identifies=True,
+        check='power, the node id, the bit rate, CAN_H and CAN_L, 120 ohms at each end of the bus '
+        'and nowhere else, and that the interface is up (ip -details link show)',
+    )
+
+    def __init__(self, port: CanPort, settings: LineSettings) -> None:
+        self._port = port
+        self._settings = settings
+        self._late: LateReplies[Transfer, Kind] = LateReplies(
+            settings.response_timeout, lambda transfer: transfer.kinds
+        )
+        #: The nodes that were made operational.
+        self._started: set[int] = set()
+        self._heartbeat_due = 0.0
+
+    @classmethod
+    def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
+        """
+        Return the link on a port.
+
+        :param port: a CAN interface, such as ``can0``; or of a LAWICEL adapter the device path, or
+            a URL of pyserial.
+        :raises ValueError: it is none of them; the message says what to write.
+        """
+        if _INTERFACE.fullmatch(port):
+            wanted = ((sdo.ANSWERS, FUNCTION_CODE), (nmt.HEARTBEATS, FUNCTION_CODE))
+            return cls(SocketCan(port, wanted), settings)
+        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE))
+        return cls(LawicelPort(serial, settings.baud_rate), settings)
+
+    def open(self) -> None:
+        """Open the port."""
+        self._port.open()
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        self._port.close()
+        self._late.clear()
+        self._started.clear()
+
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """Take parameters that are safe to read; here those are asked that every node has."""
+
+    def parts(self, address: Address) -> tuple[Address]:
+        """Return the whole: a transfer carries all of a value."""
+        return (address,)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter; it has as many bytes as the node says."""
+        upload = _upload(unit, address)
+        kinds = upload.kinds[:1] + (sdo.SEGMENTS if address.size > _EXPEDITED else ())
+        questions = ((upload, kinds), *self._resync_reads(unit))
+        certain = self._late.first_certain(unit, questions, time.monotonic())
+        if certain is not upload:
+            self._resync_read(certain)
+        try:
+            arrived = self._transact(upload)
+        except LinkError as error:
+            error.heard = certain is not upload
+            raise
+        return Reply(upload.value, arrived)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """Write one parameter; the length has to be the one that the node knows."""
+        download = Download(unit, address.index, address.sub_index or 0, data)
+        self._drain()
+        if unit not in self._started:
+            self._port.send(nmt.start(unit))
+            self._started.add(unit)
+        try:
+            return Reply(b'', self._transact(download))
+        except _Ambiguous:
+            # not after mere silence: a stop that is given again would only have to wait for it
+            self._settle(unit)
+            raise
+
+    def write_and_read(
+        self, unit: int, address: Address, data: bytes, source: Address
+    ) -> Reply:
+        """Write one parameter, then read another; in as many transfers as that takes."""
+        self.write(unit, address, data)
+        return self.read(unit, source)
+
+    def read_then_write(
+        self, unit: int, source: Address, address: Address, data: bytes
+    ) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
+            self._transact(_upload(unit, source))
+        try:
+            return self.write(unit, address, data)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
+
+    def identify(self, unit: int) -> CanopenInquiry:
+        """Return the questions by which a node tells who it is; nothing is sent yet."""
+        return CanopenInquiry(unit, self.read)
+
+    # --- belief -----------------------------------------------------------------------------------
+
+    def _resync_reads(self, unit: int) -> Iterator[tuple[Upload, Sequence[Kind]]]:
+        for index, sub_index in _EVERYWHERE:
+            upload = Upload(unit, index, sub_index)
+            yield upload, upload.kinds
+
+    def _resync_read(self, upload: Upload) -> None:
+        """Have the node answer; whatever it says, what was late has come before it."""
+        try:
+            self._transact(upload)
+        except Refused:
+            return
+        except LinkError as error:
+            # nobody has heard the request for which it was asked
+            error.maybe_done = False
+            raise
+
+    def _settle(self, unit: int) -> None:
+        """Read something, so that the next answer is believed again; if not, then not."""
+        try:
+            questions = self._resync_reads(unit)
+            self._resync_read(self._late.first_certain(unit, questions, time.monotonic()))
+        except PortError:
+            raise
+        except LinkError:
+            return
+
+    # --- one transfer -----------------------------------------------------------------------------
+
+    def _transact(self, transfer: Transfer) -> float:
+        """Carry out a transfer; return when its last answer came."""
+        self._drain()
+        arrived = 0.0
+        while transfer.request is not None:
+            self._late.sent(transfer)
+            sent = time.monotonic()
+            if self._started and sent >= self._heartbeat_due:
+                self._port.send(nmt.HEARTBEAT)
+                self._heartbeat_due = sent + _HEARTBEAT
+            self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.request))
+            try:
+                arrived = self._receive(transfer, sent)
+            except Refused:
+                self._late.release(transfer.unit)
+                raise
+            except (NoAnswer, DamagedAnswer):
+                self._late.expect(transfer, time.monotonic())
+                if transfer.has_begun:
+                    self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.abort()))
+                raise
+            # a node answers in order: whatever was still to come has come before this
+            self._late.release(transfer.unit)
+        return arrived
+
+    def _drain(self) -> None:
+        """Take what came unasked: an answer that is late, one to somebody else, a boot-up."""
+        while self._take(0.0):
+            continue
+
+    def _take(self, until: float) -> Sequence[Frame]:
+        """Return what has come, as the port does; note which nodes have started anew."""
+        frames = self._port.receive(until)
+        self._started.difference_update(map(nmt.booted, frames))
+        return frames
+
+    def _receive(self, transfer: Transfer, sent: float) -> float:
+        """Take the answer to the present request, sent just now; return when it came."""
+        unit = transfer.unit
+        quarantined = self._late.quarantined(unit, sent)
+        deadline = sent + self._settings.response_timeout
+        other = 0
+        while True:
+            frames = self._take(deadline)
+            now = time.monotonic()
+            for frame in frames:
+                if frame.identifier != sdo.ANSWERS + unit:
+                    continue
+                told = sdo.kind(frame.data)
+                if told in transfer.kinds and told in quarantined:
+                    if isinstance(transfer, Download):
+                        raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')
+                elif told in transfer.kinds:
+                    self._require_one(transfer, frame, sent, now)
+                    if transfer.take(frame.data):
+                        return now
+                other += 1
+            if now >= deadline:
+                break
+        if other:
+            raise DamagedAnswer(f'unit {unit}: {other} answers came, but none to this request')
+        why = f': {self._port.trouble}' if self._port.trouble else ''
+        raise NoAnswer(f'unit {unit} did not answer{why}')
+
+    def _require_one(self, transfer: Transfer, answer: Frame, sent: float, now: float) -> None:
+        """
+        Make sure that an answer is not the one before, told twice.
+
+        :raises DamagedAnswer: another one came.
+        """
+        unit = transfer.unit
+        # a request and its answer
+        soonest = 2 * _FRAME_BITS / self._settings.baud_rate
+        self._late.note(transfer, answer.data, now, 0.0)
+        if self._late.repeated is not None and now < sent + soonest:
+            until = sent + max(soonest, self._late.longest(unit))
+            while time.monotonic() < until:
+                came = self._take(until)
+                if any(frame.identifier == answer.identifier for frame in came):
+                    raise DamagedAnswer(f'unit {unit}: an answer came twice')
+        self._late.took(unit, now - sent)
+
+
+def _upload(unit: int, address: Address) -> Upload:
+    return Upload(unit, address.index, address.sub_index or 0)

@@ -1,0 +1,129 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Frames of a CAN bus as lines of text, without I/O: LAWICEL's protocol, which Linux calls slcan.
+
+A line ends with CR: ``t`` identifier (three digits) length data. A BEL stands for *no* in place of
+a line; an empty line, ``z`` and ``Z`` stand for *done*. Digits are sent in upper case and read in
+both. Lines of other kinds, such as those of extended and remote frames, are passed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import re
+from typing import NamedTuple
+
+from nfo_sinus_driver.link.can import IDENTIFIERS
+from nfo_sinus_driver.link.can import MOST_DATA
+from nfo_sinus_driver.link.can import Frame
+
+#: The digit of the command that sets a bit rate, by the rate, bit/s.
+BIT_RATES = {
+    10_000: 0,
+    20_000: 1,
+    50_000: 2,
+    100_000: 3,
+    125_000: 4,
+    250_000: 5,
+    500_000: 6,
+    800_000: 7,
+    1_000_000: 8,
+}
+#: Ends a line.
+CR = b'\r'
+#: In place of a line: the adapter did not do it.
+BEL = b'\a'
+#: A command that takes the adapter off the bus; it refuses it when it is off it.
+CLOSE = b'C' + CR
+#: A command that takes the adapter onto the bus.
+OPEN = b'O' + CR
+#: Ends whatever an earlier program left half said; an adapter refuses or ignores it.
+FLUSH = 3 * CR
+
+#: The longest line that counts: a frame with eight bytes, a time stamp and a CR behind it.
+_LONGEST_LINE = 26
+#: A frame, with a time stamp or without.
+_FRAME = re.compile(rb't([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)')
+_STAMP = 4
+
+
+class Heard(NamedTuple):
+    """
+    What an adapter said.
+
+    :ivar frames: in their order.
+    :ivar done: how often it said that something was done.
+    :ivar refused: how often it said *no*.
+    """
+
+    frames: Sequence[Frame]
+    done: int
+    refused: int
+
+
+def encode(frame: Frame) -> bytes:
+    """
+    Return the line that sends a frame.
+
+    :raises ValueError: there is no such standard frame.
+    """
+    if frame.identifier not in IDENTIFIERS or len(frame.data) > MOST_DATA:
+        raise ValueError(f'{frame} is no standard frame')
+    data = frame.data.hex().upper()
+    return f't{frame.identifier:03X}{len(frame.data)}{data}'.encode() + CR
+
+
+def bit_rate(rate: int) -> bytes:
+    """
+    Return the command that sets a bit rate; an adapter takes it off the bus alone.
+
+    :raises ValueError: the protocol has none for it; the message says which there are.
+    """
+    if rate not in BIT_RATES:
+        raise ValueError(f'bit rate {rate}: there are {", ".join(map(str, BIT_RATES))}')
+    return b'S%d' % BIT_RATES[rate] + CR
+
+
+class Reader:
+    """Finds what an adapter says in the bytes that come in, in whatever pieces."""
+
+    def __init__(self) -> None:
+        self._line = b''
+
+    @property
+    def pending(self) -> int:
+        """How many bytes have come of a line that is not whole yet."""
+        return len(self._line)
+
+    def feed(self, data: bytes) -> Heard:
+        """Take bytes that came in; return what the lines that became whole say."""
+        *lines, rest = (self._line + data).replace(BEL, BEL + CR).split(CR)
+        # what is longer than any line is no line, however it ends
+        self._line = rest[-_LONGEST_LINE:]
+        frames = [frame for line in lines if (frame := _decode(line)) is not None]
+        done = sum(line in (b'', b'z', b'Z') for line in lines)
+        return Heard(frames, done, sum(line.endswith(BEL) for line in lines))
+
+
+def _decode(line: bytes) -> Frame | None:
+    """Return the frame of a line without its end; ``None`` if it is none."""
+    match = _FRAME.fullmatch(line)
+    if match is None:
+        return None
+    length = 2 * int(match[2])
+    if len(match[3]) not in (length, length + _STAMP):
+        return None
+    return Frame(int(match[1], 16), bytes.fromhex(match[3][:length].decode()))

@@ -1,0 +1,98 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A CAN bus behind an adapter that speaks LAWICEL's protocol on a serial port."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import contextlib
+import time
+
+from nfo_sinus_driver.link import lawicel
+from nfo_sinus_driver.link.can import CANNOT_SEND
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.port import Port
+
+#: How long an adapter may take to say that it has done something, s; some never say it.
+_REPLY_TIME = 0.1
+
+
+class LawicelPort:
+    """
+    One adapter; it is on the bus as long as the port is open.
+
+    :param rate: bit rate of the bus, bit/s.
+    :raises ValueError: there is no such bit rate; the message says which there are.
+    """
+
+    def __init__(self, port: Port, rate: int) -> None:
+        self._port = port
+        self._rate = rate
+        self._set_rate = lawicel.bit_rate(rate)
+        self._reader = lawicel.Reader()
+        self.trouble = ''
+
+    def open(self) -> None:
+        """
+        Open the port, and take the adapter onto the bus.
+
+        :raises PortError: the port cannot be opened, or the adapter refuses the bit rate.
+        """
+        self._port.open()
+        self._reader = lawicel.Reader()
+        self.trouble = ''
+        try:
+            # an earlier program may have left it on the bus, in the middle of a line
+            self._port.write(lawicel.FLUSH)
+            self._ask(lawicel.CLOSE)
+            if self._ask(self._set_rate).refused:
+                raise PortError(f'the adapter cannot do {self._rate} bit/s on the CAN bus')
+            if self._ask(lawicel.OPEN).refused:
+                raise PortError('the adapter does not go onto the CAN bus: unplug it and try again')
+        except PortError:
+            self._port.close()
+            raise
+
+    def close(self) -> None:
+        """Take the adapter off the bus and close the port; harmless when it is closed already."""
+        with contextlib.suppress(PortError):
+            self._port.write(lawicel.CLOSE)
+        self._port.close()
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame over."""
+        self._port.write(lawicel.encode(frame))
+
+    def receive(self, until: float) -> Sequence[Frame]:
+        """Return what has come; wait for the first bytes until a moment of ``time.monotonic``."""
+        heard = self._reader.feed(self._port.read(until))
+        if heard.refused:
+            self.trouble = CANNOT_SEND
+        elif heard.frames:
+            self.trouble = ''
+        return heard.frames
+
+    def _ask(self, command: bytes) -> lawicel.Heard:
+        """Return what the adapter says to a command that was given alone."""
+        while self._port.read(0.0):
+            # what was said before it
+            self._reader = lawicel.Reader()
+        self._port.write(command)
+        until = time.monotonic() + _REPLY_TIME
+        heard = self._reader.feed(b'')
+        while not heard.done and not heard.refused and time.monotonic() < until:
+            heard = self._reader.feed(self._port.read(until))
+        return heard

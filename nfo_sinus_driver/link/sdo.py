@@ -1,0 +1,247 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Service data objects of CANopen, the side of the client, without I/O (CiA 301 §7.2.4).
+
+A :class:`Transfer` is asked what to send, and told what came, until it is over. Up to four bytes go
+in one exchange, *expedited*; longer values in segments of seven bytes, each confirmed, whose
+toggle bit tells each from the one before. An answer is recognised by its *kind*: what it does and
+to which object; only segments do not say to which.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from abc import abstractmethod
+from collections.abc import Iterator
+import struct
+from typing import NamedTuple
+
+from nfo_sinus_driver.link import sdo_abort
+from nfo_sinus_driver.link.interface import DamagedAnswer
+
+#: Added to the address of a node, the identifiers of what it is asked, and of its answers.
+REQUESTS = 0x600
+ANSWERS = 0x580
+#: The longest value that is taken or sent, bytes.
+LONGEST_VALUE = 1024
+
+#: How many bytes each message has, used or not.
+_LENGTH = 8
+#: How many bytes go in one exchange, and in a segment.
+_EXPEDITED, _SEGMENT = 4, 7
+#: Command, index and sub-index, and up to four bytes.
+_HEAD = struct.Struct('<BHB')
+_SIZE = struct.Struct('<I')
+
+#: Commands, of the client and of the server, in the three high bits.
+_COMMAND = 0xE0
+_DOWNLOAD_SEGMENT = 0x00
+_DOWNLOAD = 0x20
+_UPLOAD = 0x40
+_UPLOAD_SEGMENT = 0x60
+_ABORT = 0x80
+_UPLOADED_SEGMENT = 0x00
+_DOWNLOADED_SEGMENT = 0x20
+_UPLOADED = 0x40
+_DOWNLOADED = 0x60
+#: In the low bits: the value is here, its size is known, this segment is another, or the last one.
+_IS_EXPEDITED, _HAS_SIZE, _TOGGLE, _LAST = 0x02, 0x01, 0x10, 0x01
+#: Commands of a server that name the object.
+_NAMING = (_UPLOADED, _DOWNLOADED, _ABORT)
+
+
+class Kind(NamedTuple):
+    """
+    What tells an answer from others.
+
+    :ivar command: what the server did.
+    :ivar index: to which object; -1: a segment does not say.
+    """
+
+    command: int
+    index: int = -1  # type: ignore[assignment]  # hides a method of tuples that nobody calls
+    sub_index: int = -1
+
+
+#: The kinds of segments.
+SEGMENTS = (Kind(_UPLOADED_SEGMENT), Kind(_DOWNLOADED_SEGMENT))
+
+
+def kind(message: bytes) -> Kind | None:
+    """Return what tells an answer from others; ``None`` if it is no answer."""
+    if len(message) != _LENGTH:
+        return None
+    command = message[0] & _COMMAND
+    if command in _NAMING:
+        _, index, sub_index = _HEAD.unpack_from(message)
+        return Kind(command, index, sub_index)
+    return Kind(command) if Kind(command) in SEGMENTS else None
+
+
+class Transfer(ABC):
+    """
+    One value, read or written.
+
+    :ivar unit: the node.
+    :ivar request: the message that has to be sent now; ``None``: it is over.
+    """
+
+    #: What a server does that is asked to begin.
+    _begun: int
+
+    def __init__(self, unit: int, index: int, sub_index: int) -> None:
+        self.unit = unit
+        self.index = index
+        self.sub_index = sub_index
+        self.request: bytes | None = None
+        #: The kind of the answer to it, if it is done.
+        self._expected = Kind(self._begun, index, sub_index)
+        self._toggle = 0
+
+    @property
+    def kinds(self) -> tuple[Kind, Kind]:
+        """The kinds of answers that the present request may have."""
+        return self._expected, Kind(_ABORT, self.index, self.sub_index)
+
+    @property
+    def has_begun(self) -> bool:
+        """The server has begun with segments; it waits for the next one."""
+        return self._expected in SEGMENTS and self.request is not None
+
+    def take(self, message: bytes) -> bool:
+        """
+        Take a message from the node.
+
+        :returns: whether it is the answer to the present request; else nothing has changed.
+        :raises Refused: the server has ended the transfer; it is over.
+        :raises DamagedAnswer: the answer makes no sense.
+        """
+        told = kind(message)
+        if self.request is None or told not in self.kinds:
+            return False
+        if told is not None and told.command == _ABORT:
+            self.request = None
+            raise sdo_abort.refusal(_SIZE.unpack_from(message, 4)[0])
+        if self._expected in SEGMENTS:
+            if message[0] & _TOGGLE != self._toggle:
+                return False
+            self._toggle ^= _TOGGLE
+        self._go_on(message)
+        return True
+
+    def abort(self) -> bytes:
+        """Return what makes the server forget the transfer; there is no answer to it."""
+        return self._message(_ABORT, _SIZE.pack(sdo_abort.TIMED_OUT))
+
+    @abstractmethod
+    def _go_on(self, message: bytes) -> None:
+        """Take the answer to the present request, and prepare the next one."""
+
+    def _message(self, command: int, data: bytes) -> bytes:
+        """Return a message that names the object."""
+        head = _HEAD.pack(command, self.index, self.sub_index)
+        return (head + data).ljust(_LENGTH, b'\0')
+
+
+class Upload(Transfer):
+    """
+    A value that is read.
+
+    :ivar value: what has come of it.
+    """
+
+    _begun = _UPLOADED
+
+    def __init__(self, unit: int, index: int, sub_index: int) -> None:
+        super().__init__(unit, index, sub_index)
+        self.value = b''
+        self._size: int | None = None
+        self.request = self._message(_UPLOAD, b'')
+
+    def _go_on(self, message: bytes) -> None:
+        if self._expected in SEGMENTS:
+            self._take_segment(message)
+            return
+        flags, data = message[0], message[4:]
+        if flags & _IS_EXPEDITED:
+            unused = flags >> 2 & 0x03 if flags & _HAS_SIZE else 0
+            self.value = data[: _EXPEDITED - unused]
+            self.request = None
+            return
+        self._size = _SIZE.unpack(data)[0] if flags & _HAS_SIZE else None
+        self._expected = Kind(_UPLOADED_SEGMENT)
+        self._require_size(self._size or 0, LONGEST_VALUE)
+        self._ask_segment()
+
+    def _take_segment(self, message: bytes) -> None:
+        flags = message[0]
+        data = message[1 : 1 + _SEGMENT - (flags >> 1 & 0x07)]
+        if not data and not flags & _LAST:
+            raise DamagedAnswer(f'unit {self.unit}: a segment without data, and not the last')
+        self.value += data
+        self._require_size(len(self.value), LONGEST_VALUE if self._size is None else self._size)
+        if not flags & _LAST:
+            self._ask_segment()
+            return
+        self.request = None
+        if self._size is not None:
+            self._require_size(self._size, len(self.value))
+
+    def _ask_segment(self) -> None:
+        self.request = bytes((_UPLOAD_SEGMENT | self._toggle,)).ljust(_LENGTH, b'\0')
+
+    def _require_size(self, size: int, most: int) -> None:
+        if size > most:
+            where = f'object {self.index:04X}h, sub-index {self.sub_index}'
+            raise DamagedAnswer(f'unit {self.unit}, {where}: {size} bytes instead of {most}')
+
+
+class Download(Transfer):
+    """A value that is written."""
+
+    _begun = _DOWNLOADED
+
+    def __init__(self, unit: int, index: int, sub_index: int, value: bytes) -> None:
+        """
+        Prepare to write a value.
+
+        :raises ValueError: it has no byte, or more than :data:`LONGEST_VALUE`.
+        """
+        super().__init__(unit, index, sub_index)
+        if not 0 < len(value) <= LONGEST_VALUE:
+            raise ValueError(f'a value of {len(value)} bytes cannot be written')
+        self._segments: Iterator[bytes] = iter(())
+        if len(value) <= _EXPEDITED:
+            flags = (_EXPEDITED - len(value)) << 2 | _IS_EXPEDITED | _HAS_SIZE
+            self.request = self._message(_DOWNLOAD | flags, value)
+        else:
+            self._segments = _segments(value)
+            self.request = self._message(_DOWNLOAD | _HAS_SIZE, _SIZE.pack(len(value)))
+
+    def _go_on(self, message: bytes) -> None:
+        self._expected = Kind(_DOWNLOADED_SEGMENT)
+        self.request = next(self._segments, None)
+
+
+def _segments(value: bytes) -> Iterator[bytes]:
+    """Yield the messages that carry a value, in segments."""
+    toggle = 0
+    for begin in range(0, len(value), _SEGMENT):
+        data = value[begin : begin + _SEGMENT]
+        is_last = _LAST if begin + _SEGMENT >= len(value) else 0
+        flags = toggle | (_SEGMENT - len(data)) << 1 | is_last
+        yield bytes((_DOWNLOAD_SEGMENT | flags,)) + data.ljust(_SEGMENT, b'\0')
+        toggle ^= _TOGGLE

@@ -1,0 +1,441 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a simulated drive shows by itself, for the laws in ``any_order_laws.py``: each family's way.
+
+Written from the manuals; nothing of the driver is asked.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from any_order_rig import RESPONSE_TIMEOUT
+from any_order_rig import Rig
+from support import trace_laws
+from support.wire import Request
+from support.wire import understand
+
+from nfo_sinus_driver.simulator.movitrac31.codes import Bit
+from nfo_sinus_driver.simulator.movitrac31.codes import Mode
+from nfo_sinus_driver.simulator.movitrac31.codes import Number
+from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
+from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
+from nfo_sinus_driver.simulator.movitrac31.commands import MANUAL
+from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL
+from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
+
+#: ParameterAccess of one word or two [M0 §7], [M1].
+MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
+#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
+_SETPOINTS = (0x03FC, 0x025C, 0x0408, 0x0410)
+#: Where InvSt stands [M0 §7], [M1].
+_INV_ST = 0x02A5
+MODE_STOP, MODE_BUS = 1, 3
+RUN_FIELDBUS = 0x101
+FORWARD, REVERSE = 1 << 3, 1 << 13
+#: Bit 0 of the control word [M0 table 14].
+SWITCH_ON = 1 << 0
+#: By these the bus has control.
+_BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
+
+#: Function bits, set-point, control mode and inverter status of a MOVITRAC [M4 §4].
+BITS, SIZE, P841, STATUS = 281, 223, 205, 284
+#: What else may be written of it, in these histories: the PC time-out.
+_TIMEOUT = 285
+_DIRECTIONS = Bit.CW | Bit.CCW
+
+Complaints = Iterator[str]
+
+
+@dataclass(frozen=True)
+class Times:
+    """
+    How soon a driver does what it has to, on one kind of line; s.
+
+    :ivar noticed: two polls and a transaction, and what they themselves take, while active.
+    :ivar noticed_idle: likewise, while not.
+    :ivar control_told: how much later it may be noticed who has control.
+    :ivar carried_out: a command is, within this.
+    :ivar lost: three polls without a response and the drive is lost, while active.
+    :ivar lost_idle: likewise, while not.
+    :ivar taken_back: a run command that could not be removed is, so long after the line came back.
+    :ivar found: a drive that was lost is found again within this.
+    :ivar response_timeout: how long an answer is waited for at most.
+    """
+
+    noticed: float = 0.5
+    noticed_idle: float = 1.2
+    control_told: float = 0.0
+    carried_out: float = 0.06
+    lost: float = 3.0
+    lost_idle: float = 4.0
+    taken_back: float = 1.7
+    found: float = 5.0
+    response_timeout: float = RESPONSE_TIMEOUT
+
+    def slowed(self, response_time: float) -> Times:
+        """Return the same for a drive that answers so much later, s; a poll is 4 transactions."""
+        poll = 4 * response_time
+        return Times(
+            noticed=self.noticed + 2 * poll,
+            noticed_idle=self.noticed_idle + 2 * poll,
+            control_told=self.control_told + poll,
+            carried_out=self.carried_out + poll,
+            lost=self.lost + 3 * poll,
+            lost_idle=self.lost_idle + 3 * poll,
+            taken_back=self.taken_back + 3 * poll,
+            found=self.found + 3 * poll,
+            response_timeout=self.response_timeout,
+        )
+
+
+class Shown(abc.ABC):
+    """
+    What one simulated drive shows, and what may be written to it.
+
+    :cvar times: how soon things have to be done at its line.
+    :cvar lead: how many transactions a stop lets go ahead: what it has to read itself.
+    :ivar powered_by_acknowledgement: it refuses every command while a fault is active, so that a
+        motor may have current until the stop that follows the acknowledgement.
+    :ivar refuses_stop: it may refuse a stop in a fault, and go on by it afterwards.
+    """
+
+    times = Times()
+    lead = 1
+    powered_by_acknowledgement = False
+    refuses_stop = False
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._far = rig.far
+        self._unit: Any = rig.far.control_unit
+        self._method = rig.settings.method
+        self._protocol = rig.link.protocol.name
+
+    @property
+    @abc.abstractmethod
+    def by_bus(self) -> bool:
+        """The bus controls the drive."""
+
+    @property
+    @abc.abstractmethod
+    def running(self) -> bool:
+        """The drive carries out a run command that came over the bus."""
+
+    @property
+    @abc.abstractmethod
+    def standing(self) -> bool:
+        """A run command that came over the bus stands in it, carried out or not."""
+
+    @property
+    def tuning(self) -> bool:
+        """The drive measures its motor, which has current."""
+        return False
+
+    @property
+    def may_run(self) -> bool:
+        """Nothing at the terminals keeps the motor from running."""
+        return self._unit.run_input
+
+    @property
+    def restarts_itself(self) -> bool:
+        """A fault is active that the drive ends by itself."""
+        return False
+
+    def has_tries(self, code: int) -> bool:
+        """Tell whether a fault may end by itself."""
+        return False
+
+    @abc.abstractmethod
+    def facts(self) -> dict[str, Any]:
+        """Return what is true of the drive now; ``None``: nobody knows what it tells."""
+
+    def patience(self, name: str) -> float:
+        """Return how much later than others a fact may be told, s."""
+        return 0.0
+
+    def requests_since(self, frames: int) -> Iterator[Request]:
+        """Return what was asked since so many frames were sent."""
+        for frame in self._rig.link.frames[frames:]:
+            request = understand(bytes.fromhex(frame['hex']), self._protocol)
+            if request is not None:
+                yield request
+
+    @abc.abstractmethod
+    def reads_status(self, request: Request) -> bool:
+        """Tell whether a request is the one that every status is read with."""
+
+    @abc.abstractmethod
+    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
+        """Yield what is wrong with a write, before it is carried out."""
+
+    @abc.abstractmethod
+    def stops(self, place: int, words: tuple[int, ...]) -> bool:
+        """Tell whether a write stops the motor."""
+
+    def wrong_line(self) -> list[str]:
+        """Return what was wrong on the line, all in all; what acknowledges says so."""
+        return []
+
+
+class ShownSinus(Shown):
+    """What both families of NFO show."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self.powered_by_acknowledgement = self._unit.variant.refuses_in_fault == ALL
+        refuses = self._unit.variant.refuses_in_fault != NOTHING
+        self.refuses_stop = refuses and self._method == 'mode_scmd'
+
+    @property
+    def by_bus(self) -> bool:
+        return self._unit.source in _BUS_SOURCES
+
+    def facts(self) -> dict[str, Any]:
+        far = self._far
+        return {
+            'code': self._unit.status_code,
+            'fault': bool(far.faults),
+            'by bus': self.by_bus,
+            # nobody says what a tuning shows of it
+            'running': None if self.tuning else self.running,
+            'limit': far.motor.limited,
+            'frequency': round(far.motor.frequency, 1),
+        }
+
+    def reads_status(self, request: Request) -> bool:
+        return request.words is None and request.place == _INV_ST
+
+    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
+        word = words[-1] if place == MASK else words[0]
+        controls = place in (CONTROL, MASK)
+        if place == MODE and word not in (MODE_STOP, MODE_BUS):
+            yield f'MODE = {word}'
+        if controls and self._method != 'drive_control':
+            yield 'a control word in mode_scmd'
+        if place == SCMD and self._method != 'mode_scmd':
+            yield 'SCMD in drive_control'
+        if place == MODE and self._method == 'drive_control' and word != MODE_STOP:
+            yield 'MODE = 3 in drive_control'
+
+    def stops(self, place: int, words: tuple[int, ...]) -> bool:
+        word = words[-1] if place == MASK else words[0]
+        return (
+            (place == SCMD and word == 0)
+            or (place == MODE and word == MODE_STOP)
+            or (place in (CONTROL, MASK) and not word & SWITCH_ON)
+            # a stop that a fault keeps the drive from taking goes on with the set-point
+            or (place in _SETPOINTS and not word and bool(self._far.faults))
+        )
+
+    def wrong_line(self) -> list[str]:
+        model = self._rig.settings.model
+        return trace_laws.violations(self._rig.link.frames, -float('inf'), model)
+
+
+class ShownG2(ShownSinus):
+    """What a G2 shows."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self._control_modes = rig.far.memory.model['control.mode'].labels
+
+    @property
+    def running(self) -> bool:
+        return self.by_bus and self._unit.state == 'OPERATION_ENABLED'
+
+    @property
+    def standing(self) -> bool:
+        if self._unit.source is Source.SCMD:
+            return bool(self._unit.scmd & 1)
+        return self.by_bus and bool(self._unit.word & SWITCH_ON)
+
+    @property
+    def tuning(self) -> bool:
+        return self._unit.tuning is not None
+
+    @property
+    def restarts_itself(self) -> bool:
+        return bool(self._unit.self_restart.waiting)
+
+    def has_tries(self, code: int) -> bool:
+        return bool(self._unit.self_restart._has_tries(code))
+
+    def facts(self) -> dict[str, Any]:
+        code = self._far.memory.raw('control.mode')
+        return {**super().facts(), 'control mode': self._control_modes[code]}
+
+    def patience(self, name: str) -> float:
+        # it is not read with every poll
+        return 1.0 if name == 'control mode' else 0.0
+
+    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
+        yield from super().wrong(place, words)
+        word = words[-1] if place == MASK else words[0]
+        if place in (CONTROL, MASK) and word & FORWARD and word & REVERSE:
+            yield 'both directions at once'
+
+
+class ShownOptimal(ShownSinus):
+    """What an Optimal shows."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self.lead = 2 if self._method == 'drive_control' else 1
+
+    @property
+    def running(self) -> bool:
+        return self.by_bus and bool(self._unit._running)
+
+    @property
+    def standing(self) -> bool:
+        return self.by_bus and bool(self._unit.scmd or self._unit._steps.run)
+
+    def facts(self) -> dict[str, Any]:
+        return {
+            **super().facts(),
+            'run input missing': not self._unit.run_input,
+            'sleeping': bool(self._unit._sleeping),
+        }
+
+
+#: Its line has 9600 bit/s, and an answer is waited for up to 0.4 s.
+_MOVITRAC = Times(
+    noticed=0.8,
+    noticed_idle=1.8,
+    control_told=1.2,
+    carried_out=0.2,
+    lost=3.5,
+    lost_idle=5.0,
+    taken_back=3.0,
+    found=7.0,
+    response_timeout=0.4,
+)
+#: How many transactions an enable has, and how long each takes at least, s.
+_CHECKS = 45
+_TRANSACTION = 0.018
+
+
+class ShownMovitrac(Shown):
+    """What a MOVITRAC shows."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        self.times = _MOVITRAC.slowed(self._unit.response_time)
+
+    @property
+    def by_bus(self) -> bool:
+        raw = self._far.memory.raw
+        return self._mode == Mode.REMOTE_CONTROL and not raw(MANUAL)
+
+    @property
+    def _mode(self) -> int:
+        return round(self._far.memory.number(CONTROL_MODE))
+
+    @property
+    def _bits(self) -> int:
+        return self._far.memory.raw(FUNCTION_BITS)
+
+    @property
+    def running(self) -> bool:
+        driven = self._unit.number in (Number.ENABLE, Number.CHANGE_DIRECTION)
+        return self.standing and driven and self._far.motor.driven
+
+    @property
+    def standing(self) -> bool:
+        return self.by_bus and bool(self._bits & _DIRECTIONS)
+
+    @property
+    def may_run(self) -> bool:
+        return self._unit.run_input or self._unit.variant.enable_bit == 'either'
+
+    @property
+    def restarts_itself(self) -> bool:
+        return bool(self._unit._resets_itself)
+
+    def has_tries(self, code: int) -> bool:
+        return bool(self._far.memory.raw('special.auto_reset'))
+
+    def facts(self) -> dict[str, Any]:
+        unit = self._unit
+        shows_enable = unit.number in (Number.ENABLE, Number.CHANGE_DIRECTION)
+        remote = self._mode == Mode.REMOTE_CONTROL
+        return {
+            'code': unit.status_code,
+            'fault': bool(self._far.faults),
+            'by bus': remote,
+            # magnetizing counts as running, and as nothing that stops
+            'running': remote and shows_enable and not self._far.faults,
+            'frequency': round(self._far.motor.frequency, 1),
+        }
+
+    def patience(self, name: str) -> float:
+        # who enables it reads for so long what all its terminals are for, before the next poll
+        checks = _CHECKS * (_TRANSACTION + self._unit.response_time)
+        return checks + (self.times.control_told if name in ('by bus', 'running') else 0.0)
+
+    def reads_status(self, request: Request) -> bool:
+        return request.words is None and request.place == STATUS
+
+    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
+        value = words[0] << 16 | words[1]
+        if place not in (BITS, SIZE, P841, _TIMEOUT):
+            yield f'index {place} was written'
+        # Remote setpoint and Remote control, in packed decimal digits: 1.00 and 2.00
+        if place == P841 and value not in (0x00000100, 0x00000200):
+            yield f'P841 = {value:08X}'
+        if place == BITS:
+            yield from self._wrong_bits(Bit(value))
+
+    def _wrong_bits(self, bits: Bit) -> Complaints:
+        before, size = self._bits, self._far.memory.raw(SETPOINT)
+        direction = bits & _DIRECTIONS
+        if direction == _DIRECTIONS:
+            yield 'both directions at once'
+        if bits & Bit.RESET and bits & (Bit.ENABLE | _DIRECTIONS):
+            yield 'acknowledges with a run command'
+        changes = direction and direction != before & _DIRECTIONS
+        if changes and size and self._mode == Mode.REMOTE_CONTROL:
+            yield 'a direction is given while the set-point is not 0'
+
+    def stops(self, place: int, words: tuple[int, ...]) -> bool:
+        no_direction = place == BITS and not words[1] & _DIRECTIONS
+        return no_direction or (place == SIZE and not any(words))
+
+    def wrong_line(self) -> list[str]:
+        return [
+            'a reset bit that acknowledges'
+            for request in self.requests_since(0)
+            if request.place == BITS and request.words is not None and request.words[1] & Bit.RESET
+        ]
+
+
+_FAMILIES: Mapping[str, type[Shown]] = {
+    'sinus_g2': ShownG2,
+    'sinus_optimal': ShownOptimal,
+    'movitrac31': ShownMovitrac,
+}
+
+
+def shown_by(rig: Rig) -> Shown:
+    """Return what the drive of a rig shows."""
+    return _FAMILIES[rig.settings.model](rig)

@@ -1,0 +1,194 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A CANopen link on a bus in virtual time: nothing here ever waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
+import heapq
+import itertools
+from types import SimpleNamespace
+from typing import TypeVar
+from unittest import mock
+
+from canopen_far_end import Server
+
+from nfo_sinus_driver.link import canopen_link
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Reply
+
+TIMEOUT = 0.2
+SETTINGS = LineSettings(baud_rate=125_000, char_format='8N1', response_timeout=TIMEOUT)
+UNIT = 5
+_PATIENCE = 100_000
+#: How long a frame takes on the bus, s.
+FRAME_TIME = 0.001
+
+_T = TypeVar('_T')
+
+
+def at(index: int, sub_index: int = 0, size: int = 2) -> Address:
+    """Return the address of an object."""
+    return Address('object', index, sub_index, size)
+
+
+A = at(0x2013)
+B = at(0x2022)
+TEXT = at(0x1008, size=64)
+#: What every node has.
+MANDATORY = {(0x1000, 0): bytes(4), (0x1001, 0): b'\0', (0x1018, 0): b'\4', (0x1018, 1): bytes(4)}
+
+
+@dataclass(frozen=True)
+class Fate:
+    """
+    What becomes of one message to a node.
+
+    :ivar delay: how long the node takes, in time-outs.
+    :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``double``.
+    """
+
+    delay: float = 0.0
+    what: str = 'answer'
+
+
+GOOD = Fate()
+DROP = Fate(what='drop')
+
+
+class Bus:
+    """
+    The port of a link, the clock that it sees, and the nodes.
+
+    :ivar sent: every message, and to which node.
+    :ivar other: whatever else was sent, and when.
+    :ivar begun: of the messages with which a transfer begins: node, index, sub-index, whether it
+        writes, and its fate.
+    """
+
+    def __init__(self, fates: Sequence[Fate]) -> None:
+        self._fates = iter(fates)
+        self.now = 1000.0
+        self.trouble = ''
+        self.is_open = False
+        self.servers = {
+            unit: Server({**MANDATORY, (0x2013, 0): b'', (0x2022, 0): b'', (0x1008, 0): b''})
+            for unit in (UNIT, 6)
+        }
+        self.sent: list[tuple[int, bytes]] = []
+        self.other: list[tuple[float, Frame]] = []
+        self.begun: list[tuple[int, int, int, bool, str]] = []
+        self._free: dict[int, float] = {}
+        self._arrivals: list[tuple[float, int, Frame]] = []
+        self._order = itertools.count()
+        self._looks = 0
+
+    def heal(self, *fates: Fate) -> None:
+        """Answer from now on, but for the next messages' fates."""
+        self._fates = iter(fates)
+
+    def monotonic(self) -> float:
+        self._looks += 1
+        assert self._looks < _PATIENCE, 'the link hangs'
+        return self.now
+
+    def open(self) -> None:
+        self.is_open = True
+
+    def close(self) -> None:
+        self.is_open = False
+
+    @staticmethod
+    def value(index: int, number: int) -> bytes:
+        """What an object holds when the transfer with this number is begun."""
+        if index == TEXT.index:
+            return f'the text of transfer {number}'.encode()
+        return (index * 7 + number * 131 & 0xFFFF).to_bytes(2, 'little')
+
+    def arrive(self, at_time: float, frame: Frame) -> None:
+        """Let a frame come."""
+        heapq.heappush(self._arrivals, (at_time, next(self._order), frame))
+
+    def send(self, frame: Frame) -> None:
+        unit = frame.identifier - 0x600
+        if not 0 < unit < 128:
+            self.other.append((self.now, frame))
+            return
+        self.sent.append((unit, frame.data))
+        self._looks = 0
+        fate = next(self._fates, GOOD)
+        server = self.servers.get(unit)
+        if server is None:
+            return
+        command = frame.data[0] >> 5
+        if command in (1, 2):
+            index, sub_index = int.from_bytes(frame.data[1:3], 'little'), frame.data[3]
+            if command == 2 and (index, sub_index) in server.objects:
+                server.objects[index, sub_index] = self.value(index, len(self.begun))
+            self.begun.append((unit, index, sub_index, command == 1, fate.what))
+        answer = server.answer(frame.data)
+        if answer is None or fate.what == 'drop':
+            return
+        if fate.what == 'refuse' and command in (1, 2):
+            answer = b'\x80' + frame.data[1:4] + (0x08000022).to_bytes(4, 'little')
+        start = max(self._free.get(unit, 0.0), self.now + FRAME_TIME + fate.delay * TIMEOUT)
+        for _ in range(2 if fate.what == 'double' else 1):
+            start += FRAME_TIME
+            self.arrive(start, Frame(0x580 + unit, answer))
+        self._free[unit] = start
+
+    def receive(self, until: float) -> Sequence[Frame]:
+        if not self._arrivals or self._arrivals[0][0] > max(until, self.now):
+            self.now = max(until, self.now)
+            return []
+        self.now = max(self.now, self._arrivals[0][0])
+        found = []
+        while self._arrivals and self._arrivals[0][0] <= self.now:
+            found.append(heapq.heappop(self._arrivals)[2])
+        return found
+
+
+class Bench:
+    """A link on a virtual bus; everything done with it happens in virtual time."""
+
+    def __init__(self, *fates: Fate) -> None:
+        self.bus = Bus(fates)
+        self.link = CanopenLink(self.bus, SETTINGS)
+        self.do(self.link.open)
+
+    def do(self, action: Callable[[], _T]) -> _T:
+        clock = SimpleNamespace(monotonic=self.bus.monotonic)
+        with mock.patch.object(canopen_link, 'time', clock):
+            return action()
+
+    def read(self, address: Address, unit: int = UNIT) -> Reply:
+        return self.do(lambda: self.link.read(unit, address))
+
+    def write(self, address: Address, value: bytes = b'\1\2', unit: int = UNIT) -> Reply:
+        return self.do(lambda: self.link.write(unit, address, value))
+
+    @property
+    def asked(self) -> list[int]:
+        """The objects of all transfers so far."""
+        return [index for _, index, *_ in self.bus.begun]
+
+    def answer_of(self, number: int) -> bytes:
+        """What the node says to the transfer with this number."""
+        return self.bus.value(self.asked[number], number)

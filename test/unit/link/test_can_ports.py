@@ -1,0 +1,389 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What carries CAN frames: a LAWICEL adapter on any port, SocketCAN on a socket made of paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import errno
+import os
+from pathlib import Path
+import select
+import socket
+import struct
+import threading
+import tty
+from types import SimpleNamespace
+from typing import Any
+
+from canopen_far_end import Server
+import pytest
+
+from nfo_sinus_driver.link import lawicel_port
+from nfo_sinus_driver.link import socketcan
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.lawicel_port import LawicelPort
+from nfo_sinus_driver.link.socketcan import SocketCan
+
+REQUEST = Frame(0x605, bytes.fromhex('4013200000000000'))
+ANSWER = Frame(0x585, bytes.fromhex('4B13200011220000'))
+ANSWER_LINE = b't58584B13200011220000\r'
+
+# --- LAWICEL --------------------------------------------------------------------------------------
+
+
+class Adapter:
+    """
+    A port with an adapter behind it, and a clock that only waiting moves.
+
+    :ivar says: what it answers to each command; nothing to those that are missing.
+    :ivar told: all that was written.
+    """
+
+    def __init__(self) -> None:
+        self.says = {b'C\r': b'\r', b'S4\r': b'\r', b'O\r': b'\r'}
+        self.told: list[bytes] = []
+        self.coming = b''
+        self.is_open = False
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def open(self) -> None:
+        self.is_open = True
+
+    def close(self) -> None:
+        self.is_open = False
+
+    def write(self, data: bytes) -> None:
+        if not self.is_open:
+            raise PortError('closed')
+        self.told.append(data)
+        self.coming += self.says.get(data, b'')
+
+    def read(self, until: float) -> bytes:
+        if not self.coming:
+            self.now = max(self.now, until)
+        data, self.coming = self.coming[:3], self.coming[3:]
+        return data
+
+
+@pytest.fixture
+def adapter(monkeypatch: pytest.MonkeyPatch) -> Adapter:
+    adapter = Adapter()
+    monkeypatch.setattr(lawicel_port, 'time', SimpleNamespace(monotonic=adapter.monotonic))
+    return adapter
+
+
+def test_an_adapter_goes_onto_the_bus_and_off_it(adapter: Adapter) -> None:
+    port = LawicelPort(adapter, 125_000)
+    port.open()
+    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.now == 0.0, 'nothing was waited for'
+    port.send(REQUEST)
+    assert adapter.told[4:] == [b't60584013200000000000\r']
+    port.close()
+    assert adapter.told[5:] == [b'C\r'] and not adapter.is_open
+    port.close()
+
+
+def test_an_adapter_that_was_left_on_the_bus(adapter: Adapter) -> None:
+    # it refuses what is half said, and frames come until it is off the bus
+    adapter.says[b'\r\r\r'] = b'\a' + ANSWER_LINE
+    adapter.says[b'C\r'] = ANSWER_LINE[5:] + b'\r'
+    port = LawicelPort(adapter, 125_000)
+    port.open()
+    assert port.receive(0.0) == []
+    assert port.trouble == ''
+
+
+def test_an_adapter_that_answers_no_command_is_used_all_the_same(adapter: Adapter) -> None:
+    adapter.says.clear()
+    LawicelPort(adapter, 125_000).open()
+    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.now == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ('command', 'problem'),
+    [(b'S4\r', 'cannot do 125000 bit/s'), (b'O\r', 'does not go onto the CAN bus')],
+)
+def test_an_adapter_that_refuses(adapter: Adapter, command: bytes, problem: str) -> None:
+    adapter.says[command] = b'\a'
+    with pytest.raises(PortError, match=problem):
+        LawicelPort(adapter, 125_000).open()
+    assert not adapter.is_open
+
+
+def test_a_bit_rate_that_there_is_not(adapter: Adapter) -> None:
+    with pytest.raises(ValueError, match='bit rate 9600: there are 10000'):
+        LawicelPort(adapter, 9600)
+
+
+def test_frames_of_an_adapter_in_pieces(adapter: Adapter) -> None:
+    port = LawicelPort(adapter, 125_000)
+    port.open()
+    adapter.coming = b'z\r' + ANSWER_LINE + ANSWER_LINE
+    found: list[Frame] = []
+    while adapter.coming:
+        found += port.receive(0.0)
+    assert found == [ANSWER, ANSWER]
+
+
+def test_what_an_adapter_could_not_send(adapter: Adapter) -> None:
+    port = LawicelPort(adapter, 125_000)
+    port.open()
+    adapter.coming = b'\a'
+    assert port.receive(0.0) == []
+    assert 'with this bit rate?' in port.trouble
+    adapter.coming = ANSWER_LINE
+    while adapter.coming:
+        port.receive(0.0)
+    assert port.trouble == ''
+
+
+# --- a whole bus ----------------------------------------------------------------------------------
+
+
+class PtyBus:
+    """An adapter at the far end of a pseudo-terminal, and one node."""
+
+    def __init__(self) -> None:
+        self._end, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.path = os.ttyname(self._near)
+        self.server = Server({(0x2022, 0): b'\1\0', (0x1008, 0): b'a text of many letters'})
+        self._stop, self._stopped = os.pipe()
+        self._thread = threading.Thread(target=self._work)
+        self._thread.start()
+
+    def close(self) -> None:
+        os.write(self._stopped, b'x')
+        self._thread.join()
+        for fd in (self._end, self._near, self._stop, self._stopped):
+            os.close(fd)
+
+    def _work(self) -> None:
+        buffer = b''
+        while self._stop not in select.select([self._end, self._stop], [], [])[0]:
+            *lines, buffer = (buffer + os.read(self._end, 200)).split(b'\r')
+            for line in lines:
+                os.write(self._end, self._answer(line))
+
+    def _answer(self, line: bytes) -> bytes:
+        if not line.startswith(b't605'):
+            return b'z\r' if line.startswith(b't') else b'\r'
+        answer = self.server.answer(bytes.fromhex(line[5:].decode()))
+        return b'z\r' + (b'' if answer is None else b't5858' + answer.hex().encode() + b'\r')
+
+
+@pytest.fixture
+def pty_bus() -> Iterator[PtyBus]:
+    bus = PtyBus()
+    yield bus
+    bus.close()
+
+
+def test_a_node_behind_an_adapter(pty_bus: PtyBus) -> None:
+    link = CanopenLink.on_port(pty_bus.path, LineSettings(125_000, '8N1', 10.0))
+    link.open()
+    try:
+        mode, name = Address('object', 0x2022, None, 2), Address('object', 0x1008, None, 64)
+        assert link.read(5, mode).data == b'\1\0'
+        assert link.read(5, name).data == b'a text of many letters'
+        for value in (b'another text', b'\3\0'):
+            link.write(5, mode, value)
+            assert link.read(5, mode).data == value
+        with pytest.raises(Refused, match='no such object'):
+            link.read(5, mode._replace(index=0x3000))
+    finally:
+        link.close()
+
+
+def test_no_node_behind_an_adapter(pty_bus: PtyBus) -> None:
+    link = CanopenLink.on_port(pty_bus.path, LineSettings(125_000, '8N1', 0.05))
+    link.open()
+    try:
+        with pytest.raises(NoAnswer, match='unit 9 did not answer'):
+            link.read(9, Address('object', 0x2022, None, 2))
+    finally:
+        link.close()
+
+
+# --- SocketCAN ------------------------------------------------------------------------------------
+
+
+class PaperSocket:
+    """
+    A CAN socket; a pipe is what ``select`` sees of it.
+
+    :ivar fails: with which error each of its methods fails.
+    """
+
+    def __init__(self) -> None:
+        self.options: list[tuple[int, int, bytes]] = []
+        self.bound: tuple[str, ...] | None = None
+        self.sent: list[bytes] = []
+        self.coming: list[bytes] = []
+        self.fails: dict[str, int] = {}
+        self.is_open = True
+        self._ready, self._wake = os.pipe()
+
+    def _may_fail(self, method: str) -> None:
+        if method in self.fails:
+            raise OSError(self.fails[method], os.strerror(self.fails[method]))
+
+    def fileno(self) -> int:
+        return self._ready
+
+    def setblocking(self, blocking: bool) -> None:
+        assert not blocking
+
+    def setsockopt(self, level: int, name: int, value: bytes) -> None:
+        self.options.append((level, name, value))
+
+    def bind(self, address: tuple[str, ...]) -> None:
+        self._may_fail('bind')
+        self.bound = address
+
+    def arrive(self, *frames: bytes) -> None:
+        self.coming += frames
+        os.write(self._wake, b'x')
+
+    def recv(self, size: int) -> bytes:
+        self._may_fail('recv')
+        if not self.coming:
+            os.read(self._ready, 1)
+            raise BlockingIOError
+        data = self.coming.pop(0)
+        assert len(data) == size
+        return data
+
+    def send(self, data: bytes) -> int:
+        self._may_fail('send')
+        self.sent.append(data)
+        return len(data)
+
+    def close(self) -> None:
+        if self.is_open:
+            os.close(self._ready)
+            os.close(self._wake)
+        self.is_open = False
+
+
+@pytest.fixture
+def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[PaperSocket]:
+    paper = PaperSocket()
+
+    def make(family: int, kind: int, protocol: int) -> PaperSocket:
+        assert (family, kind, protocol) == (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        paper._may_fail('socket')
+        return paper
+
+    monkeypatch.setattr(socketcan.socket, 'socket', make)
+    yield paper
+    paper.close()
+
+
+def raw(identifier: int, data: bytes, length: int | None = None) -> bytes:
+    """Return a struct can_frame as linux/can.h has it."""
+    size = len(data) if length is None else length
+    return struct.pack('=I', identifier) + bytes((size, 0, 0, 0)) + data.ljust(8, b'\0')
+
+
+def make(name: str = 'can0') -> SocketCan:
+    return SocketCan(name, ((0x580, 0x780),))
+
+
+def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) -> None:
+    make().open()
+    assert paper.bound == ('can0',)
+    # no extended, remote or error frames either
+    expected = struct.pack('=II', 0x580, 0x780 | 0xE0000000)
+    assert paper.options == [(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected)]
+
+
+def test_frames_of_a_socket(paper: PaperSocket) -> None:
+    port = make()
+    port.open()
+    port.send(REQUEST)
+    assert paper.sent == [raw(0x605, REQUEST.data)]
+    assert port.receive(0.0) == []
+    paper.arrive(raw(0x585, ANSWER.data), raw(0x80000585, b''), raw(0x585, b'\1'), raw(1, b'', 9))
+    assert port.receive(0.0) == [ANSWER, Frame(0x585, b'\1')]
+    assert port.receive(0.0) == []
+    port.close()
+    port.close()
+    assert not paper.is_open
+
+
+def test_nobody_acknowledges(paper: PaperSocket) -> None:
+    port = make()
+    port.open()
+    paper.fails['send'] = errno.ENOBUFS
+    port.send(REQUEST)
+    assert 'with this bit rate?' in port.trouble
+    del paper.fails['send']
+    paper.arrive(raw(0x585, ANSWER.data))
+    port.receive(0.0)
+    assert port.trouble == ''
+
+
+@pytest.mark.parametrize(
+    ('method', 'number', 'problem'),
+    [
+        ('socket', errno.EAFNOSUPPORT, 'this kernel has no SocketCAN'),
+        ('bind', errno.ENODEV, r'there is no CAN interface can0: .* Interfaces there are: vcan7'),
+        ('send', errno.ENETDOWN, 'can0 is down: sudo ip link set can0 up type can bitrate'),
+        ('recv', errno.ENETDOWN, 'can0 is down'),
+        ('recv', errno.EIO, 'can0 was lost'),
+    ],
+)
+def test_what_is_wrong_with_an_interface(
+    paper: PaperSocket,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    method: str,
+    number: int,
+    problem: str,
+) -> None:
+    for name, kind in (('vcan7', '280'), ('eth0', '1')):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / 'type').write_text(f'{kind}\n', encoding='ascii')
+    monkeypatch.setattr(socketcan, '_INTERFACES', tmp_path)
+    paper.fails[method] = number
+    port = make()
+    acts: dict[str, Callable[[], Any]] = {
+        'send': lambda: port.send(REQUEST),
+        'recv': lambda: (paper.arrive(b''), port.receive(0.0)),
+    }
+    with pytest.raises(PortError, match=problem):
+        port.open()
+        acts[method]()
+
+
+def test_a_closed_port() -> None:
+    port = make()
+    for act in (lambda: port.send(REQUEST), lambda: port.receive(0.0)):
+        with pytest.raises(PortError, match='can0 is not open'):
+            act()

@@ -1,0 +1,431 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Transfers with the nodes of a bus in virtual time, whatever they do."""
+
+from __future__ import annotations
+
+import itertools
+
+from canopen_bench import DROP
+from canopen_bench import FRAME_TIME
+from canopen_bench import GOOD
+from canopen_bench import MANDATORY
+from canopen_bench import TEXT
+from canopen_bench import TIMEOUT
+from canopen_bench import UNIT
+from canopen_bench import A
+from canopen_bench import B
+from canopen_bench import Bench
+from canopen_bench import Fate
+from canopen_bench import at
+from hypothesis import example
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import Identification
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Refused
+
+# --- plain transfers ------------------------------------------------------------------------------
+
+
+def test_read_and_write() -> None:
+    bench = Bench()
+    assert bench.read(A).data == bench.answer_of(0)
+    assert bench.write(A, b'\x34\x12').data == b''
+    assert bench.bus.servers[UNIT].objects[A.index, 0] == b'\x34\x12'
+    assert bench.read(TEXT).data == bench.answer_of(2)
+    assert bench.write(TEXT, b'a longer text').data == b''
+    assert bench.bus.servers[UNIT].objects[TEXT.index, 0] == b'a longer text'
+    assert [unit for unit, _ in bench.bus.sent] == [UNIT] * len(bench.bus.sent)
+    assert bench.bus.sent[0] == (UNIT, bytes.fromhex('4013200000000000'))
+
+
+def test_reply_says_when_it_came() -> None:
+    bench = Bench(Fate(0.5))
+    assert bench.read(A).arrived == bench.bus.now
+    bench.bus.now += 1
+    assert bench.write(A).arrived == bench.bus.now
+
+
+def test_a_value_is_as_long_as_the_node_says() -> None:
+    # [C102]
+    bench = Bench()
+    assert len(bench.read(at(A.index, size=4)).data) == 2
+    assert bench.link.parts(TEXT) == (TEXT,)
+
+
+def test_a_refusal_says_why() -> None:
+    bench = Bench()
+    with pytest.raises(Refused, match=r'no such object .SDO abort 06020000h.') as refused:
+        bench.read(at(0x3000))
+    assert refused.value.code == Refused.ILLEGAL_ADDRESS
+    with pytest.raises(Refused, match='no such sub-index'):
+        bench.write(at(A.index, 7))
+    # a refusal is an answer: nothing is in doubt
+    assert bench.asked == [0x3000, A.index]
+
+
+def test_who_a_node_is() -> None:
+    bench = Bench()
+    bench.bus.servers[UNIT].objects |= {(0x1018, 2): bytes(4), (0x1018, 4): bytes(4)}
+    inquiry = bench.link.identify(UNIT)
+    while not inquiry.done:
+        try:
+            bench.do(inquiry.ask)
+        except Refused as error:
+            assert 'no such object' in str(error)
+    assert bench.asked == [0x1018, 0x1018, 0x1018, 0x1008, 0x100A]
+    number = [str(int.from_bytes(bench.answer_of(each), 'little')) for each in range(3)]
+    assert inquiry.found == Identification(
+        vendor=number[0],
+        product_code=number[1],
+        serial=number[2],
+        product=bench.answer_of(3).decode(),
+    )
+
+
+def test_write_and_read_is_two_transfers() -> None:
+    bench = Bench()
+    reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, b'\1\2', B))
+    assert reply.data == bench.answer_of(1)
+    assert bench.asked == [A.index, B.index]
+
+
+@pytest.mark.parametrize('what', ['answer', 'refuse', 'drop', 'double'])
+def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: str) -> None:
+    bench = Bench(Fate(what=what))
+    assert bench.do(lambda: bench.link.read_then_write(UNIT, A, B, b'\1\2')).data == b''
+    assert [(index, writes) for _, index, _, writes, _ in bench.bus.begun] == [
+        (A.index, False),
+        (B.index, True),
+    ]
+
+
+def test_a_write_that_fails_behind_a_read_may_be_done() -> None:
+    bench = Bench(Fate(), Fate(what='refuse'))
+    with pytest.raises(Refused) as raised:
+        bench.do(lambda: bench.link.read_then_write(UNIT, A, B, b'\1\2'))
+    assert raised.value.maybe_done
+
+
+# --- silence --------------------------------------------------------------------------------------
+
+
+def test_silence() -> None:
+    bench = Bench(DROP, DROP)
+    start = bench.bus.now
+    with pytest.raises(NoAnswer, match=r'^unit 5 did not answer$'):
+        bench.read(A)
+    assert bench.bus.now - start == pytest.approx(TIMEOUT)
+    with pytest.raises(NoAnswer) as raised:
+        bench.write(A)
+    assert raised.value.maybe_done
+
+
+def test_silence_says_what_the_adapter_knows() -> None:
+    bench = Bench(DROP)
+    bench.bus.trouble = 'frames do not leave'
+    with pytest.raises(NoAnswer, match='unit 5 did not answer: frames do not leave'):
+        bench.read(A)
+
+
+@pytest.mark.parametrize('exchange', [1, 2, 3])
+def test_a_transfer_that_breaks_off_is_ended_at_the_node(exchange: int) -> None:
+    bench = Bench(*[Fate()] * exchange, DROP)
+    with pytest.raises(NoAnswer):
+        bench.read(TEXT)
+    assert bench.bus.servers[UNIT].ended == [0x05040000]
+    assert bench.read(B).data == bench.answer_of(1)
+
+
+def test_foreign_frames_make_no_request_longer() -> None:
+    bench = Bench(DROP)
+    start = bench.bus.now
+    for number in range(2000):
+        at_time = start + number * TIMEOUT / 1000
+        bench.bus.arrive(at_time, Frame(0x181, bytes(8)))
+        bench.bus.arrive(at_time, Frame(0x586, bytes.fromhex('4B13200011220000')))
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    assert bench.bus.now - start == pytest.approx(TIMEOUT, rel=0.01)
+
+
+def test_answers_to_others_are_not_silence() -> None:
+    bench = Bench(DROP)
+    for number in range(3):
+        at_time = bench.bus.now + 0.01 * (number + 1)
+        bench.bus.arrive(at_time, Frame(0x585, bytes.fromhex('4B14200011220000')))
+    with pytest.raises(DamagedAnswer, match='3 answers came, but none to this request'):
+        bench.read(A)
+
+
+# --- late -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('late', [1.1, 2.0, 3.0])
+def test_late_answer_is_not_taken_for_that_to_the_same_question(late: float) -> None:
+    bench = Bench(Fate(late))
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    for _ in range(50):
+        try:
+            told = bench.read(A).data
+        except (NoAnswer, DamagedAnswer, NotReady):
+            bench.bus.now += 0.1 * TIMEOUT
+            continue
+        assert bench.asked[-1] == A.index
+        assert told == bench.answer_of(len(bench.asked) - 1)
+        return
+    raise AssertionError('never answered')
+
+
+def test_another_object_is_read_at_once() -> None:
+    bench = Bench(DROP)
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    assert bench.read(B).data == bench.answer_of(1)
+    assert bench.read(A).data == bench.answer_of(2)
+    assert bench.asked == [A.index, B.index, A.index]
+
+
+def test_late_answer_is_not_taken_for_that_to_another_write_of_the_same() -> None:
+    bench = Bench(Fate(1.1), DROP)
+    with pytest.raises(NoAnswer):
+        bench.write(A)
+    with pytest.raises((NoAnswer, DamagedAnswer)) as raised:
+        bench.write(A, b'\3\4')
+    assert raised.value.maybe_done
+
+
+def test_a_write_in_doubt_goes_out_at_once_and_clears_the_line() -> None:
+    bench = Bench(DROP)
+    with pytest.raises(NoAnswer):
+        bench.write(A)
+    start = bench.bus.now
+    with pytest.raises(DamagedAnswer, match='an earlier request') as raised:
+        bench.write(A)
+    assert raised.value.maybe_done and bench.bus.now - start < 0.01
+    assert bench.asked == [A.index, A.index, 0x1000]
+    bench.write(A)
+    assert len(bench.asked) == 4
+
+
+def test_four_questions_are_enough_for_one_to_be_certain() -> None:
+    bench = Bench(*[DROP] * 9)
+    for _ in range(9):
+        with pytest.raises(NoAnswer):
+            bench.read(A)
+    assert bench.asked[:5] == [A.index, 0x1000, 0x1001, 0x1018, A.index]
+
+
+def test_a_node_without_the_objects_that_each_has_tells_as_much() -> None:
+    bench = Bench(DROP)
+    for place in MANDATORY:
+        del bench.bus.servers[UNIT].objects[place]
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    assert bench.read(A).data == bench.answer_of(2)
+    assert bench.asked == [A.index, 0x1000, A.index]
+
+
+def test_what_is_late_of_one_node_is_nothing_to_another() -> None:
+    bench = Bench(DROP)
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    assert bench.read(A, unit=6).data == bench.answer_of(1)
+    assert bench.asked == [A.index, A.index]
+
+
+def test_an_answer_told_twice_is_taken_once() -> None:
+    bench = Bench(Fate(), Fate(what='double'))
+    bench.read(A)
+    first = bench.read(A).data
+    with pytest.raises(DamagedAnswer, match='came twice'):
+        bench.read(A)
+    assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1) != first
+    bench = Bench(Fate(), Fate(what='double'))
+    bench.write(A)
+    bench.write(A)
+    with pytest.raises(DamagedAnswer, match='came twice') as raised:
+        bench.write(A, b'\3\4')
+    assert raised.value.maybe_done
+
+
+def test_same_values_cost_no_request_and_no_time() -> None:
+    bench = Bench()
+    bench.bus.value = lambda index, number: b'\4'  # type: ignore[method-assign]
+    start = bench.bus.now
+    for _ in range(10):
+        assert bench.read(A).data == b'\4'
+    assert bench.bus.now - start == pytest.approx(10 * 2 * FRAME_TIME)
+
+
+def test_closing_ends_every_quarantine() -> None:
+    bench = Bench(DROP)
+    with pytest.raises(NoAnswer):
+        bench.read(A)
+    bench.do(bench.link.close)
+    bench.do(bench.link.open)
+    bench.read(A)
+    assert bench.asked == [A.index, A.index]
+
+
+# --- who is there ---------------------------------------------------------------------------------
+
+START = Frame(0, b'\x01\x05')
+HEARTBEAT = Frame(0x77F, b'\x05')
+
+
+def starts(bench: Bench) -> list[Frame]:
+    return [frame for _, frame in bench.bus.other if frame.identifier == 0]
+
+
+def test_reading_changes_nothing() -> None:
+    bench = Bench()
+    for _ in range(3):
+        bench.read(A)
+        bench.bus.now += 1
+    assert bench.bus.other == []
+
+
+def test_a_node_is_made_operational_before_the_first_write() -> None:
+    bench = Bench()
+    bench.write(A)
+    assert bench.bus.other[0][1] == START
+    bench.write(A)
+    bench.write(A, unit=6)
+    assert starts(bench) == [START, Frame(0, b'\x01\x06')]
+    bench.do(bench.link.close)
+    bench.do(bench.link.open)
+    bench.write(A)
+    assert len(starts(bench)) == 3
+
+
+@pytest.mark.parametrize('reads', [0, 1])
+def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
+    bench = Bench()
+    bench.write(A)
+    bench.bus.now += 1
+    # another one produces a heartbeat, and others start anew
+    for identifier, data in ((0x705, b'\x05'), (0x706, b'\0'), (0x700, b'\0')):
+        bench.bus.arrive(bench.bus.now, Frame(identifier, data))
+    bench.write(A)
+    assert len(starts(bench)) == 1
+    bench.bus.arrive(bench.bus.now + (0.0005 if reads else 0.0), Frame(0x705, b'\0'))
+    for _ in range(reads):
+        bench.read(A)
+    bench.write(A)
+    assert starts(bench) == [START, START]
+
+
+def test_whoever_writes_is_heard_ten_times_a_second() -> None:
+    bench = Bench()
+    bench.write(A)
+    until = bench.bus.now + 2
+    while bench.bus.now < until:
+        bench.read(A)
+        bench.bus.now += 0.01
+    beats = [when for when, frame in bench.bus.other if frame == HEARTBEAT]
+    pauses = [after - before for before, after in itertools.pairwise(beats)]
+    assert min(pauses) >= 0.1 and max(pauses) < 0.12
+    assert len(beats) >= 18
+
+
+# --- whatever happens -----------------------------------------------------------------------------
+
+
+
+def one_fault_at_a_time(fates: list[Fate]) -> list[Fate]:
+    """Let whoever told something twice tell the next thing at once."""
+    before = [GOOD, *fates]
+    return [
+        GOOD if former.what == 'double' else fate
+        for former, fate in zip(before, fates, strict=False)
+    ]
+
+
+FATES = st.lists(
+    st.builds(
+        Fate,
+        st.one_of(st.just(0.0), st.floats(0, 3)),
+        st.sampled_from(['answer', 'answer', 'answer', 'drop', 'refuse', 'double']),
+    ),
+    max_size=30,
+).map(one_fault_at_a_time)
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(['A', 'B', 'text', 'type', 'write A', 'write B', 'write text']),
+        st.one_of(st.just(0.0), st.just(0.0), st.floats(0, 4)),
+    ),
+    max_size=25,
+)
+NAMES = {'A': A, 'B': B, 'text': TEXT, 'type': at(0x1000)}
+
+
+@hypothesis_settings(max_examples=300)
+@given(FATES, STEPS)
+@example([Fate(1.1), DROP], [('write A', 0.0), ('write A', 0.0)])
+@example([Fate(1.5), Fate(1.5), Fate(1.5)], [('A', 0.0), ('B', 0.0), ('A', 0.0)])
+@example([Fate(), Fate(), Fate(1.5)], [('text', 0.0), ('text', 0.0)])
+def test_every_answer_belongs_to_its_request(
+    fates: list[Fate], steps: list[tuple[str, float]]
+) -> None:
+    bench = Bench(*fates)
+    begun = bench.bus.begun
+    for what, pause in steps:
+        bench.bus.now += pause * TIMEOUT
+        address = NAMES[what.split()[-1]]
+        value = b'a text to be written' if address is TEXT else b'\1\2'
+        before = len(begun)
+        try:
+            if what.startswith('write'):
+                assert bench.write(address, value).data == b''
+                # one transfer, and this very one was confirmed
+                assert len(begun) == before + 1
+                assert begun[before][4] in ('answer', 'double')
+                assert bench.bus.servers[UNIT].objects[address.index, 0] == value
+            else:
+                told = bench.read(address).data
+                assert begun[-1][1] == address.index
+                assert told == bench.answer_of(len(begun) - 1)
+        except Refused:
+            refused = before if what.startswith('write') else len(begun) - 1
+            assert begun[refused][1] == address.index
+        except NotReady as refusal:
+            assert not what.startswith('write')
+            assert len(begun) == before
+            assert refusal.until > bench.bus.now
+        except (NoAnswer, DamagedAnswer) as error:
+            assert error.maybe_done or begun[-1][1] != address.index
+        assert len(begun) - before <= 2
+        if what.startswith('write'):
+            assert begun[before][1:4] == (address.index, 0, True)
+
+
+# --- ports ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('port', ['', '192.0.2.1:4001', 'nonsense://x'])
+def test_what_is_no_port(port: str) -> None:
+    with pytest.raises(ValueError, match='port'):
+        CanopenLink.on_port(port, LineSettings(125_000, '8N1'))

@@ -1,0 +1,123 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""CAN frames as lines of text, in whatever pieces they come."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.lawicel import BIT_RATES
+from nfo_sinus_driver.link.lawicel import Heard
+from nfo_sinus_driver.link.lawicel import Reader
+from nfo_sinus_driver.link.lawicel import bit_rate
+from nfo_sinus_driver.link.lawicel import encode
+
+FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8))
+#: What else an adapter says.
+OTHERS = st.sampled_from(
+    [b'\r', b'z\r', b'Z\r', b'\a', b'F00\r', b'V1013\r', b'r1000\r', b'T000001002AABB\r']
+)
+
+
+def heard(*pieces: bytes) -> Heard:
+    """Return all that a reader hears."""
+    reader = Reader()
+    each = [reader.feed(piece) for piece in pieces]
+    frames = [frame for one in each for frame in one.frames]
+    return Heard(frames, sum(one.done for one in each), sum(one.refused for one in each))
+
+
+def pieces_of(data: st.DataObject, stream: bytes) -> list[bytes]:
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    return [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
+
+
+@pytest.mark.parametrize(
+    ('frame', 'line'),
+    [
+        # the examples of the CANUSB's manual
+        (Frame(0x100, b''), b't1000\r'),
+        (Frame(0x7FF, b'\x11'), b't7FF111\r'),
+        (Frame(0x601, bytes.fromhex('4000100000000000')), b't60184000100000000000\r'),
+    ],
+)
+def test_frames_as_lines(frame: Frame, line: bytes) -> None:
+    assert encode(frame) == line
+    assert heard(line) == Heard([frame], 0, 0)
+    assert heard(line.lower()) == Heard([frame], 0, 0)
+
+
+@given(st.data(), st.lists(st.one_of(FRAMES, OTHERS), max_size=8), st.booleans())
+def test_every_frame_is_found_in_any_pieces(
+    data: st.DataObject, said: list[Frame | bytes], stamps: bool
+) -> None:
+    stream = b''
+    for one in said:
+        line = encode(one) if isinstance(one, Frame) else one
+        if isinstance(one, Frame) and stamps:
+            line = line[:-1] + b'12fe\r'
+        stream += line
+    found = heard(*pieces_of(data, stream))
+    assert found.frames == [one for one in said if isinstance(one, Frame)]
+    assert found.done == sum(one in (b'\r', b'z\r', b'Z\r') for one in said)
+    assert found.refused == said.count(b'\a')
+
+
+@given(st.data(), st.binary(max_size=80), FRAMES)
+def test_a_frame_is_found_behind_any_noise(
+    data: st.DataObject, noise: bytes, frame: Frame
+) -> None:
+    stream = noise + b'\r' + encode(frame)
+    assert heard(*pieces_of(data, stream)).frames[-1] == frame
+    assert heard(*pieces_of(data, stream)) == heard(stream)
+
+
+@given(FRAMES)
+def test_what_lacks_a_digit_or_has_one_more_is_no_frame(frame: Frame) -> None:
+    line = encode(frame)[:-1]
+    for wrong in (line[:-1], line[1:], line + b'0', b't' + line, b' ' + line):
+        assert heard(wrong + b'\r').frames == []
+
+
+@given(st.lists(st.binary(max_size=50), max_size=20))
+def test_whatever_comes_little_is_kept(pieces: list[bytes]) -> None:
+    reader = Reader()
+    for piece in pieces:
+        for frame in reader.feed(piece).frames:
+            assert frame.identifier <= 0x7FF and len(frame.data) <= 8
+        assert reader.pending <= 26
+
+
+def test_lines_that_lost_the_end_between_them_are_no_frame() -> None:
+    line = encode(Frame(0x581, bytes(8)))
+    assert heard(line[:-1] + line).frames == []
+    assert heard(line[:-1], line).frames == []
+    assert heard(line[:-1] + b'\a' + line).frames == [Frame(0x581, bytes(8))]
+
+
+@pytest.mark.parametrize('frame', [Frame(0x800, b''), Frame(-1, b''), Frame(1, bytes(9))])
+def test_what_is_no_standard_frame(frame: Frame) -> None:
+    with pytest.raises(ValueError, match='no standard frame'):
+        encode(frame)
+
+
+def test_bit_rates() -> None:
+    assert [bit_rate(rate) for rate in (10_000, 125_000, 1_000_000)] == [b'S0\r', b'S4\r', b'S8\r']
+    assert sorted(BIT_RATES.values()) == list(range(9))
+    with pytest.raises(ValueError, match='bit rate 9600: there are 10000, 20000'):
+        bit_rate(9600)
