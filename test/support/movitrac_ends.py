@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The ends of each setting of the MOVITRAC 31, copied by hand from [M4 §4].
+The ends of each setting of the MOVITRAC 31, from the text of [M4 §4].
 
 A second witness beside the catalog: names are those of the public interface, P numbers and indices,
 ranges and steps those of the manual, and nothing is read or computed from the tables of the driver.

@@ -246,8 +246,8 @@ class FunctionBits(ControlMethod):
         """
         Acknowledge a fault by one rising edge of the reset bit, the run bits removed first.
 
-        :raises NotPossible: a direction stands at a terminal, by which the motor could start; or
-            the drive keeps its function bits.
+        :raises NotPossible: a direction stands at a terminal, by which the motor could start; the
+            drive keeps its function bits; or it ignores them.
         """
         _require_no_direction((yield from _assignments()), int((yield Read(TERMINALS))))
         if (yield from self.remove(control_mode)) is not Removal.COMMAND:
@@ -256,6 +256,12 @@ class FunctionBits(ControlMethod):
             )
         for bits in (Bits.RESET, Bits(0)):
             yield Write(BITS, int(bits))
+        # with another P841 the drive may ignore function bits [C110]
+        if not (yield from self.in_control()) and int((yield Read(STATUS_WORD))) & words.FAULT:
+            raise NotPossible(
+                'P841 is not Remote control, and the drive ignores function bits: reset it at the '
+                'keypad or by a terminal'
+            )
         return ''
 
 

@@ -99,7 +99,7 @@ class Number(enum.IntEnum):
 IN_SET_2 = 1 << 3
 #: Set: the motor turns clockwise, which is forward.
 _CLOCKWISE = 1 << 4
-_FAULT = 0xFF << 24
+FAULT = 0xFF << 24
 #: The codes of the faults that the manual lists.
 _FAULTS = frozenset(
     (
@@ -151,7 +151,7 @@ def state_of(word: int) -> State:
     """
     number = _number(word)
     state = State.UNKNOWN if number is None else _STATES.get(number, State.OPERATION_ENABLED)
-    if not word & _FAULT:
+    if not word & FAULT:
         return state
     return State.FAULTED if state in _RELEASED else State.FAULT_REACTION_ACTIVE
 
@@ -171,7 +171,7 @@ def _decimal(byte: int) -> int:
 
 STATUS_WORD = StatusWord(
     state=state_of,
-    by_bit={_FAULT: Fact.FAULT},
+    by_bit={FAULT: Fact.FAULT},
     by_clear_bit={_CLOCKWISE: Fact.REVERSE},
     by_state={
         State.READY_TO_SWITCH_ON: Fact.READY,

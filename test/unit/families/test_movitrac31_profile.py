@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import contextlib
 from dataclasses import replace
 import math
 from typing import Any
@@ -362,8 +363,26 @@ def test_a_fault_is_acknowledged_by_an_edge_without_run_bits() -> None:
         *SIZE_0,
         (Write(BITS, RESET), None),
         (Write(BITS, 0), None),
+        (Read(MODE), 'Remote control'),
     )
     assert told == ''
+
+
+@pytest.mark.parametrize('word', [0x2D010000, 0x00010000])
+def test_a_reset_that_the_drive_ignores_is_told(word: int) -> None:
+    ignored = pytest.raises(NotPossible, match='P841 is not Remote control')
+    with ignored if word >> 24 else contextlib.nullcontext():
+        play(
+            method.acknowledge(TIMED_OUT, 'Freque'),
+            *assigned(),
+            (Read(TERMINALS), CLOSED_43),
+            (Write(BITS, 0), None),
+            *SIZE_0,
+            (Write(BITS, RESET), None),
+            (Write(BITS, 0), None),
+            (Read(MODE), 'Standard'),
+            (Read(WORD), word),
+        )
 
 
 def test_no_fault_is_acknowledged_where_a_terminal_would_start_the_motor() -> None:
