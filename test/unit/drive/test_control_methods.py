@@ -112,7 +112,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     turn(rig)
     rig.simulator.inject('run', False)
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('RUN input')
+    wait_until(lambda: rig.notes.told('RUN input'))
     rig.wait_until_still()
     rig.simulator.inject('run', True)
     rig.next_snapshots(5)

@@ -62,7 +62,7 @@ def test_fault(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('stopped: fault 5 Overload')
+    wait_until(lambda: rig.notes.told('stopped: fault 5 Overload'))
     assert rig.notes.told('~/enable to go on')
     rig.assert_stays_still()
     rig.acknowledged = 1
@@ -111,7 +111,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('run', 'off')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told(Cause.STOPPED_BY_ITSELF, Severity.WARNING)
+    wait_until(lambda: rig.notes.told(Cause.STOPPED_BY_ITSELF, Severity.WARNING))
     rig.assert_stays_still()
     rig.simulator.inject('run', 'on')
     assert_only_enable_helps(rig)
@@ -131,7 +131,7 @@ def test_stop_key(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('keypad', 'stop')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told(Cause.CONTROL_LOST, Severity.WARNING)
+    wait_until(lambda: rig.notes.told(Cause.CONTROL_LOST, Severity.WARNING))
     assert_only_enable_helps(rig)
 
 
@@ -157,7 +157,7 @@ def test_control_mode_changed_at_the_keypad(
     rig.turn()
     rig.simulator.inject('set', 'control.mode', 'Speed')
     wait_until(lambda: not rig.drive.armed)
-    assert rig.notes.told('the control mode was changed to Speed', Severity.WARNING)
+    wait_until(lambda: rig.notes.told('the control mode was changed to Speed', Severity.WARNING))
     rig.assert_stays_still()
 
 

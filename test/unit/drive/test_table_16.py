@@ -475,6 +475,8 @@ def test_table_16_fault(make_rig: MakeRig, exits: Exits, state: Phase) -> None:
     wait_until(lambda: shown(rig) is State.FAULTED)
     assert not rig.drive.armed
     assert (A, F) in exits
+    # it is told right after
+    wait_until(lambda: sum('fault 5 Overload' in text for _, text in rig.notes.events))
     assert sum('fault 5 Overload' in text for _, text in rig.notes.events) == 1
     if state is N:
         initialise(rig)
