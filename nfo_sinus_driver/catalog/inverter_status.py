@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import replace
 import functools
 import math
 
@@ -27,9 +28,11 @@ from nfo_sinus_driver.catalog.status import Meaning
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 
+#: By so much a frequency has to fall, Hz: less is what it wobbles by.
+_FALL = 0.1
 #: A frequency that was seen to fall, and has not risen since, counts as falling so long, s: the
-#: steps of a slow ramp come seldom.
-_FALLS_FOR = 2.0
+#: slowest ramp, of 2000 s, falls by so much in 4 s.
+_FALLS_FOR = 5.0
 #: Of what has not happened: when it began, and when it was over.
 NEVER = (-math.inf, -math.inf)
 #: Stands for an inverter status that has not been read; no drive has it.
@@ -56,8 +59,9 @@ class InverterStatus:
     :ivar by_mode_at: when it said so, likewise.
     :ivar frequency: Hz, read with it where the family's status word tells no stop; NaN elsewhere,
         and where the drive refuses to tell it.
-    :ivar fell: when the last two statuses in a row were between which the frequency fell; minus
-        infinity if it has not, or has risen since.
+    :ivar crest: from which size of it on it may be falling, and when that was last seen.
+    :ivar fell: when the last fall by more than a wobble began, and when it was seen; minus infinity
+        if there was none, or if it has risen since.
     """
 
     at: float
@@ -68,7 +72,20 @@ class InverterStatus:
     by_mode_at: float = -math.inf
     code_at: float = -math.inf
     frequency: float = math.nan
+    crest: tuple[float, float] = NEVER
     fell: tuple[float, float] = NEVER
+
+    def with_frequency(self, frequency: float, before: InverterStatus | None) -> InverterStatus:
+        """Return the same with the frequency read with it, after the status before."""
+        size = abs(frequency)
+        crest, fell = (before.crest, before.fell) if before is not None else (NEVER, NEVER)
+        if not size <= crest[0]:
+            crest, fell = (size, self.at), NEVER
+        elif size == crest[0]:
+            crest = size, self.at
+        elif size < crest[0] - _FALL:
+            crest, fell = (size, self.at), (crest[1], self.at)
+        return replace(self, frequency=frequency, crest=crest, fell=fell)
 
     @functools.cached_property
     def listed(self) -> StatusCode:

@@ -35,7 +35,6 @@ from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog.inverter_status import NEVER
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -232,12 +231,7 @@ class DriveState:
         except Refused:
             frequency = math.nan
         self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
-        before, fell = self.seen, NEVER
-        if before is not None and abs(frequency) < abs(before.frequency):
-            fell = before.at, seen.at
-        elif before is not None and abs(frequency) == abs(before.frequency):
-            fell = before.fell
-        return self._saw(replace(seen, frequency=frequency, fell=fell))
+        return self._saw(seen.with_frequency(frequency, self.seen))
 
     async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
         reply = await self.registers.read_reply(key, priority, once=once)

@@ -62,6 +62,8 @@ class Bolt(FarEnd):
         self.fault = 0
         #: It goes on as it was told before, whatever is written.
         self.deaf = False
+        #: By how much the frequency goes up and down while it does, 0.01 Hz.
+        self.wobble = 0
         #: Its motor is turned the other way.
         self.backwards = False
         self._demand = 0
@@ -75,7 +77,8 @@ class Bolt(FarEnd):
         registers = self.registers
         if number == HERTZ:
             wanted, has = self._demand, registers[HERTZ]
-            registers[HERTZ] = has + max(-self.step, min(self.step, wanted - has))
+            self.wobble = -self.wobble
+            registers[HERTZ] = has + self.wobble + max(-self.step, min(self.step, wanted - has))
         runs = (registers[BITS] & RUN or registers[HERTZ]) and not self.fault
         registers[TOLD] = self.fault or (2 if runs else 1)
         facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault)
@@ -225,6 +228,18 @@ def test_a_fall_from_before_the_stop_confirms_nothing(bolt: Bolt, bus: Bus) -> N
         bolt.deaf, bolt.step = False, 5
     wait_until(lambda: not drive.stop_unconfirmed)
     assert bolt.registers[BITS] == 0
+
+
+def test_a_frequency_that_wobbles_confirms_nothing(bolt: Bolt, bus: Bus) -> None:
+    notes = Notes()
+    drive = turning(bolt, bus, notes)
+    with bolt.lock:
+        bolt.deaf, bolt.step, bolt.wobble = True, 0, 5
+    with raises(Cause.STOP_UNCONFIRMED):
+        drive.stop().result(PATIENCE)
+    with bolt.lock:
+        bolt.deaf, bolt.step, bolt.wobble = False, 5, 0
+    wait_until(lambda: not drive.stop_unconfirmed)
 
 
 def test_a_motor_that_runs_unasked_is_stopped(bolt: Bolt, bus: Bus) -> None:
