@@ -291,5 +291,5 @@ class Silences:
 
     @property
     def missing_from(self) -> float:
-        """From when on a missing unit may be asked again; at any time while nobody answers."""
+        """From when on a missing unit may be asked again; at any time while no unit responds."""
         return min(self._pause_ends, self._anybody_at + _MISSING_AFTER)

@@ -178,7 +178,7 @@ def control_session(
 
 #: How long an answer of the drive layer may take, s; it gives up earlier by itself.
 _LONGEST_ANSWER = 10.0
-#: How long a stop that is not confirmed is tried on, s.
+#: How long a stop that is not confirmed is retried, s.
 _LAST_TRIES = 10.0
 #: The same as the parameter ``shutdown_timeout`` of the driver has, s.
 SHUTDOWN_TIMEOUT = 4.0
@@ -240,7 +240,7 @@ class Stopping:
         return seen.status is not None and seen.status.driven
 
     def confirmed_late(self) -> bool:
-        """Let a stop be tried on for a while; true when the drive has confirmed it."""
+        """Let a stop be retried for a while; true when the drive has confirmed it."""
         show, drive = self._session.screen.say, self._drive
         deadline = time.monotonic() + _LAST_TRIES
         while drive.stop_unconfirmed and time.monotonic() < deadline:

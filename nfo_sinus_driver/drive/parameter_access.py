@@ -210,7 +210,7 @@ class ParameterAccess:
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
-        # what is busy has done nothing; a stop that is sent once is tried on by who wants it
+        # what is busy has done nothing; a stop that is sent once is repeated by who wants it
         busy = 0 if once and priority is Priority.STOP else _BUSY_TRIES
         while True:
             try:

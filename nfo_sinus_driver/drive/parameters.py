@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The settings of one drive: read once, watched for ever, changed on request, as wanted or not."""
+"""The settings of one drive: read once, watched, changed on request, as wanted or not."""
 
 from __future__ import annotations
 
@@ -289,7 +289,7 @@ class Parameters:
                 except LinkError:
                     # the poll says so if the drive is lost
                     inverter.missed()
-            # many drives on a line take their time, lest nothing but that goes on
+            # many drives on a line take their time, so that other things go on, too
             pace = _ROUND * self._bus.refreshing / len(due)
             await self._bus.sleep(started + number * pace - time.monotonic())
             if keys is not self._keys:

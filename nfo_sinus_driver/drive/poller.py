@@ -498,7 +498,7 @@ _OFF_PERIOD = 0.5
 
 async def watch_telemetry(inverter: DriveState) -> None:
     """
-    Measure at ``telemetry_rate`` for ever; a value the drive does not have stays NaN.
+    Measure at ``telemetry_rate`` until cancelled; a value the drive does not have stays NaN.
 
     One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
     """

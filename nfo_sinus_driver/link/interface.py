@@ -322,7 +322,7 @@ _REFUSALS = {
 
 class NotReady(LinkError):
     """
-    This unit must be left alone for a while, lest a late answer be taken for the right one.
+    This unit must be left alone for a while, so that no late answer is taken for the right one.
 
     Nothing was sent.
 

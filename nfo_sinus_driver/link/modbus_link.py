@@ -244,7 +244,7 @@ class ModbusInquiry:
             assert isinstance(question, ReadDevice)
             self._take(answer)
             following = answer.next_object
-            # only forward, lest a unit that always has more is asked for ever
+            # only forward: a unit that always has more is not asked without end
             if following is not None and question.first < following < len(_FIELDS):
                 self._questions.insert(0, ReadDevice(self._unit, REGULAR, following))
         elif isinstance(answer, bytes):

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,7 +40,7 @@ class Fault(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Drives:
+class Drives(abc.ABC):
     """
     The drives of one family, in the words of their simulator.
 
@@ -82,41 +83,41 @@ class Drives:
         ramps = 'stopping: it ramps down (this drive has no quick stop)'
         return 'released: the motor coasts' if self.coasts else ramps
 
+    @abc.abstractmethod
     def commanded(self, state: State) -> bool:
         """Tell whether a run command of the bus stands."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def taken(self, state: State) -> bool:
         """Tell whether the bus has control."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def left(self, state: State) -> bool:
         """Tell whether a driver that has ended left the drive as it should."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def stopping(self, state: State) -> bool:
         """Tell whether the drive drives its motor to a stop, or not at all."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def timeout(self, seconds: float) -> tuple[str, ...]:
         """Return the options of a simulated drive whose own time-out stops the motor so soon."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def has_timeout(self, state: State, seconds: float) -> bool:
         """Tell whether its own time-out is set so, and stops the motor."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
         """Have a person stop it at its keypad, who leaves it when that was noticed."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def run_by_terminals(self, drive: Simulated) -> None:
         """Have somebody else change who controls it, and run it by its terminals."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def end_run_by_terminals(self, drive: Simulated) -> None:
         """Have the same end that, and leave it so that it can be enabled."""
-        raise NotImplementedError
 
 
 class Sinus(Drives):

@@ -252,7 +252,7 @@ class ControlSteps:
     How far a master has come.
 
     A command is taken when its bit rises and the status word is ready for it. What came too early
-    does nothing until it is taken back and given again; what is taken back ends at once, and all
+    does nothing until it is removed and given again; what is removed ends at once, and all
     that came after it.
 
     :ivar word: the last control word.
@@ -284,7 +284,7 @@ class ControlSteps:
         self._asked = self._reached = 0
 
     def drop_run(self) -> None:
-        """Forget the run command; its bit must be taken back and given again."""
+        """Forget the run command; its bit must be removed and given again."""
         before_run = len(_STEPS) - 1
         self._asked = min(self._asked, before_run)
         self._reached = min(self._reached, before_run)
