@@ -109,7 +109,8 @@ class Setpoint:
         #: The parameters that a set-point is written to, by where that is.
         self._keys: dict[Address, str] = {}
         self._armed_at = math.inf
-        #: What stands in the drive and since when, by where; nothing where that is not known.
+        #: What stands in the drive and since when, by where; nothing where that is not known, and
+        #: minus infinity where it may be what was written since.
         self._written: dict[Address, tuple[bytes, float]] = {}
         self._watch: Task | None = None
         #: What reads back whether the drive took what was told to all, and when it last did.
@@ -364,7 +365,7 @@ class Setpoint:
             asked = self._meant({**self._standing, transfer.address: transfer.data})
             self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
         else:
-            self.was_missed(error)
+            self.was_missed(error, transfer.address)
 
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf
@@ -372,13 +373,21 @@ class Setpoint:
         if len(self._written) == len(self._keys):
             self.commanded = self._meant(self._standing)
 
-    def was_missed(self, error: LinkError) -> None:
-        """Take note that nobody knows what stands in the drive; it is written when it answers."""
+    def was_missed(self, error: LinkError, address: Address | None = None) -> None:
+        """
+        Take note that nobody knows what stands in the drive; it is written when it answers.
+
+        :param address: of several, where alone that is not known: the old or the new.
+        """
         # the poll asks at once whether it is there, and has the time that a silent drive may
         # take from its neighbours
         self._registers.unanswered += isinstance(error, NoAnswer)
         self._waits_for_answer = True
-        self._written = {}
+        if len(self._keys) > 1 and address in self._written:
+            # the motor goes on in its direction, and need not be told to stop first
+            self._written[address] = self._written[address][0], -math.inf
+        else:
+            self._written = {}
         self._inverter.missed()
 
     def _gives_up_combining(self, error: LinkError) -> bool:

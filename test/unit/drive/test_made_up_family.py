@@ -206,14 +206,24 @@ def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bu
     wait_until(lambda: acme.hertz == -5.0)
 
 
-def test_after_silence_both_registers_are_written_again(acme: Acme, bus: Bus) -> None:
+def test_a_lost_answer_to_a_set_point_slows_no_motor_down(acme: Acme, bus: Bus) -> None:
+    drive = turning(acme, bus, Notes())
+    acme.fates[SIZE] = NoAnswer('silence')
+    begun = len(acme.writes)
+    drive.set_setpoint(-30.0)
+    wait_until(lambda: acme.hertz == -30.0)
+    assert acme.writes[begun:] == [(SIZE, 0), (SIZE + 1, 0x3000)]
+    wait_until(lambda: drive.snapshot.setpoint == -30.0)
+
+
+def test_after_silence_a_direction_is_written_again(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, Notes())
     acme.fates[TURN] = NoAnswer('silence')
     begun = len(acme.writes)
     drive.set_setpoint(30.0)
     wait_until(lambda: acme.hertz == 30.0)
     none = [(SIZE, 0), (SIZE + 1, 0)]
-    assert acme.writes[begun:] == [*none, *none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
+    assert acme.writes[begun:] == [*none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
     wait_until(lambda: drive.snapshot.setpoint == 30.0)
 
 
