@@ -19,10 +19,10 @@ from __future__ import annotations
 import os
 
 #: Set by ``make unit FULL=1``.
-_FULL = bool(os.environ.get('FULL'))
+FULL = bool(os.environ.get('FULL'))
 _SHARE = 4
 
 
 def examples(number: int) -> int:
     """Return the number itself in a full run, and a share of it in a normal one."""
-    return number if _FULL else number // _SHARE
+    return number if FULL else number // _SHARE
