@@ -455,5 +455,6 @@ class Drive:
         self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
+            telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
+            self._telemetry_task = self._bus.spawn(telemetry)
             self._watch.wake()
