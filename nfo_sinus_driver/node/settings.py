@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link.interface import BAUD_RATES
@@ -234,12 +235,12 @@ DRIVE_SETTINGS = (
     Setting(
         'drive_timeout',
         0.0,
-        "The drive's own time-out (SioTot, with AutoStop = ON), s, in steps of 0.1: it stops the "
-        'motor when this driver dies; 0: leave it as it is',
+        "The drive's own time-out (G2: SioTot, with AutoStop = ON), s: it stops the motor when "
+        'this driver dies; 0: leave it as it is',
         0,
-        25,
+        LONGEST_DRIVE_TIMEOUT,
         unit='s',
-        constraints='0 or at least lost_after + 0.5',
+        constraints='0 or at least lost_after + 0.5; the most and the step are those of the drive',
     ),
     Setting(
         'shutdown_timeout',
