@@ -45,7 +45,7 @@ from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
 MODEL = 'movitrac31'
 OVERCURRENT = 101
 #: Indices [M4 §4].
-BITS, SIZE, P841, STATUS, FREQUENCY = 281, 223, 205, 284, 0
+BITS, SIZE, P841, STATUS, FREQUENCY, PC_TIMEOUT_INDEX = 281, 223, 205, 284, 0, 285
 DIRECTIONS = Bit.CW | Bit.CCW
 REMOTE = {CONTROL_MODE: 'Remote control'}
 
@@ -414,6 +414,78 @@ def test_a_pc_time_out_that_is_found_is_acknowledged_by_a_person_alone(
     assert rig.far.faults.codes == [PC_TIMEOUT]
     assert 'acknowledged 145 PC time out' in rig.answer(rig.drive.acknowledge())
     assert_only_enable_helps(rig)
+
+
+@pytest.mark.parametrize('found', [0.0, 5.0])
+@pytest.mark.parametrize('end', [['clean up'], ['exit', 'clean up']], ids=['clean up', 'exit'])
+def test_a_clean_end_leaves_the_pc_time_out_as_it_was_found(
+    make_virtual: MakeVirtual, found: float, end: list[str]
+) -> None:
+    rig = make_virtual({'serial.pc_timeout': found}, model=MODEL, drive_timeout=1.5)
+    rig.ride()
+    assert rig.far.memory.number('serial.pc_timeout') == 1.5
+    # set again and changed: what was found stays what it was
+    rig.answer(rig.drive.set_drive_timeout(2.0))
+    for name in end:
+        assert succeeded(rig, WAYS[name](rig.drive)), name
+    assert rig.far.memory.number('serial.pc_timeout') == found
+    assert bool(rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)) == bool(found)
+    rig.send(None)
+    rig.kill()
+    rig.elapse(20.0)
+    assert bool(rig.far.faults) == bool(found)
+
+
+def test_a_clean_end_turns_the_pc_time_out_off_when_the_motor_has_stopped(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    frequencies: list[float] = []
+
+    def meet(index: int, words: Words | None) -> None:
+        if index == PC_TIMEOUT_INDEX and words is not None:
+            frequencies.append(rig.far.motor.frequency)
+
+    rig.before = meet
+    assert succeeded(rig, rig.drive.disconnect(5.0))
+    assert frequencies == [0.0]
+
+
+def test_a_clean_end_during_a_long_ramp_leaves_no_fault(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual({'ramp.t11_down': 60.0}, model=MODEL, drive_timeout=1.5)
+    rig.ride()
+    assert succeeded(rig, rig.drive.disconnect(0.5))
+    rig.send(None)
+    rig.kill()
+    rig.elapse(1.0)
+    assert rig.far.motor.frequency > 10
+    rig.elapse(60.0)
+    assert not rig.far.faults and not rig.far.motor.turning
+
+
+@pytest.mark.parametrize('seconds', [0.0, 4.0])
+def test_a_pc_time_out_of_somebody_else_is_left_alone(
+    make_virtual: MakeVirtual, seconds: float
+) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    rig.far.set_from_keypad('serial.pc_timeout', seconds)
+    rig.pass_time(1.0)
+    written = len(rig.written(PC_TIMEOUT_INDEX))
+    assert succeeded(rig, rig.drive.disconnect(1.0))
+    assert len(rig.written(PC_TIMEOUT_INDEX)) == written
+    assert rig.far.memory.number('serial.pc_timeout') == seconds
+
+
+def test_a_pc_time_out_that_cannot_be_ended_is_told(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    rig.far.set_from_keypad('special.parameter_lock', True)
+    # the motor stands all the same
+    assert succeeded(rig, rig.drive.disconnect(1.0))
+    assert rig.far.motor.frequency == 0
+    assert rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)
 
 
 def test_a_drive_that_answers_late_is_followed_all_the_same(make_virtual: MakeVirtual) -> None:
