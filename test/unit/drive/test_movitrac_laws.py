@@ -349,6 +349,25 @@ def test_who_takes_the_motor_away_ends_a_ride(
     assert_only_enable_helps(rig)
 
 
+@each_switch
+@pytest.mark.parametrize('key', ['stop', 'cw', 'ccw'])
+def test_a_keypad_that_takes_control_is_seen_whatever_the_drive_shows(
+    make_virtual: MakeVirtual, switch: Mapping[str, str], key: str
+) -> None:
+    rig = make(make_virtual, switch)
+    rig.ride()
+    rig.far.control_unit.press('manual')
+    rig.far.control_unit.press(key)
+    rig.pass_time(2.0)
+    assert not rig.drive.armed
+    assert rig.said(Cause.STOPPED_BECAUSE, Severity.WARNING)
+    assert not bits(rig) & DIRECTIONS
+    assert rig.far.memory.number(SETPOINT) == 0
+    rig.far.control_unit.press('automatic')
+    rig.pass_time(2.0)
+    assert_only_enable_helps(rig)
+
+
 # --- set-points -----------------------------------------------------------------------------------
 
 
