@@ -398,6 +398,7 @@ class Drive:
 
     async def _connect(self, patient: bool) -> None:
         inverter = self.inverter
+        self.registers.connected()
         try:
             await inverter.identify(patient=patient)
         except Refused as error:

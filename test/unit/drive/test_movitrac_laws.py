@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from concurrent.futures import Future
+import dataclasses
 import itertools
 from typing import Any
 
@@ -390,6 +391,57 @@ def test_a_reversal_goes_through_zero(make_virtual: MakeVirtual) -> None:
         assert rig.far.motor.frequency == pytest.approx(value, abs=0.1)
         assert rig.drive.snapshot.frequency == pytest.approx(value, abs=0.1)
     assert not wrong
+
+
+# --- what an enable asks --------------------------------------------------------------------------
+
+#: P600 to P609 of terminals that only an option card has, P760 and P880 likewise.
+CARDS = {153, 154, 155, 156, 321, 322, 323, 249, 212}
+
+
+def asked_by_enable(rig: VirtualRig) -> list[int]:
+    """Enable; return the indices that were asked for or written meanwhile."""
+    before = len(rig.link.frames)
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    asked = [index for index, _ in requests_since(rig, before)]
+    assert succeeded(rig, rig.drive.stop())
+    return asked
+
+
+@pytest.mark.parametrize(('settings', 'most'), [({}, 34), (REMOTE, 28)], ids=['P841', 'mine'])
+def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
+    make_virtual: MakeVirtual, settings: dict[str, Any], most: int
+) -> None:
+    rig = make_virtual(settings, model=MODEL, telemetry_rate=0.0, poll_rate=0.1)
+    rig.connect()
+    rig.answer(rig.drive.parameters.read())
+    asked = asked_by_enable(rig)
+    assert len(asked) <= most, asked
+    assert not CARDS & set(asked)
+
+
+def test_a_card_that_was_fitted_meanwhile_is_asked_for_again(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual({'terminal.input_48': 'CW/Stop'}, model=MODEL)
+    rig.connect()
+    rig.answer(rig.drive.parameters.read())
+    assert not CARDS & set(asked_by_enable(rig))
+    unit = rig.far.control_unit
+    unit.variant = dataclasses.replace(unit.variant, option_card='fio')
+    unit.terminals.inputs += (48, 49, 50, 51, 52, 53, 54)
+    # a card is fitted while the drive has no power
+    rig.far.power_cycle(5.0)
+    rig.pass_time(10.0)
+    assert rig.drive.snapshot.connected
+    unit.switch(48, True)
+    assert 'terminal 48 (CW/Stop) is closed' in rig.answer(rig.drive.enable())
+
+
+def test_one_refusal_is_not_believed_of_a_card(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    rig.connect()
+    assert CARDS <= set(asked_by_enable(rig))
+    assert CARDS <= set(asked_by_enable(rig))
+    assert not CARDS & set(asked_by_enable(rig))
 
 
 # --- the PC time-out ------------------------------------------------------------------------------
