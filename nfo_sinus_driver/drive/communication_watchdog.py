@@ -16,10 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -28,6 +31,7 @@ from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
+from nfo_sinus_driver.link import LinkError
 
 
 class CommunicationWatchdog:
@@ -44,6 +48,9 @@ class CommunicationWatchdog:
         self._told: Report | None = None
         #: It could not be set yet.
         self._due = False
+        #: What this driver has changed: what was found before, and what it has set.
+        self._found: dict[str, Value] = {}
+        self._set: dict[str, Value] = {}
 
     async def prepare(self) -> None:
         """
@@ -80,8 +87,43 @@ class CommunicationWatchdog:
         wanted: dict[str, Value] = {key(Role.COMMUNICATION_TIMEOUT): seconds}
         if key(Role.STOP_AT_TIMEOUT):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
+        changes = await self._change(wanted)
+        for change in changes:
+            self._found.setdefault(change.key, change.old)
+            self._set[change.key] = change.new
+        return changes
+
+    async def put_back(self) -> None:
+        """
+        Put back what was found, at a clean end after which the drive would go on watching.
+
+        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
+        if it will; nothing of that keeps the driver from ending.
+        """
+        inverter = self._inverter
+        if not inverter.can_time_out:
+            return
+        try:
+            for key in reversed(self._found):
+                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                    await self._change({key: self._found[key]})
+            await inverter.read_timeout()
+        except (LinkError, DriveError) as error:
+            self._tell_left(explain_failure(error, inverter))
+        else:
+            if inverter.sio_tot and inverter.auto_stop:
+                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
+
+    async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
             wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
+        )
+
+    def _tell_left(self, why: Report) -> None:
+        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
+        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
+        self._inverter.tell(
+            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
         )
 
     def warn_if_unfit(self) -> None:

@@ -402,7 +402,8 @@ class Controller:
         Give control back once the motor stands.
 
         A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
-        time-out of its own it is released, for else that would end the ramp with a fault.
+        time-out of its own it is released, for else that would end the ramp with a fault; where
+        that goes on whoever is released, it is for who ends the time-out.
 
         :raises DriveError: the drive does not confirm that it stops.
         """
@@ -425,7 +426,7 @@ class Controller:
             await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
-            if not self._inverter.sio_tot:
+            if not self._inverter.sio_tot or self.method.keeps_control:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self.method.release()

@@ -259,7 +259,10 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            return await self._controller.release(timeout)
+            answer = await self._controller.release(timeout)
+            if self._controller.method.keeps_control:
+                await self._watchdog.put_back()
+            return answer
         finally:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
@@ -395,6 +398,7 @@ class Drive:
 
     async def _connect(self, patient: bool) -> None:
         inverter = self.inverter
+        self.registers.connected()
         try:
             await inverter.identify(patient=patient)
         except Refused as error:

@@ -197,6 +197,10 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_LEFT: 'control stays with the bus, and the time-out of the drive itself '
+    '({name} {timeout:g} s) goes on: {why}. So it will have a fault when nothing is said to it for '
+    'so long; set {key} to 0 if it shall not',
+    Cause.OWN_TIMEOUT_NOT_OURS: 'this {call.program} has not set it, and leaves it as it is',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',
