@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import math
 import shlex
 
+from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
@@ -182,11 +183,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar='GROUP',
         help='only this one, such as Motor; Status are the measured values',
     )
+    setting, value = example_setting()
     get = verb('get', 'show some parameters', json=True)
-    get.add_argument('names', nargs='+', metavar='NAME', help='such as control.accel')
+    get.add_argument('names', nargs='+', metavar='NAME', help=f'such as {setting}')
     set_ = verb('set', 'change parameters, all of them or none', json=True)
     set_.add_argument(
-        'changes', nargs='+', type=_change, metavar='NAME=VALUE', help='such as control.accel=5'
+        'changes',
+        nargs='+',
+        type=_change,
+        metavar='NAME=VALUE',
+        help=f'such as {setting}={value:g}',
     )
     set_.add_argument(_ALLOW, action='store_true', help='let parameters serial.* be changed')
     dump = verb('dump', 'save all settings of the drive')

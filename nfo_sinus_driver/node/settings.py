@@ -25,6 +25,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
@@ -162,7 +163,7 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'model',
-        'sinus_g2',
+        usual_family(),
         'The drive family; auto: find out',
         constraints=f'one of {", ".join((*families(), AUTO))}',
     ),
