@@ -48,6 +48,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.TOO_LATE: 'no answer within {timeout:g} s',
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
+    Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
+    Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
     Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
     Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
@@ -197,6 +199,13 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
+        why='{why}', remedy='use the RUN input'
+    ),
+    Cause.OWN_TIMEOUT_LEFT: 'the time-out of the drive itself could not be turned off ({why}): '
+    'within {seconds:g} s after this end it may report a fault, which is acknowledged as any other',
+    Cause.CHANGED_FOR_END: '{change}, for control stays with the bus and nobody talks to the drive '
+    'from now on',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',

@@ -28,6 +28,7 @@ from unittest import mock
 from canopen_far_end import Server
 
 from nfo_sinus_driver.link import canopen_link
+from nfo_sinus_driver.link import canopen_supervision
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address
@@ -175,7 +176,10 @@ class Bench:
 
     def do(self, action: Callable[[], _T]) -> _T:
         clock = SimpleNamespace(monotonic=self.bus.monotonic)
-        with mock.patch.object(canopen_link, 'time', clock):
+        with (
+            mock.patch.object(canopen_link, 'time', clock),
+            mock.patch.object(canopen_supervision, 'time', clock),
+        ):
             return action()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
