@@ -108,6 +108,7 @@ class CanopenLink:
         char_format='8N1',
         baud_rates=tuple(lawicel.BIT_RATES),
         identifies=True,
+        rates_disturb=True,
         check='power, the node id, the bit rate, CAN_H and CAN_L, 120 ohms at each end of the bus '
         'and nowhere else, and that the interface is up (ip -details link show)',
     )
@@ -135,7 +136,7 @@ class CanopenLink:
         if _INTERFACE.fullmatch(port):
             wanted = ((sdo.ANSWERS, FUNCTION_CODE), (nmt.HEARTBEATS, FUNCTION_CODE))
             return cls(SocketCan(port, wanted), settings)
-        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE))
+        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
         return cls(LawicelPort(serial, settings.baud_rate), settings)
 
     def open(self) -> None:
@@ -350,8 +351,10 @@ class CanopenLink:
                 break
         if other:
             raise DamagedAnswer(f'unit {unit}: {other} answers came, but none to this request')
-        why = f': {self._port.trouble}' if self._port.trouble else ''
-        raise NoAnswer(f'unit {unit} did not answer{why}')
+        hint = self._port.trouble
+        silent = NoAnswer(f'unit {unit} did not answer{": " if hint else ""}{hint}')
+        silent.hint = hint
+        raise silent
 
     def _require_one(self, transfer: Transfer, answer: Frame, sent: float, now: float) -> None:
         """

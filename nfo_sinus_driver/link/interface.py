@@ -177,6 +177,8 @@ class LineProtocol:
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
+    :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
+        is tried.
     :ivar check: what to look at, in this order, where no drive answers.
     """
 
@@ -191,6 +193,7 @@ class LineProtocol:
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
+    rates_disturb: bool = False
     check: str = _CHECK
 
     def require_unit(self, address: int) -> None:
@@ -302,6 +305,8 @@ class LinkError(Exception):
     maybe_done = False
     #: The unit answered a question before, for the sake of this one: it is there.
     heard = False
+    #: What the port knows of why, as it may be told; ``''`` if nothing.
+    hint = ''
 
 
 class PortError(LinkError):

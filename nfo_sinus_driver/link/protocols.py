@@ -35,6 +35,8 @@ _LINKS = {
 }
 #: What the driver's ``protocol`` parameter takes, and what each is.
 PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}
+#: The bit rates of all of them.
+BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.baud_rates}))
 
 
 def protocol_of(name: str) -> LineProtocol:

@@ -42,7 +42,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.DRIVER_ERROR: 'error in the driver: {error}',
     Cause.LINE_FAILED: '{error}',
     Cause.NOT_REACHED: '{error}: check the cable and that the drive has power',
-    Cause.NO_RESPONSE: 'no response from address {address}: check in this order: {check}',
+    Cause.NO_RESPONSE: 'no response from address {address}{behind}: check in this order: '
+    '{check}',
     Cause.NO_VALID_ANSWER: 'what comes from address {address} is no answer ({error}): check baud '
     'rate and parity, that no other master is on the line, and the wiring',
     Cause.TOO_LATE: 'no answer within {timeout:g} s',

@@ -32,7 +32,8 @@ from nfo_sinus_driver.link import sdo_abort
 
 MODE = 0x2022
 INV_ST = 0x2026
-WITH_ACK, WITHOUT_ACK = Address('object', INV_ST, 1, 2, False), Address('object', INV_ST, 2, 2, False)
+WITH_ACK = Address('object', INV_ST, 1, 2, False)
+WITHOUT_ACK = Address('object', INV_ST, 2, 2, False)
 
 
 def number(index: int, size: int, *, signed: bool) -> Address:
@@ -85,7 +86,7 @@ def test_a_number_is_the_same_however_long_the_node_has_it(
 
 def test_what_the_catalog_has_no_room_for_is_no_value() -> None:
     bench = bench_with({(MODE, 0): (70_000).to_bytes(4, 'little')})
-    with pytest.raises(DamagedAnswer, match='object 2022h, sub-index 0: .* is no number of 2 bytes'):
+    with pytest.raises(DamagedAnswer, match=r'2022h, sub-index 0: .* is no number of 2 bytes'):
         bench.read(number(MODE, 2, signed=False))
     bench = bench_with({(MODE, 0): bytes(3)})
     with pytest.raises(DamagedAnswer, match='no number'):
