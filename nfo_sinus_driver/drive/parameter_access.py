@@ -123,7 +123,7 @@ class ParameterAccess:
 
     def require_fitted(self, key: str) -> None:
         """Raise what the drive has answered each time, if it lacks the option card for a key."""
-        denials = self._denials.get(key, ())
+        denials = self._denials.get(key, [])
         if len(denials) >= _DENIALS:
             raise denials[-1]
 
@@ -155,6 +155,10 @@ class ParameterAccess:
     async def identify(self, priority: Priority) -> Identification:
         """Ask the drive who it is; what it does not tell stays empty."""
         return await self._bus.identify(self._unit, priority)
+
+    async def watch(self, seconds: float, priority: Priority) -> str:
+        """Have the drive notice a silence of the line; see :meth:`Bus.watch`."""
+        return await self._bus.watch(self._unit, seconds, priority, 1 + self._retries)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""

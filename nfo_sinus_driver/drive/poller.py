@@ -173,6 +173,16 @@ class Poller:
             self._told = reply
             self.wake()
 
+    def restarted(self) -> None:
+        """Take note that the drive has started anew: it is lost until it is connected to again."""
+        if self._task is None or not self._inverter.connected:
+            return
+        # what is asked of it just now was begun before
+        self._bus.cancel(self._task)
+        self._lose(DriveError(Cause.RESTARTED))
+        self._failures = 0
+        self.begin()
+
     def wake(self) -> None:
         """Look at the drive at once."""
         if self._task is not None:

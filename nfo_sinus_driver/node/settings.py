@@ -31,8 +31,8 @@ from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: What YAML makes of a character format without quotes.
 _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}
@@ -101,7 +101,7 @@ BUS_SETTINGS = (
         'port',
         '/dev/ttyUSB0',
         'Serial port: a device path, or a pyserial URL such as socket://host:port; '
-        'for modbus_tcp host:port of the gateway',
+        'for modbus_tcp host:port of the gateway; for canopen a CAN interface such as can0, too',
         fixed=True,
     ),
     Setting(
@@ -115,7 +115,8 @@ BUS_SETTINGS = (
         'baud_rate',
         0,
         'Bit rate, bit/s, as SiBaud in the drive says; 0: the factory default of the protocol',
-        constraints=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)}',
+        constraints=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as '
+        'the protocol has it',
         fixed=True,
     ),
     Setting(
@@ -157,7 +158,8 @@ DRIVE_SETTINGS = (
     Setting(
         'address',
         1,
-        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone",
+        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone; "
+        'CANopen (node id) 1 to 127',
         0,
         247,
     ),
