@@ -144,6 +144,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'press STOP there',
     Cause.POWER_CYCLED: 'the drive did not answer for a moment, and the bus has lost control '
     '({status}). It was switched off and on: check its mains',
+    Cause.SLOWER_AFTER_SILENCE: 'the drive did not answer for a moment, and the motor turns slower '
+    'than it was told to ({now:g} Hz, before {before:g} Hz; {status}). It may have been switched '
+    'off and on: check its mains and the line',
     Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
