@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from canopen_bench import Bus
+from can_bus_bench import Bus
 import pytest
 
 from nfo_sinus_driver.simulator.can_frames import Frame
