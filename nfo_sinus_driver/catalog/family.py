@@ -345,4 +345,5 @@ def _area(row: table.Row) -> ErrorLogArea:
         factor=Fraction(row.get('factor') or 1),
         above=table.number(row.get('above', '')),
         readings=tuple(_readings(row.get('readings', ''))),
+        elsewhere=table.number(row.get('elsewhere', '')),
     )

@@ -28,6 +28,7 @@ from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.cli.console import progress
 from nfo_sinus_driver.cli.console import put
@@ -76,7 +77,7 @@ def scan(options: argparse.Namespace) -> int:
             for _ in range(len(options.addresses) - len(asked)):
                 step()
             for address, facts in _who_answers(line, asked, step):
-                facts['line'] = f'{baud_rate} {char_format}' if baud_rate else 'gateway'
+                facts['line'] = f'{baud_rate} {char_format}'.rstrip() if baud_rate else 'gateway'
                 if not found and not options.json:
                     show(_row({name: name for name, _ in _COLUMNS}))
                 found[address] = facts
@@ -87,11 +88,11 @@ def scan(options: argparse.Namespace) -> int:
         drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
         show(json.dumps(drives, ensure_ascii=False, indent=2))
     if not found:
-        check = PROTOCOLS[options.protocol].check
-        raise CliError(
-            f'no response: check in this order: {check} (--all-settings tries all that the '
-            'protocol can have), A and B of the wires'
+        protocol = PROTOCOLS[options.protocol]
+        others = '' if protocol.rates_disturb else (
+            ' (--all-settings tries all that the protocol can have), A and B of the wires'
         )
+        raise CliError(f'no response: check in this order: {protocol.check}{others}')
     if options.params:
         _write_params(options, found, lines_of)
     return 0
@@ -123,6 +124,13 @@ def _write_params(
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
     protocol = PROTOCOLS[options.protocol]
+    if protocol.rates_disturb:
+        if options.all_settings:
+            raise UsageError(
+                f'--all-settings: on {protocol.name} a wrong bit rate disturbs everybody else, so '
+                'none is tried; say --baud-rate'
+            )
+        return [(options.baud_rate or protocol.baud_rate, '')]
     if not protocol.char_formats:
         # the line is that of the gateway
         return [(0, '')]
@@ -222,7 +230,9 @@ def driver_params(
     names = {address: f'drive_{address}' for address in sorted(found)}
     line: dict[str, object] = {'port': options.port, 'protocol': options.protocol}
     if baud_rate:
-        line |= {'baud_rate': baud_rate, 'char_format': char_format}
+        line['baud_rate'] = baud_rate
+    if char_format:
+        line['char_format'] = char_format
     for name in _IF_OTHER:
         # a scan is content with less time than the driver should give
         if getattr(options, name) > DEFAULTS[name]:

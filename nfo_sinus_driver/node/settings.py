@@ -29,8 +29,8 @@ from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: What YAML makes of a character format without quotes.
 _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}
@@ -99,7 +99,7 @@ BUS_SETTINGS = (
         'port',
         '/dev/ttyUSB0',
         'Serial port: a device path, or a pyserial URL such as socket://host:port; '
-        'for modbus_tcp host:port of the gateway',
+        'for modbus_tcp host:port of the gateway; for canopen a CAN interface such as can0, too',
         fixed=True,
     ),
     Setting(
@@ -113,7 +113,8 @@ BUS_SETTINGS = (
         'baud_rate',
         0,
         'Bit rate, bit/s, as SiBaud in the drive says; 0: the factory default of the protocol',
-        constraints=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)}',
+        constraints=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as '
+        'the protocol has it',
         fixed=True,
     ),
     Setting(
@@ -155,7 +156,8 @@ DRIVE_SETTINGS = (
     Setting(
         'address',
         1,
-        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone",
+        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone; "
+        'CANopen (node id) 1 to 127',
         0,
         247,
     ),
