@@ -28,7 +28,9 @@ from collections import deque
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
+from collections.abc import Iterator
 from concurrent.futures import Future
+import contextlib
 import ctypes
 import functools
 import logging
@@ -98,6 +100,9 @@ class Bus:
         self.recorder = Recorder()
         #: How many coroutines read parameters again and again; they share the time for it.
         self.refreshing = 0
+        #: The units whose settings are read for the first time, and those for which that was begun.
+        self._being_introduced: set[int] = set()
+        self._introduced: set[int] = set()
         self._current: Task | None = None
         #: Who is told that a unit has started anew.
         self._on_restart: dict[int, Callable[[], None]] = {}
@@ -278,6 +283,23 @@ class Bus:
         """End the pause of a task early; harmless if it is not in one."""
         if task is not None and task.asleep:
             self._end_pause(task)
+
+    @contextlib.contextmanager
+    def introducing(self, unit: int) -> Iterator[None]:
+        """Have units that only stand leave the line to this one, if it is read the first time."""
+        first = unit not in self._introduced
+        self._introduced.add(unit)
+        if first:
+            self._being_introduced.add(unit)
+        try:
+            yield
+        finally:
+            if first:
+                self._being_introduced.discard(unit)
+
+    def introduces_another(self, unit: int) -> bool:
+        """Tell whether any other unit is read for the first time just now."""
+        return bool(self._being_introduced - {unit})
 
     # --- the worker ---------------------------------------------------------------------------
 

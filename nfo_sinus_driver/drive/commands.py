@@ -89,6 +89,7 @@ async def carry_out(
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
+                registers.require_fitted(step.key)
                 brought = await registers.read(step.key, priority, once=step.once)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(step, registers, priority, tell)

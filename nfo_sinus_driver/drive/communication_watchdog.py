@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -50,8 +51,9 @@ class CommunicationWatchdog:
         self._told: Report | None = None
         #: It could not be set yet.
         self._due = False
-        #: It is as it is because this driver has set it.
-        self._is_ours = False
+        #: What this driver has changed: what was found before, and what it has set.
+        self._found: dict[str, Value] = {}
+        self._set: dict[str, Value] = {}
 
     async def prepare(self) -> None:
         """
@@ -94,9 +96,7 @@ class CommunicationWatchdog:
         if inverter.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
         try:
-            changes = await self._parameters.change_now(
-                wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
-            )
+            changes = await self._change(wanted)
         except DriveError as error:
             faulted = inverter.seen is not None and inverter.seen.faulted
             if faulted or not inverter.bus.supervised:
@@ -104,31 +104,60 @@ class CommunicationWatchdog:
             # whether a drive has any means at all is nowhere written for such a line [C102]
             inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
             return ()
-        self._is_ours = True
+        for change in changes:
+            self._found.setdefault(change.key, change.old)
+            self._set[change.key] = change.new
         return changes
 
-    async def end(self, *, control_stays: bool) -> None:
+    async def put_back(self) -> None:
         """
-        Turn off what was set here, for nobody talks to the drive any more; nothing is raised.
+        Put back what was found, at a clean end after which the drive would go on watching.
 
-        :param control_stays: the bus has control of the drive from now on, too, or may have it
-            again: SioTot would go on counting, which it does not where the bus has no control.
+        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
+        if it will; nothing of that keeps the driver from ending.
         """
         inverter = self._inverter
-        seconds = inverter.own_timeout
+        await self._end_watch()
+        if not inverter.can_time_out:
+            return
         try:
-            if inverter.watched_by:
-                await inverter.registers.watch(0.0, Priority.SERVICE)
-                inverter.watched_by, inverter.watched_for = '', 0.0
-            elif self._is_ours and control_stays:
-                timeout = inverter.model.key(Role.COMMUNICATION_TIMEOUT)
-                await self._parameters.change_now(
-                    {timeout: 0.0}, guarded=False, told_as=Cause.CHANGED_FOR_END
-                )
+            for key in reversed(self._found):
+                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                    await self._change({key: self._found[key]})
+            await inverter.read_timeout()
         except (LinkError, DriveError) as error:
-            why = report_of(error)
-            inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, why=why, seconds=seconds)
-        self._is_ours = False
+            self._tell_left(explain_failure(error, inverter))
+        else:
+            if inverter.sio_tot and inverter.auto_stop:
+                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
+
+    async def _end_watch(self) -> None:
+        inverter = self._inverter
+        if not inverter.watched_by:
+            return
+        try:
+            await inverter.registers.watch(0.0, Priority.SERVICE)
+        except LinkError as error:
+            inverter.tell(
+                Severity.WARNING,
+                Cause.WATCH_LEFT,
+                why=explain_failure(error, inverter),
+                by=inverter.watched_by,
+                seconds=inverter.watched_for,
+            )
+        inverter.watched_by, inverter.watched_for = '', 0.0
+
+    async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
+        return await self._parameters.change_now(
+            wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
+        )
+
+    def _tell_left(self, why: Report) -> None:
+        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
+        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
+        self._inverter.tell(
+            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
+        )
 
     def warn_if_unfit(self) -> None:
         """Tell that it is missing, or strikes too soon; once for each reason in a row."""

@@ -260,9 +260,11 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            return await self._controller.release(
-                timeout, lambda stays: self._watchdog.end(control_stays=stays)
-            )
+            answer = await self._controller.release(timeout)
+            # whoever has control at this moment: it may come back to the bus by itself
+            if self._controller.method.keeps_control:
+                await self._watchdog.put_back()
+            return answer
         finally:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
@@ -398,6 +400,7 @@ class Drive:
 
     async def _connect(self, patient: bool) -> None:
         inverter = self.inverter
+        self.registers.connected()
         try:
             await inverter.identify(patient=patient)
         except Refused as error:
@@ -461,5 +464,6 @@ class Drive:
         self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
+            telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
+            self._telemetry_task = self._bus.spawn(telemetry)
             self._watch.wake()

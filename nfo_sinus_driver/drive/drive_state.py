@@ -280,7 +280,15 @@ class DriveState:
         source = self.model.key(Role.CONTROL_SOURCE)
         reply = await self.registers.read_reply(source, priority, once=once)
         holder = self.model.profile.holders.get(self.registers.value(source, reply.data))
-        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=reply.arrived)
+        by_bus = holder is Holder.BUS and not await self._operated_locally(priority, once)
+        return replace(seen, by_mode=by_bus, by_mode_at=reply.arrived)
+
+    async def _operated_locally(self, priority: Priority, once: bool) -> bool:
+        """Tell whether keypad or terminals command, whatever the control source says."""
+        key = self.model.key(Role.LOCAL_OPERATION)
+        if not self.registers.reaches(key):
+            return False
+        return bool(await self.registers.read(key, priority, once=once))
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later

@@ -99,7 +99,7 @@ def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None
     assert state['fault'] == 0
 
 
-@needs('timeout', 'quiet')
+@needs('timeout')
 def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:
@@ -112,7 +112,8 @@ def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     ended = drive.state()['time']
     state = drive.wait_for(lambda state: state['time'] > ended + 3.0, timeout=PATIENCE)
     assert state['fault'] == 0
-    assert not state['driven']
+    assert bench.drives.stopping(state)
+    assert not bench.drives.commanded(state)
     assert not state['error_log']
 
 

@@ -45,7 +45,6 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
-    'quiet': 'its time-out goes on where nobody is: control stays with the bus',
     'nominal': 'this model does not tell the nominal speed of its motor',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
@@ -146,7 +145,7 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'quiet', 'timeout'))
+_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer', 'nominal',

@@ -176,7 +176,7 @@ def _of_canopen(data: bytes) -> Request | None:
     if unit not in _NODES:
         known = identifier == _NETWORK_MANAGEMENT or identifier - _ERROR_CONTROL in _NODES
         if not known:
-            raise ValueError(f'has identifier {identifier:03X}h, which is no client\'s')
+            raise ValueError(f"has identifier {identifier:03X}h, which is no client's")
         return None
     if len(message) != 8:
         raise ValueError(f'has {len(message)} bytes, and a request has eight')
