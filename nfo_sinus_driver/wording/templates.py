@@ -206,10 +206,12 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
         why='{why}', remedy='use the RUN input'
     ),
-    Cause.OWN_TIMEOUT_LEFT: 'the time-out of the drive itself ({name} {timeout:g} s) goes on after '
-    'this end: {why}. So the drive may have a fault when nothing is said to it for so long, which '
-    'is acknowledged as any other; set it to 0 if it shall not',
+    Cause.OWN_TIMEOUT_LEFT: 'control stays with the bus, and the time-out of the drive itself '
+    '({name} {timeout:g} s) goes on: {why}. So it will have a fault when nothing is said to it for '
+    'so long; set {key} to 0 if it shall not',
     Cause.OWN_TIMEOUT_NOT_OURS: 'this {call.program} has not set it, and leaves it as it is',
+    Cause.WATCH_LEFT: 'the drive may go on watching over this {call.program} ({by}): {why}. So it '
+    'may have a fault {seconds:g} s after this end, which is acknowledged as any other',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',
