@@ -257,8 +257,8 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            control_mode = await self._check()
-            await self._start(control_mode, prepare)
+            control_mode, nominal = await self._check()
+            await self._start(control_mode, nominal, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
@@ -268,8 +268,12 @@ class Controller:
         reference = self._inverter.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
-    async def _check(self) -> str:
-        """See to it that nothing keeps the motor from being started; return the control mode."""
+    async def _check(self) -> tuple[str, float]:
+        """
+        See to it that nothing keeps the motor from being started.
+
+        :returns: the control mode, and the nominal value of what it is about.
+        """
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
@@ -278,14 +282,16 @@ class Controller:
             self._happened(ControlEvent.REFUSED)
             raise DriveError(report_of(error)) from error
 
-    async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+    async def _start(
+        self, control_mode: str, nominal: float, prepare: Callable[[], Awaitable[None]]
+    ) -> None:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._happened(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.arm(control_mode)
+            self._setpoint.arm(control_mode, nominal)
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
