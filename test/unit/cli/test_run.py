@@ -462,6 +462,10 @@ def test_sigterm_does_not_wait_for_a_long_ramp(make_bench: MakeBench) -> None:
     [
         ({}, 150.1, 'Freque -150 to 150 Hz'),
         ({}, -151, 'set-point -151 Hz is out of range'),
+        # rpm, as it seems
+        ({}, 145, 'beyond what is nominal for this motor, 50 Hz: check the unit'),
+        ({'control.mode': 'Speed'}, -1500, '-1500 rpm is beyond what is nominal for this motor'),
+        ({'control.mode': 'Torque'}, 101, 'if it is meant so, give --setpoint-max 101'),
         ({'control.mode': 'Speed'}, 9001, 'Speed -9000 to 9000 rpm'),
         ({'control.mode': 'Torque'}, 201, 'Torque -200 to 200 %'),
     ],
@@ -473,6 +477,16 @@ def test_out_of_range(
     done = bench.run('run', setpoint)
     assert done.status == 1 and said in done.err
     assert nothing_commanded(bench)
+
+
+def test_beyond_nominal_where_that_is_said(bench: Bench) -> None:
+    done = bench.run('run', 61, '--for', 0.1, '--setpoint-max', 60)
+    assert done.status == 1 and 'beyond --setpoint-max, 60 Hz' in done.err
+    assert nothing_commanded(bench)
+    with bench.begun('run', 60, '--setpoint-max', 60) as process:
+        wait_until(lambda: bench.state()['frequency'] == pytest.approx(60, abs=0.2))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
 
 
 def test_out_of_range_of_an_optimal(make_bench: MakeBench) -> None:

@@ -77,7 +77,16 @@ def test_set_point_that_is_no_number(rig: Rig, value: float) -> None:
 
 @pytest.mark.parametrize(
     ('most', 'asked', 'given'),
-    [(0.0, 400.0, 150.0), (0.0, -1e30, -150.0), (10.0, 25.0, 10.0), (10.0, -10.01, -10.0)],
+    [
+        # the nominal frequency of the motor: 400 may have been meant as rpm
+        (0.0, 400.0, 50.0),
+        (0.0, -1e30, -50.0),
+        (10.0, 25.0, 10.0),
+        (10.0, -10.01, -10.0),
+        # more than nominal is what somebody says, up to what the drive takes
+        (87.0, 90.0, 87.0),
+        (500.0, 400.0, 150.0),
+    ],
 )
 def test_set_point_is_clamped(
     make_rig: MakeRig, most: float, asked: float, given: float
