@@ -92,7 +92,7 @@ def test_nobody_at_this_address(make_rig: MakeRig) -> None:
 def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
     silent = NoAnswer('unit 3 did not answer')
     first = explain(silent, 3, check=protocol.check)
-    assert first == Report(Cause.NO_RESPONSE, address=3, check=protocol.check)
+    assert first == Report(Cause.NO_RESPONSE, address=3, behind='', check=protocol.check)
     # what has answered once is set right
     assert explain(silent, 3).cause is Cause.NOT_REACHED
 
