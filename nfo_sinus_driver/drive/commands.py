@@ -41,6 +41,7 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -136,6 +137,8 @@ class Commands:
         method = inverter.model.profile.methods[inverter.settings.method]
         self._method = method(inverter.settings.reference, inverter.registers.reaches)
         self._registers = inverter.registers
+        #: Why the line has the bus keep control.
+        self._held = inverter.model.profile.holds_control.get(inverter.registers.protocol, '')
         self._tell = inverter.tell
 
     @property
@@ -145,8 +148,17 @@ class Commands:
 
     @property
     def keeps_control(self) -> str:
-        """Why control stays with the bus at :meth:`release`; ``''`` where it does not."""
-        return self._method.keeps_control
+        """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
+        return self._method.keeps_control or self._held
+
+    async def kept(self) -> bool:
+        """Tell whether control has stayed with the bus; so it is where the drive does not tell."""
+        if not self._held:
+            return bool(self.keeps_control)
+        try:
+            return await self.in_control(Priority.SERVICE)
+        except LinkError:
+            return True
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.diagnosis import explain_failure
+from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -37,6 +37,9 @@ from nfo_sinus_driver.link import LinkError
 class CommunicationWatchdog:
     """
     SioTot with AutoStop of one drive [C91], or why not in a :class:`DriveError`; on the bus alone.
+
+    On a line on which something lives beside questions and answers, such as a heartbeat, the drive
+    watches over that, if it can.
 
     :param commanded: this driver may command the drive, and not only watch it.
     """
@@ -81,38 +84,59 @@ class CommunicationWatchdog:
             raise DriveError(Cause.MONITOR_ONLY)
         if not seconds:
             return ()
-        if not self._inverter.can_time_out:
-            raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
-        key = self._inverter.model.key
-        wanted: dict[str, Value] = {key(Role.COMMUNICATION_TIMEOUT): seconds}
-        if key(Role.STOP_AT_TIMEOUT):
+        inverter = self._inverter
+        inverter.watched_by = await inverter.registers.watch(seconds, Priority.SERVICE)
+        inverter.watched_for = seconds if inverter.watched_by else 0.0
+        key = inverter.model.key
+        wanted: dict[str, Value] = {}
+        if not inverter.watched_by:
+            if not inverter.can_time_out:
+                raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
+            wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
+        if inverter.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
-        changes = await self._change(wanted)
+        try:
+            changes = await self._change(wanted)
+        except DriveError as error:
+            faulted = inverter.seen is not None and inverter.seen.faulted
+            if faulted or not inverter.bus.supervised:
+                raise
+            # whether a drive has any means at all is nowhere written for such a line [C102]
+            inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
+            return ()
         for change in changes:
             self._found.setdefault(change.key, change.old)
             self._set[change.key] = change.new
         return changes
 
-    async def put_back(self) -> None:
+    async def end(self, *, control_stays: bool) -> None:
         """
-        Put back what was found, at a clean end after which the drive would go on watching.
+        Turn off what was set here, for nobody talks to the drive any more; nothing is raised.
 
-        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
-        if it will; nothing of that keeps the driver from ending.
+        What was found is put back; what somebody else has set meanwhile is left alone. Tells why
+        the drive will have a fault, if it will.
+
+        :param control_stays: the bus has control of the drive from now on, too, or may have it
+            again: SioTot would go on counting, which it does not where the bus has no control.
         """
         inverter = self._inverter
-        if not inverter.can_time_out:
-            return
         try:
-            for key in reversed(self._found):
-                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
-                    await self._change({key: self._found[key]})
-            await inverter.read_timeout()
+            if inverter.watched_by:
+                await inverter.registers.watch(0.0, Priority.SERVICE)
+                inverter.watched_by, inverter.watched_for = '', 0.0
+            elif control_stays and inverter.can_time_out:
+                await self._put_back()
         except (LinkError, DriveError) as error:
-            self._tell_left(explain_failure(error, inverter))
+            self._tell_left(report_of(error))
         else:
-            if inverter.sio_tot and inverter.auto_stop:
+            if control_stays and inverter.own_timeout and inverter.auto_stop:
                 self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
+
+    async def _put_back(self) -> None:
+        for key in reversed(self._found):
+            if await self._inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                await self._change({key: self._found[key]})
+        await self._inverter.read_timeout()
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
@@ -120,11 +144,15 @@ class CommunicationWatchdog:
         )
 
     def _tell_left(self, why: Report) -> None:
-        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
-        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
-        self._inverter.tell(
-            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
+        inverter = self._inverter
+        name, timeout = self._name(), inverter.own_timeout
+        inverter.tell(
+            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, name=name, timeout=timeout, why=why
         )
+
+    def _name(self) -> str:
+        model = self._inverter.model
+        return self._inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
 
     def warn_if_unfit(self) -> None:
         """Tell that it is missing, or strikes too soon; once for each reason in a row."""
@@ -135,11 +163,11 @@ class CommunicationWatchdog:
 
     def _complaint(self) -> Report | None:
         inverter, model = self._inverter, self._inverter.model
-        timeout, margin = inverter.sio_tot, DRIVE_TIMEOUT_MARGIN
+        timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
-        if not inverter.can_time_out:
+        if not inverter.can_time_out and not inverter.watched_by:
             return Report(Cause.NO_OWN_TIMEOUT)
-        name = model[model.key(Role.COMMUNICATION_TIMEOUT)].name
+        name = self._name()
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)
         if not inverter.auto_stop:

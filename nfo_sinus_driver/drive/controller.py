@@ -400,14 +400,16 @@ class Controller:
             return Report(Cause.ACKNOWLEDGED_DETAILED, status=acknowledged, details=details)
         return Report(Cause.ACKNOWLEDGED, status=acknowledged)
 
-    async def release(self, timeout: float) -> Report:
+    async def release(self, timeout: float, end_watch: Callable[[bool], Awaitable[None]]) -> Report:
         """
         Give control back once the motor stands.
 
         A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
-        time-out of its own it is released, for else that would end the ramp with a fault; where
-        that goes on whoever is released, it is for who ends the time-out.
+        time-out of its own that goes on it is released, for else that would end the ramp with a
+        fault.
 
+        :param end_watch: turns off the time-out that the driver has set, as far as it would strike;
+            told whether the bus may keep control.
         :raises DriveError: the drive does not confirm that it stops.
         """
         # a run command may be on its way, whoever has control at this moment; and where the bus has
@@ -416,11 +418,16 @@ class Controller:
         may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
         # nobody enables it while it is waited for that the motor stands
         with self._stopped_by_itself():
-            return await self._release(timeout, may_run=may_run)
+            return await self._release(timeout, end_watch, may_run=may_run)
 
-    async def _release(self, timeout: float, *, may_run: bool) -> Report:
+    async def _release(
+        self, timeout: float, end_watch: Callable[[bool], Awaitable[None]], *, may_run: bool
+    ) -> Report:
+        # where the bus may get control back by itself, it does not matter who has it just now
+        stays = bool(self.method.keeps_control)
         stopped = await self.stop() if may_run else None
         if not await self.method.in_control(Priority.SERVICE):
+            await end_watch(stays)
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
@@ -428,12 +435,15 @@ class Controller:
         try:
             await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
+            await end_watch(stays)
             await self._inverter.read_timeout()
-            if not self._inverter.sio_tot or self.method.keeps_control:
+            if not self._inverter.own_timeout:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
+        else:
+            await end_watch(stays)
         await self.method.release()
-        if self.method.keeps_control:
+        if await self.method.kept():
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 

@@ -49,7 +49,8 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))
     if isinstance(error, NoAnswer):
-        return Report(Cause.NO_RESPONSE, address=address, check=check)
+        behind = f' ({error.hint})' if error.hint else ''
+        return Report(Cause.NO_RESPONSE, address=address, behind=behind, check=check)
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 

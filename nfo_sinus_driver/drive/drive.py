@@ -114,6 +114,7 @@ class Drive:
         self.log = ErrorLog(self.inverter, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
         self._tuning = Tuning(self.inverter, self.parameters, procedures)
+        bus.on_restart(self._unit, self._watch.restarted)
         #: What goes on while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -259,10 +260,9 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            answer = await self._controller.release(timeout)
-            if self._controller.method.keeps_control:
-                await self._watchdog.put_back()
-            return answer
+            return await self._controller.release(
+                timeout, lambda stays: self._watchdog.end(control_stays=stays)
+            )
         finally:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
@@ -427,6 +427,9 @@ class Drive:
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, Cause.CONNECTED, drive=told)
+        held = inverter.model.profile.holds_control.get(self.registers.protocol)
+        if self._controller is None and held:
+            inverter.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
 
     def _set_disconnected(self) -> None:
@@ -459,5 +462,6 @@ class Drive:
         self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
+            telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
+            self._telemetry_task = self._bus.spawn(telemetry)
             self._watch.wake()

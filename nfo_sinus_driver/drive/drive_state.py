@@ -135,6 +135,10 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
+        #: How long the drive may hear nothing of what lives on the line, s, and by what it notices;
+        #: 0: it does not.
+        self.watched_for = 0.0
+        self.watched_by = ''
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
@@ -349,6 +353,11 @@ class DriveState:
     def speed(self) -> float:
         """The speed as last polled, rpm."""
         return self.last_polled(Role.ACTUAL_SPEED).value
+
+    @property
+    def own_timeout(self) -> float:
+        """After which silence the drive itself does something, s; 0: after none."""
+        return min(filter(None, (self.sio_tot, self.watched_for)), default=0.0)
 
     @property
     def can_time_out(self) -> bool:

@@ -156,6 +156,10 @@ class ParameterAccess:
         """Ask the drive who it is; what it does not tell stays empty."""
         return await self._bus.identify(self._unit, priority)
 
+    async def watch(self, seconds: float, priority: Priority) -> str:
+        """Have the drive notice a silence of the line; see :meth:`Bus.watch`."""
+        return await self._bus.watch(self._unit, seconds, priority, 1 + self._retries)
+
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key

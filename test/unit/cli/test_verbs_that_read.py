@@ -273,11 +273,20 @@ def test_scan_writes_no_file_of_drives_that_make_no_line(
     file = tmp_path / 'line.yaml'
     done = nfo('scan', '--addresses', '7', '--params', file, '--response-timeout', 0.02)
     assert done.status == 1 and not file.exists()
-    found = {1: {'line': '19200 8E1'}, 2: {'line': '9600 8E1'}}
+    found = {
+        1: {'line': '19200 8E1', 'model': 'sinus_g2'},
+        2: {'line': '9600 8E1', 'model': 'sinus_g2'},
+    }
     options = argparse.Namespace(params=str(file))
     with pytest.raises(CliError, match='several') as raised:
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert '2: 9600 8E1' in str(raised.value)
+    assert '(nfo-sinus set serial.si_baud=...)' in str(raised.value)
+    # it has none that anybody knows
+    for facts in found.values():
+        facts['model'] = 'sinus_optimal'
+    with pytest.raises(CliError, match=r'set them alike \(at the keypad\)'):
+        scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert not file.exists()
 
 

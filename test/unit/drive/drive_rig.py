@@ -119,6 +119,7 @@ class Tap:
         self.parts = link.parts
         self.use_resync_reads = link.use_resync_reads
         self.identify = link.identify
+        self.supervision = link.supervision
 
     def read(self, unit: int, address: Address) -> Reply:
         self.before(address.index, None)

@@ -243,6 +243,16 @@ def test_optimal_is_enabled_again_after_its_keypad(make_rig: MakeRig, key: str) 
     assert rig.enable().startswith('enabled')
 
 
+def test_optimal_that_stays_under_bus_control_says_so(make_rig: MakeRig) -> None:
+    rig = make_rig(model='sinus_optimal', control_method='drive_control', reference='terminal')
+    turn(rig)
+    answer = rig.drive.disconnect(PATIENCE).result(PATIENCE)
+    assert answer.cause is Cause.CONTROL_KEPT
+    assert 'the bus keeps control: from the terminals an active RUN input' in said(answer)
+    assert rig.far.read_raw('fieldbus.drive_control') == 0x4000
+    assert rig.far.control_unit.status_word & FROM_BUS
+
+
 # --- one method in a session ----------------------------------------------------------------------
 
 

@@ -242,7 +242,10 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
         ({'lost_after': 61.0}, 'allowed are 0.2 to 60 s'),
         ({'drive_timeout': 1.4}, 'at least 1.5 s, half a second more than lost_after'),
         ({'drive_timeout': 1.2, 'lost_after': 0.75}, 'at least 1.3 s, half a second more'),
-        ({'drive_timeout': 25.1}, 'allowed are 0 to 25 s'),
+        ({'drive_timeout': 25.1}, 'allowed are 0 to 25 s with sinus_g2'),
+        ({'drive_timeout': 10.1, 'model': 'movitrac31'}, 'allowed are 0 to 10 s with movitrac31'),
+        ({'drive_timeout': 25.1, 'model': 'auto'}, 'allowed are 0 to 25 s (0: as it is)'),
+        ({'drive_timeout': 25.1, 'model': 'sinus_optimal'}, 'allowed are 0 to 25 s'),
         ({'drive_timeout': 2.55}, 'between two steps of the drive, 2.5 and 2.6'),
     ],
 )
@@ -258,4 +261,7 @@ def test_settings_that_do() -> None:
     for timeout in range(7, 251):
         longest = (timeout - 5) / 10
         assert DriveSettings(drive_timeout=timeout / 10, lost_after=longest)
+    assert DriveSettings(drive_timeout=10.0, model='movitrac31')
+    # it may be the one that takes it
+    assert DriveSettings(drive_timeout=25.0, model='auto')
     assert DriveSettings(drive_timeout=0.0, setpoint_timeout=0.0, poll_rate=1000.0)
