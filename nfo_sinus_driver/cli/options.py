@@ -295,6 +295,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         'this one (default: any; an Optimal: Freque)',
     )
     add(
+        '--setpoint-max',
+        type=_limit,
+        default=0.0,
+        metavar='VALUE',
+        help='the greatest SETPOINT that is meant to be one (default: what is nominal for the '
+        'motor, where the drive tells it)',
+    )
+    add(
         '--drive-timeout',
         type=float,
         default=0.0,
@@ -357,6 +365,13 @@ def _setpoint(text: str) -> float:
     if not math.isfinite(setpoint):
         raise argparse.ArgumentTypeError(f'{text} is no set-point')
     return setpoint
+
+
+def _limit(text: str) -> float:
+    limit = float(text)
+    if not 0 < limit <= 32767:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: more than 0')
+    return limit
 
 
 def _ride_seconds(text: str) -> float:

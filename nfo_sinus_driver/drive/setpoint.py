@@ -107,6 +107,7 @@ class Setpoint:
         #: The newest one to all drives of the line.
         self._shared = _NONE
         self.control_mode = ''
+        self._nominal = math.inf
         self._target: SetpointTarget | None = None
         #: The parameters that a set-point is written to, by where that is.
         self._keys: dict[Address, str] = {}
@@ -159,13 +160,16 @@ class Setpoint:
         able = self._registers.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
-    def arm(self, control_mode: str) -> None:
+    def arm(self, control_mode: str, nominal: float) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
 
         With a reference of the drive's own, none is followed and none is missed.
+
+        :param nominal: what the motor is made for, in the unit of the control mode.
         """
         self.control_mode = control_mode
+        self._nominal = nominal
         follows = self._inverter.settings.follows_setpoints
         self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
         self._armed_at = time.monotonic()
@@ -177,7 +181,7 @@ class Setpoint:
                 self._written[address] = data, self._armed_at
         self.commanded = 0.0 if follows else NAN
         self._had = [(0.0, math.inf)]
-        self.clamped = False
+        self.clamped = self._clamp_told = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
@@ -270,9 +274,14 @@ class Setpoint:
 
     @property
     def most(self) -> float:
-        """The greatest set-point that it may be given, in either direction."""
+        """
+        The greatest set-point that it may be given, in either direction.
+
+        More than nominal only where somebody says so: what was meant in another unit, rpm for Hz,
+        must not race the motor.
+        """
         assert self._target is not None
-        return min(self._target.most, self._inverter.settings.setpoint_max or math.inf)
+        return min(self._target.most, self._inverter.settings.setpoint_max or self._nominal)
 
     def counts(self, request: Request) -> bool:
         """Tell whether a request to all came after the drive was enabled, and is still fresh."""
@@ -367,9 +376,7 @@ class Setpoint:
             return None
         limited = self._accept(request)
         if self.clamped and not self._clamp_told:
-            self._inverter.tell(
-                Severity.WARNING, Cause.SETPOINT_LIMITED, value=request.value, limited=limited
-            )
+            self._tell_limited(request.value, limited)
         self._clamp_told = self.clamped
         due = self.due(request)
         if not due:
@@ -381,6 +388,16 @@ class Setpoint:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
         status = self._registers.address(self._inverter.word_key)
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
+
+    def _tell_limited(self, value: float, limited: float) -> None:
+        nominal = self._inverter.settings.setpoint_max == 0 and abs(limited) == self._nominal
+        self._inverter.tell(
+            Severity.WARNING,
+            Cause.SETPOINT_BEYOND_NOMINAL if nominal else Cause.SETPOINT_LIMITED,
+            value=value,
+            limited=limited,
+            unit=self._inverter.unit,
+        )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:

@@ -104,7 +104,8 @@ class DriveSettings:
     :ivar telemetry_rate: Hz; 0 turns telemetry off.
     :ivar lost_after: s; after so long without a valid frame a drive that is asked is lost.
     :ivar setpoint_timeout: s; 0 turns it off.
-    :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
+    :ivar setpoint_max: in the unit of the control mode; 0 is the nominal value of what it is
+        about, where the drive tells it, else the drive's own limit.
     :ivar drive_timeout: s; the drive's own time-out, within its limits and on a step of it; 0
         leaves it as it is. At least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
     :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
@@ -164,7 +165,7 @@ class DriveSettings:
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
         _between('lost_after', self.lost_after, 0.2, 60, 's')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
-        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: the limit of the drive)')
+        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: what the motor is made for)')
         _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
         self._check_drive_timeout()
 

@@ -224,7 +224,8 @@ DRIVE_SETTINGS = (
     Setting(
         'setpoint_max',
         0.0,
-        "Set-points are clamped to this, in the unit of the control mode; 0: the drive's own limit",
+        'Set-points are clamped to this, in the unit of the control mode; 0: what is nominal for '
+        "the motor, or the drive's own limit where it does not tell that",
         0,
         32767,
         unit='in the unit of the control mode',
