@@ -506,7 +506,7 @@ def asked_by_enable(rig: VirtualRig) -> list[int]:
     return asked
 
 
-@pytest.mark.parametrize(('settings', 'most'), [({}, 34), (REMOTE, 28)], ids=['P841', 'mine'])
+@pytest.mark.parametrize(('settings', 'most'), [({}, 38), (REMOTE, 31)], ids=['P841', 'mine'])
 def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
     make_virtual: MakeVirtual, settings: dict[str, Any], most: int
 ) -> None:
