@@ -45,7 +45,7 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
-    'nominal': 'this model does not tell the nominal speed of its motor',
+    'nominal': 'this model does not tell how many pole pairs its motor has',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
@@ -198,7 +198,8 @@ WAYS = {
             for kind, features in (('rtu', _RTU), ('ascii', _ASCII))
         ),
         Way(
-            'movitrac', 'movitrac', frozenset(('movitrac', 'serial', 'states', 'timeout')),
+            'movitrac', 'movitrac',
+            frozenset(('movitrac', 'nominal', 'serial', 'states', 'timeout')),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
         ),
         Way(

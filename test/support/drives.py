@@ -242,6 +242,7 @@ DRIVES = {
         overvoltage=Fault(8, 'DC High', ('control.retard',)),
         hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
         no_timeout=('--set', 'serial.auto_stop=OFF'),
+        nominal=50.0,
     ),
     'sinus_optimal': Sinus(
         **_SINUS,
