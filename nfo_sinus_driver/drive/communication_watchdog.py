@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -109,34 +109,43 @@ class CommunicationWatchdog:
             self._set[change.key] = change.new
         return changes
 
-    async def end(self, *, control_stays: bool) -> None:
+    async def put_back(self) -> None:
         """
-        Turn off what was set here, for nobody talks to the drive any more; nothing is raised.
+        Put back what was found, at a clean end after which the drive would go on watching.
 
-        What was found is put back; what somebody else has set meanwhile is left alone. Tells why
-        the drive will have a fault, if it will.
-
-        :param control_stays: the bus has control of the drive from now on, too, or may have it
-            again: SioTot would go on counting, which it does not where the bus has no control.
+        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
+        if it will; nothing of that keeps the driver from ending.
         """
         inverter = self._inverter
+        await self._end_watch()
+        if not inverter.can_time_out:
+            return
         try:
-            if inverter.watched_by:
-                await inverter.registers.watch(0.0, Priority.SERVICE)
-                inverter.watched_by, inverter.watched_for = '', 0.0
-            elif control_stays and inverter.can_time_out:
-                await self._put_back()
+            for key in reversed(self._found):
+                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                    await self._change({key: self._found[key]})
+            await inverter.read_timeout()
         except (LinkError, DriveError) as error:
-            self._tell_left(report_of(error))
+            self._tell_left(explain_failure(error, inverter))
         else:
-            if control_stays and inverter.own_timeout and inverter.auto_stop:
+            if inverter.sio_tot and inverter.auto_stop:
                 self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
 
-    async def _put_back(self) -> None:
-        for key in reversed(self._found):
-            if await self._inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
-                await self._change({key: self._found[key]})
-        await self._inverter.read_timeout()
+    async def _end_watch(self) -> None:
+        inverter = self._inverter
+        if not inverter.watched_by:
+            return
+        try:
+            await inverter.registers.watch(0.0, Priority.SERVICE)
+        except LinkError as error:
+            inverter.tell(
+                Severity.WARNING,
+                Cause.WATCH_LEFT,
+                why=explain_failure(error, inverter),
+                by=inverter.watched_by,
+                seconds=inverter.watched_for,
+            )
+        inverter.watched_by, inverter.watched_for = '', 0.0
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
@@ -144,15 +153,11 @@ class CommunicationWatchdog:
         )
 
     def _tell_left(self, why: Report) -> None:
-        inverter = self._inverter
-        name, timeout = self._name(), inverter.own_timeout
-        inverter.tell(
-            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, name=name, timeout=timeout, why=why
+        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
+        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
+        self._inverter.tell(
+            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
         )
-
-    def _name(self) -> str:
-        model = self._inverter.model
-        return self._inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
 
     def warn_if_unfit(self) -> None:
         """Tell that it is missing, or strikes too soon; once for each reason in a row."""
@@ -167,7 +172,7 @@ class CommunicationWatchdog:
         least = inverter.settings.lost_after + margin
         if not inverter.can_time_out and not inverter.watched_by:
             return Report(Cause.NO_OWN_TIMEOUT)
-        name = self._name()
+        name = inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)
         if not inverter.auto_stop:

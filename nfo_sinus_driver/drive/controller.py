@@ -39,6 +39,7 @@ from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.diagnosis import explain_fall
 from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.diagnosis import explain_stop
 from nfo_sinus_driver.drive.diagnosis import report_of
@@ -101,6 +102,8 @@ class Controller:
         self._sequence = StopSequence(inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
+        #: The status that was judged last.
+        self._judged: InverterStatus | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
 
@@ -254,8 +257,8 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            control_mode = await self._check()
-            await self._start(control_mode, prepare)
+            control_mode, nominal = await self._check()
+            await self._start(control_mode, nominal, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
@@ -265,8 +268,12 @@ class Controller:
         reference = self._inverter.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
-    async def _check(self) -> str:
-        """See to it that nothing keeps the motor from being started; return the control mode."""
+    async def _check(self) -> tuple[str, float]:
+        """
+        See to it that nothing keeps the motor from being started.
+
+        :returns: the control mode, and the nominal value of what it is about.
+        """
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
@@ -275,14 +282,16 @@ class Controller:
             self._happened(ControlEvent.REFUSED)
             raise DriveError(report_of(error)) from error
 
-    async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+    async def _start(
+        self, control_mode: str, nominal: float, prepare: Callable[[], Awaitable[None]]
+    ) -> None:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._happened(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.arm(control_mode)
+            self._setpoint.arm(control_mode, nominal)
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
@@ -397,7 +406,7 @@ class Controller:
             return Report(Cause.ACKNOWLEDGED_DETAILED, status=acknowledged, details=details)
         return Report(Cause.ACKNOWLEDGED, status=acknowledged)
 
-    async def release(self, timeout: float, end_watch: Callable[[bool], Awaitable[None]]) -> Report:
+    async def release(self, timeout: float) -> Report:
         """
         Give control back once the motor stands.
 
@@ -405,8 +414,6 @@ class Controller:
         time-out of its own that goes on it is released, for else that would end the ramp with a
         fault.
 
-        :param end_watch: turns off the time-out that the driver has set, as far as it would strike;
-            told whether the bus may keep control.
         :raises DriveError: the drive does not confirm that it stops.
         """
         # a run command may be on its way, whoever has control at this moment; and where the bus has
@@ -415,16 +422,11 @@ class Controller:
         may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
         # nobody enables it while it is waited for that the motor stands
         with self._stopped_by_itself():
-            return await self._release(timeout, end_watch, may_run=may_run)
+            return await self._release(timeout, may_run=may_run)
 
-    async def _release(
-        self, timeout: float, end_watch: Callable[[bool], Awaitable[None]], *, may_run: bool
-    ) -> Report:
-        # where the bus may get control back by itself, it does not matter who has it just now
-        stays = bool(self.method.keeps_control)
+    async def _release(self, timeout: float, *, may_run: bool) -> Report:
         stopped = await self.stop() if may_run else None
         if not await self.method.in_control(Priority.SERVICE):
-            await end_watch(stays)
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
@@ -432,13 +434,10 @@ class Controller:
         try:
             await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
-            await end_watch(stays)
             await self._inverter.read_timeout()
-            if not self._inverter.own_timeout:
+            if not self._inverter.own_timeout or self.method.keeps_control:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
-        else:
-            await end_watch(stays)
         await self.method.release()
         if await self.method.kept():
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
@@ -495,6 +494,7 @@ class Controller:
     def judge(self, seen: InverterStatus) -> bool:
         """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
+        before, self._judged = self._judged, seen
         if self.blocked_by_fault and not seen.faulted:
             self._sequence.request_anew()
         if self._explain_refusal(seen):
@@ -503,7 +503,7 @@ class Controller:
             return False
         reason = None
         if self.enabled:
-            reason = self._why_stopped(seen)
+            reason = self._why_stopped(seen) or self._why_slower(seen, before)
         elif not (self.commanded or self.stopping) and seen.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
@@ -540,6 +540,12 @@ class Controller:
 
     def _why_stopped(self, seen: InverterStatus) -> Report | None:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)
+
+    def _why_slower(self, seen: InverterStatus, before: InverterStatus | None) -> Report | None:
+        if before is None or before.at < self._since or self._setpoint.control_mode != 'Freque':
+            return None
+        least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
+        return explain_fall(self._inverter, before, seen, least)
 
     def _no_control(self, seen: InverterStatus | None) -> Report:
         if seen is not None and seen.driven:

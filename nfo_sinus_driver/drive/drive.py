@@ -260,9 +260,11 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            return await self._controller.release(
-                timeout, lambda stays: self._watchdog.end(control_stays=stays)
-            )
+            answer = await self._controller.release(timeout)
+            # whoever has control at this moment: it may come back to the bus by itself
+            if self._controller.method.keeps_control:
+                await self._watchdog.put_back()
+            return answer
         finally:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
