@@ -98,5 +98,7 @@ def _allocated() -> int:
     for one in gc.get_objects():
         if isinstance(one, functools._lru_cache_wrapper):
             one.cache_clear()
+    # the newest object may be of a case: it would keep all that it knows
+    del one
     gc.collect()
     return sys.getallocatedblocks()
