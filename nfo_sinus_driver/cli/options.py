@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import math
 import shlex
 
+from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
@@ -185,11 +186,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar='GROUP',
         help='only this one, such as Motor; Status are the measured values',
     )
+    setting, value = example_setting()
     get = verb('get', 'show some parameters', json=True)
-    get.add_argument('names', nargs='+', metavar='NAME', help='such as control.accel')
+    get.add_argument('names', nargs='+', metavar='NAME', help=f'such as {setting}')
     set_ = verb('set', 'change parameters, all of them or none', json=True)
     set_.add_argument(
-        'changes', nargs='+', type=_change, metavar='NAME=VALUE', help='such as control.accel=5'
+        'changes',
+        nargs='+',
+        type=_change,
+        metavar='NAME=VALUE',
+        help=f'such as {setting}={value:g}',
     )
     set_.add_argument(_ALLOW, action='store_true', help='let parameters serial.* be changed')
     dump = verb('dump', 'save all settings of the drive')
@@ -289,6 +295,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         'this one (default: any; an Optimal: Freque)',
     )
     add(
+        '--setpoint-max',
+        type=_limit,
+        default=0.0,
+        metavar='VALUE',
+        help='the greatest SETPOINT that is meant to be one (default: what is nominal for the '
+        'motor, where the drive tells it)',
+    )
+    add(
         '--drive-timeout',
         type=float,
         default=0.0,
@@ -351,6 +365,13 @@ def _setpoint(text: str) -> float:
     if not math.isfinite(setpoint):
         raise argparse.ArgumentTypeError(f'{text} is no set-point')
     return setpoint
+
+
+def _limit(text: str) -> float:
+    limit = float(text)
+    if not 0 < limit <= 32767:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: more than 0')
+    return limit
 
 
 def _ride_seconds(text: str) -> float:

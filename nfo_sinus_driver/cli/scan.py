@@ -27,6 +27,8 @@ import json
 from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import listed
@@ -52,11 +54,6 @@ _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
-_ADVICE = (
-    'no response: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
-    'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
-    'A and B of the wires'
-)
 
 
 def scan(options: argparse.Namespace) -> int:
@@ -106,10 +103,12 @@ def _write_params(
     """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
         told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
+        keys = {load_family(facts['model']).key(Role.BAUD_RATE) for facts in found.values()}
+        how = ', '.join(f'nfo-sinus set {key}=...' for key in sorted(keys - {''}))
         raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
-                'drives have several; set them alike (nfo-sinus set serial.si_baud=...)',
+                f'drives have several; set them alike ({how or "at the keypad"})',
                 told,
             )
         )

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 from collections.abc import Callable
+import math
 from typing import Any
 from typing import TypeVar
 
@@ -104,6 +105,19 @@ async def carry_out(
         except Refused as error:
             refusal = Refusal(str(error))
             refusal.__cause__ = error
+
+
+async def read_nominal(inverter: DriveState, control_mode: str) -> float:
+    """
+    Read what the motor is made for, in the unit of a control mode.
+
+    :returns: infinite where the drive does not tell it, or takes no set-points in that mode.
+    """
+    target = inverter.model.profile.setpoints.get(control_mode)
+    if target is None:
+        return math.inf
+    steps = target.read_nominal(inverter.has)
+    return await carry_out(steps, inverter.registers, Priority.SERVICE)
 
 
 async def _store(

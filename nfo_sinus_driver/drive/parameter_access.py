@@ -123,7 +123,7 @@ class ParameterAccess:
 
     def require_fitted(self, key: str) -> None:
         """Raise what the drive has answered each time, if it lacks the option card for a key."""
-        denials = self._denials.get(key, ())
+        denials = self._denials.get(key, [])
         if len(denials) >= _DENIALS:
             raise denials[-1]
 

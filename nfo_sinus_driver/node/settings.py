@@ -25,9 +25,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
@@ -163,7 +165,7 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'model',
-        'sinus_g2',
+        usual_family(),
         'The drive family; auto: find out',
         constraints=f'one of {", ".join((*families(), AUTO))}',
     ),
@@ -222,7 +224,8 @@ DRIVE_SETTINGS = (
     Setting(
         'setpoint_max',
         0.0,
-        "Set-points are clamped to this, in the unit of the control mode; 0: the drive's own limit",
+        'Set-points are clamped to this, in the unit of the control mode; 0: what is nominal for '
+        "the motor, or the drive's own limit where it does not tell that",
         0,
         32767,
         unit='in the unit of the control mode',
@@ -236,12 +239,12 @@ DRIVE_SETTINGS = (
     Setting(
         'drive_timeout',
         0.0,
-        "The drive's own time-out (SioTot, with AutoStop = ON), s, in steps of 0.1: it stops the "
-        'motor when this driver dies; 0: leave it as it is',
+        "The drive's own time-out (G2: SioTot, with AutoStop = ON), s: it stops the motor when "
+        'this driver dies; 0: leave it as it is',
         0,
-        25,
+        LONGEST_DRIVE_TIMEOUT,
         unit='s',
-        constraints='0 or at least lost_after + 0.5',
+        constraints='0 or at least lost_after + 0.5; the most and the step are those of the drive',
     ),
     Setting(
         'shutdown_timeout',

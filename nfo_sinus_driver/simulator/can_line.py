@@ -15,8 +15,9 @@
 A CAN bus with nodes on it, and the adapter through which a master is there.
 
 Knows no clock of its own: it is told the time, so that tests can make it up. Of the frames that
-wait for the bus the one with the least identifier goes first. A frame that nobody takes (no node
-has power, a line that carries nothing, another bit rate) is not sent again later.
+wait for the bus the one with the least identifier goes first; the adapter sends its own in order. A
+frame that nobody takes (no node has power, a line that carries nothing, another bit rate) is not
+sent again later.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from dataclasses import replace
 import itertools
 from typing import Protocol
 
@@ -87,22 +87,16 @@ class CanFaults(LineFaults):
     """
     What goes wrong between a node and the master.
 
-    Frames have a check sum, and a damaged one is sent again at once, so damage is a delay. Noise is
-    what comes out of a serial adapter beside its lines.
-
-    :param again: how long it takes to send one again (s).
+    Frames have a check sum, and a damaged one is sent again at once, so damage only takes time.
+    Noise is what comes out of a serial adapter beside its lines. The line sees to both.
     """
-
-    def __init__(self, again: float) -> None:
-        super().__init__()
-        self._again = again
 
     def damaged(self, reply: Reply) -> Reply:
         """Return an answer that was damaged."""
-        return replace(reply, delay=reply.delay + self._again)
+        return reply
 
     def noisy(self, reply: Reply) -> Reply:
-        """Return an answer before which there is noise: the line sees to it when it is told."""
+        """Return an answer with noise before it."""
         return reply
 
 
@@ -131,7 +125,7 @@ class CanLine(Wire):
         trace: Trace | None = None,
     ) -> None:
         self._bit = 1 / timing.baud if paced else 0.0
-        super().__init__(port, timing, CanFaults(can_frames.ERROR_BITS * self._bit))
+        super().__init__(port, timing, CanFaults())
         self.speed = f'{timing.baud} bit/s'
         self._adapter = adapter
         self._drives = drives
@@ -206,9 +200,18 @@ class CanLine(Wire):
         if not self._waiting:
             return None
         begin = max(self._busy_until, min(one.since for one in self._waiting))
-        ready = (one for one in self._waiting if one.since <= begin)
+        # the adapter sends in order: of its frames only the first takes part
+        masters = next((one for one in self._waiting if one.sender is None), None)
+        ready = (
+            one
+            for one in self._waiting
+            if one.since <= begin and (one.sender is not None or one is masters)
+        )
         first = min(ready, key=lambda one: one.precedence)
-        return first, begin + can_frames.bits(first.frame) * self._bit
+        bits = can_frames.bits(first.frame)
+        # each time that it is damaged, an error frame is in its place, and it comes again
+        again = first.note.count('damaged') * (bits + can_frames.ERROR_BITS)
+        return first, begin + (bits + again) * self._bit
 
     def _carry(self, waiting: _Waiting, end: float) -> None:
         """Let a frame arrive everywhere."""

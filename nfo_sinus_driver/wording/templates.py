@@ -144,6 +144,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'press STOP there',
     Cause.POWER_CYCLED: 'the drive did not answer for a moment, and the bus has lost control '
     '({status}). It was switched off and on: check its mains',
+    Cause.SLOWER_AFTER_SILENCE: 'the drive did not answer for a moment, and the motor turns slower '
+    'than it was told to ({now:g} Hz, before {before:g} Hz; {status}). It may have been switched '
+    'off and on: check its mains and the line',
     Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
@@ -160,6 +163,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'set reference to fieldbus, where its control method has that',
     Cause.SETPOINT_LIMITED: 'set-point {value:g} is limited to {limited:g} (setpoint_max, or the '
     'limit of the drive)',
+    Cause.SETPOINT_BEYOND_NOMINAL: 'set-point {value:g} is limited to {limited:g} {unit}, which is '
+    'nominal for this motor: check in which unit it was meant; if the motor may go beyond, '
+    '{call.set_setpoint_max}',
     Cause.SETPOINT_TIMED_OUT: 'no set-point for {timeout:g} s: the motor ramps to a stop until the '
     'next one arrives; check what publishes them',
     Cause.SETPOINTS_AGAIN: 'set-points arrive again',
@@ -313,6 +319,7 @@ class Calls:
     :ivar program: what this is that speaks.
     :ivar drive_timeout: the name of that setting.
     :ivar set_drive_timeout: such as ``set drive_timeout``.
+    :ivar set_setpoint_max: how to let set-points go beyond what is nominal.
     :ivar set_control_mode: how to expect another control mode.
     :ivar set_model: how to correct the model.
     """
@@ -322,6 +329,7 @@ class Calls:
     program: str
     drive_timeout: str
     set_drive_timeout: str
+    set_setpoint_max: str
     set_control_mode: str
     set_model: str
 

@@ -210,6 +210,8 @@ class LineRig:
         chosen = addresses or tuple(self.drives)
         for future in [self.drives[address].enable() for address in chosen]:
             assert 'enabled' in self.answer(future)
+        # what is asked for in the very moment of enabling does not come after it
+        self.pass_time(_SLICE)
 
     def keep(self, program: Callable[[], None]) -> None:
         """Have a program do something again and again, as one that sends set-points."""

@@ -476,6 +476,21 @@ def test_a_set_point_is_rounded_to_the_steps_of_the_drive() -> None:
     assert target.most == 400
 
 
+@pytest.mark.parametrize(
+    ('word', 'setting', 'pattern', 'base', 'nominal'),
+    [
+        (0x00010010, 'frequency.vf_pattern_1', 'V/f pattern 1', ('frequency.f_base_1', '50'), 50.0),
+        (0x00010018, 'frequency.vf_pattern_2', 'V/f pattern 3', ('frequency.f_base_3', 87.0), 87.0),
+    ],
+)
+def test_nominal_is_the_base_frequency_of_the_pattern_in_use(
+    word: int, setting: str, pattern: str, base: tuple[str, Any], nominal: float
+) -> None:
+    key, value = base
+    steps = ((Read(WORD), word), (Read(setting), pattern), (Read(key), value))
+    assert play(target.read_nominal(MOVITRAC.__contains__), *steps) == nominal
+
+
 # --- what the tables have of it -------------------------------------------------------------------
 
 
