@@ -105,7 +105,9 @@ class Wire:
         self._trace = bench.trace
         self._written = _WRITTEN[bench.way.protocol]
         #: Older firmware takes settings under bus control alone: MODE and a stop go along [C100].
-        self._aside = _HARMLESS if bench.way.dialect == '5.0' else frozenset()
+        #: One that is in bus mode when it is found is told to stop.
+        told = bench.way.dialect == '5.0' or 'local' not in bench.way.features
+        self._aside = _HARMLESS if told else frozenset()
         self._read = 0
 
     def writes(self) -> list[Write]:

@@ -171,6 +171,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
     _untouched(drive)
 
 
+@needs('characters')
 def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
     drive = bench.simulator()
     drive.inject('damage', 1000000)
@@ -262,7 +263,7 @@ def test_what_to_call_is_named_in_full_wherever_it_is(bench: Bench) -> None:
     assert refused.message.endswith('then call /line1/reset')
 
 
-@needs('parameters')
+@needs('local', 'parameters')
 def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.mode=Speed')
     bench.driver('-p', 'expected_control_mode:=Freque')
