@@ -171,6 +171,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
     _untouched(drive)
 
 
+@needs('characters')
 def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
     drive = bench.simulator()
     drive.inject('damage', 1000000)
@@ -262,7 +263,7 @@ def test_what_to_call_is_named_in_full_wherever_it_is(bench: Bench) -> None:
     assert refused.message.endswith('then call /line1/reset')
 
 
-@needs('parameters')
+@needs('local', 'parameters')
 def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.mode=Speed')
     bench.driver('-p', 'expected_control_mode:=Freque')
@@ -329,8 +330,8 @@ def untouched(
         (['-p', 'drive_timeout:=0.3'], ['drive_timeout', 'at least 1.5 s']),
         (['-p', 'control_method:=magic'], ['control_method', 'monitor']),
         (['-p', 'model:=sinus_g3'], ['model', 'sinus_g2']),
-        (['-p', 'protocol:=canopen'], ['protocol', 'modbus_rtu']),
-        (['-p', 'baud_rate:=12345'], ['baud_rate', '57600']),
+        (['-p', 'protocol:=profibus'], ['protocol', 'modbus_rtu']),
+        (['-p', 'baud_rate:=12345'], ['baud_rate 12345', ' has ']),
         (['-p', 'char_format:=9X1'], ['char_format', '8E1']),
         (['-p', 'drives:=[one, one]'], ['one', 'its own name']),
         (['-p', 'drives:=[nfo_sinus_bus]'], ['nfo_sinus_bus']),
