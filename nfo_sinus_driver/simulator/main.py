@@ -24,6 +24,7 @@ import json
 import signal
 import sys
 
+from nfo_sinus_driver import __version__
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import Client
@@ -174,6 +175,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
     )
     add = parser.add_argument
+    add('--version', action='version', version=f'nfo_sinus_driver {__version__}')
     add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
