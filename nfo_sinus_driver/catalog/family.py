@@ -158,6 +158,12 @@ def usual_family() -> str:
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 
+def example_setting() -> tuple[str, float]:
+    """Return the key of a setting of that family, and a value, for help and documentation."""
+    key, value = importlib.import_module(_FAMILIES).EXAMPLE
+    return str(key), float(value)
+
+
 @functools.cache
 def load_profile(name: str) -> Profile:
     """
@@ -345,4 +351,5 @@ def _area(row: table.Row) -> ErrorLogArea:
         factor=Fraction(row.get('factor') or 1),
         above=table.number(row.get('above', '')),
         readings=tuple(_readings(row.get('readings', ''))),
+        elsewhere=table.number(row.get('elsewhere', '')),
     )

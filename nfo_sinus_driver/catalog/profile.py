@@ -394,6 +394,8 @@ class Profile:
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
+    :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
+        the protocol over which that is so.
     """
 
     title: str
@@ -410,6 +412,7 @@ class Profile:
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
+    holds_control: Mapping[str, str] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

@@ -42,6 +42,7 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -89,6 +90,7 @@ async def carry_out(
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
+                registers.require_fitted(step.key)
                 brought = await registers.read(step.key, priority, once=step.once)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(step, registers, priority, tell)
@@ -149,6 +151,8 @@ class Commands:
         method = inverter.model.profile.methods[inverter.settings.method]
         self._method = method(inverter.settings.reference, inverter.registers.reaches)
         self._registers = inverter.registers
+        #: Why the line has the bus keep control.
+        self._held = inverter.model.profile.holds_control.get(inverter.registers.protocol, '')
         self._tell = inverter.tell
 
     @property
@@ -158,8 +162,17 @@ class Commands:
 
     @property
     def keeps_control(self) -> str:
-        """Why control stays with the bus at :meth:`release`; ``''`` where it does not."""
-        return self._method.keeps_control
+        """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
+        return self._method.keeps_control or self._held
+
+    async def kept(self) -> bool:
+        """Tell whether control has stayed with the bus; so it is where the drive does not tell."""
+        if not self._held:
+            return bool(self.keeps_control)
+        try:
+            return await self.in_control(Priority.SERVICE)
+        except LinkError:
+            return True
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""

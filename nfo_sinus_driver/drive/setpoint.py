@@ -51,6 +51,8 @@ _KEEP_ALIVE_SHARE = 1 / 3
 _LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
 _WATCH_PERIOD = 0.25
+#: How long it is known which set-points the drive had, s.
+_REMEMBERED = 10.0
 #: How often at most it is read back whether the drive took what was told to all drives, s.
 _READ_BACK_PERIOD = 0.5
 
@@ -123,6 +125,8 @@ class Setpoint:
         self._waits_for_answer = False
         self._busy_since = math.inf
         self._clamp_told = False
+        #: The set-points that the drive may have had lately, and until when; newest last.
+        self._had: list[tuple[float, float]] = []
         #: What the drive was last given, in the unit of the control mode.
         self.commanded = NAN
         self.clamped = False
@@ -176,6 +180,7 @@ class Setpoint:
                 self._keys[address] = step.key
                 self._written[address] = data, self._armed_at
         self.commanded = 0.0 if follows else NAN
+        self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_told = False
         self._expired = False
         self._warned = False
@@ -200,6 +205,34 @@ class Setpoint:
         if self._waits_for_answer:
             self._waits_for_answer = False
             self._bus.request(self._slot)
+
+    def least_since(self, at: float, *, reverse: bool) -> float:
+        """
+        Return the slowest that the drive can have been told to turn since then, in one direction.
+
+        :param at: s of ``time.monotonic``; longer ago than 10 s nobody knows any more.
+        """
+        return min(
+            (max(0.0, -value if reverse else value) for value, until in self._had if until >= at),
+            default=0.0,
+        )
+
+    def _may_have(self, value: float) -> None:
+        """Take note that the drive may have a set-point from now on; NaN: nobody knows which."""
+        value = 0.0 if math.isnan(value) else value
+        oldest = time.monotonic() - _REMEMBERED
+        self._had = [one for one in self._had if one[1] >= oldest]
+        if (value, math.inf) not in self._had:
+            self._had.append((value, math.inf))
+
+    def _has(self, value: float) -> None:
+        """Take note that the drive has a set-point, and none of the others any more."""
+        self.commanded = value
+        self._may_have(value)
+        now = time.monotonic()
+        self._had = [
+            (one, until if one == value else min(until, now)) for one, until in self._had
+        ]
 
     @property
     def _rewrite_period(self) -> float:
@@ -283,6 +316,7 @@ class Setpoint:
 
     def was_told(self, address: Address, data: bytes) -> None:
         """Take note of what was written to all drives; it is read back whether this one took it."""
+        self._may_have(self._meant({**self._standing, address: data}))
         if not self._inverter.answering:
             # it gets its own when it answers
             self._written = {}
@@ -349,6 +383,7 @@ class Setpoint:
             return None
         # of several writes each has a turn of its own, and a newer set-point comes between
         address, data = due[0]
+        self._may_have(self._meant({**self._standing, address: data}))
         if self._combining is _Combining.GIVEN_UP or len(due) > 1:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
         status = self._registers.address(self._inverter.word_key)
@@ -388,7 +423,7 @@ class Setpoint:
         self._busy_since = math.inf
         self._written[address] = data, time.monotonic()
         if len(self._written) == len(self._keys):
-            self.commanded = self._meant(self._standing)
+            self._has(self._meant(self._standing))
 
     def was_missed(self, error: LinkError, address: Address | None = None) -> None:
         """
@@ -473,6 +508,7 @@ class Setpoint:
                 if self._request is not before:
                     # that one is written instead
                     return
+                self._may_have(0.0)
                 try:
                     await self._registers.write(replace(step, once=True), Priority.STOP)
                 except LinkError as error:
@@ -487,5 +523,5 @@ class Setpoint:
                 self._written[address] = data, time.monotonic()
                 self._busy_since = math.inf
             if self._request is before:
-                self.commanded = 0.0
+                self._has(0.0)
         self._expired = True

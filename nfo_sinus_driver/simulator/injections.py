@@ -31,8 +31,8 @@ from typing import Any
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
+from nfo_sinus_driver.simulator.wire import Wire
 
 #: Stands for an argument that must be given.
 _REQUIRED: Any = object()
@@ -95,7 +95,7 @@ class Argument:
 class Target:
     """What a verb works on; ``drive`` is ``None`` when it concerns any drive of the line."""
 
-    line: Line
+    line: Wire
     drive: SimulatedDrive | None
     now: float
 

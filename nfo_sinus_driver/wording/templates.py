@@ -42,12 +42,15 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.DRIVER_ERROR: 'error in the driver: {error}',
     Cause.LINE_FAILED: '{error}',
     Cause.NOT_REACHED: '{error}: check the cable and that the drive has power',
-    Cause.NO_RESPONSE: 'no response from address {address}: check in this order: {check}',
+    Cause.NO_RESPONSE: 'no response from address {address}{behind}: check in this order: '
+    '{check}',
     Cause.NO_VALID_ANSWER: 'what comes from address {address} is no answer ({error}): check baud '
     'rate and parity, that no other master is on the line, and the wiring',
     Cause.TOO_LATE: 'no answer within {timeout:g} s',
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
+    Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
+    Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
     Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
     Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
@@ -141,6 +144,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'press STOP there',
     Cause.POWER_CYCLED: 'the drive did not answer for a moment, and the bus has lost control '
     '({status}). It was switched off and on: check its mains',
+    Cause.SLOWER_AFTER_SILENCE: 'the drive did not answer for a moment, and the motor turns slower '
+    'than it was told to ({now:g} Hz, before {before:g} Hz; {status}). It may have been switched '
+    'off and on: check its mains and the line',
     Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
@@ -200,6 +206,15 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
+        why='{why}', remedy='use the RUN input'
+    ),
+    Cause.OWN_TIMEOUT_LEFT: 'control stays with the bus, and the time-out of the drive itself '
+    '({name} {timeout:g} s) goes on: {why}. So it will have a fault when nothing is said to it for '
+    'so long; set {key} to 0 if it shall not',
+    Cause.OWN_TIMEOUT_NOT_OURS: 'this {call.program} has not set it, and leaves it as it is',
+    Cause.WATCH_LEFT: 'the drive may go on watching over this {call.program} ({by}): {why}. So it '
+    'may have a fault {seconds:g} s after this end, which is acknowledged as any other',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',

@@ -45,12 +45,13 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
-    'quiet': 'its time-out goes on where nobody is: control stays with the bus',
     'nominal': 'this model does not tell the nominal speed of its motor',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
+    'canopen': 'it is about CANopen',
+    'local': 'the module holds the drive in bus mode: keypad and terminals never get control',
 }
 
 #: How unit and PDU are got out of a frame of Modbus.
@@ -62,6 +63,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
 #: What a driver says where nobody answers, and what is to be checked, in order.
 SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 _SILENCE_OF_MOVITRACS = 'no response', 'power', 'USS 11A', 'P880', 'P842', 'wires'
+_SILENCE_OF_NODES = 'no response', 'power', 'the node id', 'the bit rate', 'CAN_H', '120 ohms'
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class Way:
     @property
     def drives(self) -> Drives:
         """What is to be known of its drives."""
-        return DRIVES[self.model]
+        return DRIVES.get(f'{self.model} {self.protocol}', DRIVES[self.model])
 
     @property
     def simulator(self) -> dict[str, str | int]:
@@ -131,6 +133,8 @@ class Way:
         """What a driver says where nobody has its address, and what is to be checked, in order."""
         if self.protocol == 'modbus_tcp':
             return 'has no path to unit', 'table of units', 'serial port'
+        if self.protocol == 'canopen':
+            return _SILENCE_OF_NODES
         return _SILENCE_OF_MOVITRACS if self.protocol == 'movitrac' else SILENCE
 
     @property
@@ -141,7 +145,7 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'quiet', 'timeout'))
+_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer', 'nominal',
@@ -196,6 +200,10 @@ WAYS = {
         Way(
             'movitrac', 'movitrac', frozenset(('movitrac', 'serial', 'states', 'timeout')),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
+        ),
+        Way(
+            'canopen', 'canopen', (_G2 | {'canopen', 'fine', 'identity'}) - {'local', 'fast'},
+            baud_rate=125_000, beyond=_NOT_ON_MODBUS,
         ),
     )
 }

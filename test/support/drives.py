@@ -166,6 +166,20 @@ class Sinus(Drives):
         drive.inject('keypad', 'stop')
 
 
+class OnCanopen(Sinus):
+    """
+    A G2 on CANopen: its module holds it in bus mode, whoever is there [M0 §6.4].
+
+    It watches over the heartbeat of the driver, which shows in no parameter.
+    """
+
+    def left(self, state: State) -> bool:
+        return state['mode'] == 3 and not state['scmd'] and not state['mode_ext_writes']
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        return state['parameters']['serial.auto_stop'] is True
+
+
 class Movitrac(Drives):
     """Those with function bits, which count while P841 is Remote control."""
 
@@ -218,6 +232,12 @@ DRIVES = {
     'sinus_g2': Sinus(
         **_SINUS,
         nominal=50.0,
+        overvoltage=Fault(8, 'DC High', ('control.retard',)),
+        hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
+        no_timeout=('--set', 'serial.auto_stop=OFF'),
+    ),
+    'sinus_g2 canopen': OnCanopen(
+        **{**_SINUS, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'},
         overvoltage=Fault(8, 'DC High', ('control.retard',)),
         hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
         no_timeout=('--set', 'serial.auto_stop=OFF'),

@@ -129,6 +129,13 @@ class DirectionAndSize(SetpointTarget):
         """Write size 0 and leave the bits alone, for a direction among them would be a command."""
         yield Write(self.key, 0.0, once=once)
 
+    def set_to_zero(self) -> Steps[None]:
+        """Write size 0, and read it back alone."""
+        yield from self.zero(once=False)
+        kept = float((yield Read(self.key)))
+        if kept:
+            raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
+
 
 def _reverse(value: float) -> bool:
     return math.copysign(1, value) < 0

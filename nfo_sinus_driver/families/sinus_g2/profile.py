@@ -475,4 +475,9 @@ PROFILE = Profile(
     most=MOST,
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
+    # [M0 §6.4]
+    holds_control={
+        'canopen': 'the CANopen module holds the drive in bus mode from the first request on, '
+        'until the drive is switched off',
+    },
 )

@@ -27,6 +27,8 @@ from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus import parts
+from nfo_sinus_driver.simulator.sinus_g2 import canopen
+from nfo_sinus_driver.simulator.sinus_g2 import canopen_shape
 from nfo_sinus_driver.simulator.sinus_g2 import classic
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
@@ -86,7 +88,7 @@ def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
     factory=FACTORY,
-    servers={'modbus': ModbusServer, 'classic': classic.Server},
+    servers={'modbus': ModbusServer, 'classic': classic.Server, 'canopen': canopen.Server},
     options=(
         Option(
             'dialect',
@@ -95,6 +97,7 @@ FAMILY = SimulatedFamily(
             tuple(DIALECTS),
         ),
         *parts.OPTIONS,
+        *canopen_shape.OPTIONS,
     ),
     verbs={
         **parts.VERBS,

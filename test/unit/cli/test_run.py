@@ -41,8 +41,6 @@ import pytest
 
 Nfo = Callable[..., Done]
 RUN = (0x02, 0x98)
-#: A line that is cut is noticed soon.
-HASTY = ('--response-timeout', 0.3, '--retries', 2)
 OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
 #: Every protocol, model and control method.
 WAYS: dict[str, tuple[dict[str, Any], tuple[object, ...]]] = {
@@ -364,7 +362,7 @@ def test_a_fault(bench: Bench) -> None:
     ],
 )
 def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject(what, value, address=1)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1, err
@@ -384,7 +382,7 @@ def test_a_fault_as_json(bench: Bench) -> None:
 
 
 def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
@@ -394,7 +392,7 @@ def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
 
 
 def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         assert process.stderr is not None
         read_until(process.stderr, 'the stop is NOT confirmed')
@@ -407,7 +405,7 @@ def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
 
 
 def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None

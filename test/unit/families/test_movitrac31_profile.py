@@ -53,7 +53,7 @@ method = MOVITRAC.profile.methods['function_bits']('fieldbus', MOVITRAC.__contai
 target = MOVITRAC.profile.setpoints['Freque']
 #: What a drive without option cards has assigned to its terminals in the factory.
 FACTORY: Mapping[int, Any] = {42: 'CCW/Stop', 43: 'Enable/Stop', 47: 'n11 (n21)'}
-SIZE_0 = ((Write(SIZE, 0.0), None), (Read(SIZE), 0.0), (Read(BITS), 0))
+SIZE_0 = ((Write(SIZE, 0.0), None), (Read(SIZE), 0.0))
 NOTHING_ELSE = (
     (Read('control.operating_mode'), 'V/f mode'),
     (Read('control.synchronous_operation'), REFUSED),
@@ -210,7 +210,7 @@ def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) ->
     play(
         method.take_control(),
         *begun,
-        *((Write(SIZE, 0.0), None), (Read(SIZE), 0.0), (Read(BITS), FORWARD)),
+        *SIZE_0,
         (Write(MODE, REMOTE, stored=True), None),
         (Write(BITS, 0, head=True), None),
         *SIZE_0,
@@ -220,7 +220,7 @@ def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) ->
         play(
             method.take_control(),
             *begun,
-            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0), (Read(BITS), FORWARD)),
+            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0)),
         )
 
 
