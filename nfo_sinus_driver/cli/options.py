@@ -21,7 +21,6 @@ from collections.abc import Sequence
 import math
 import shlex
 
-from nfo_sinus_driver import __version__
 from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import usual_family
@@ -32,6 +31,7 @@ from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.version import VERSION
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
 DEFAULTS = {
@@ -181,7 +181,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         parents=[common],
     )
-    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {__version__}')
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')
 
     def verb(name: str, help_text: str, *, json: bool = False) -> argparse.ArgumentParser:

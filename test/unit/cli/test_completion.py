@@ -23,11 +23,11 @@ import subprocess
 
 import pytest
 
-from nfo_sinus_driver import __version__
 from nfo_sinus_driver.cli.completion import script
 from nfo_sinus_driver.cli.main import VERBS
 from nfo_sinus_driver.cli.main import main
 from nfo_sinus_driver.simulator.main import main as simulator
+from nfo_sinus_driver.version import VERSION
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -75,7 +75,7 @@ def test_commands_say_their_version(
     with pytest.raises(SystemExit) as end:
         command(['--version'])
     assert end.value.code == 0
-    assert capsys.readouterr().out == f'nfo_sinus_driver {__version__}\n'
+    assert capsys.readouterr().out == f'nfo_sinus_driver {VERSION}\n'
 
 
 def test_all_files_have_the_same_version() -> None:
@@ -88,4 +88,4 @@ def test_all_files_have_the_same_version() -> None:
         )
         for match in re.findall(pattern, (ROOT / name).read_text(encoding='utf-8'))
     }
-    assert found == {__version__}
+    assert found == {VERSION}
