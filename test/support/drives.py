@@ -237,6 +237,7 @@ DRIVES = {
         no_timeout=('--set', 'serial.auto_stop=OFF'),
     ),
     'sinus_g2 canopen': OnCanopen(
+        nominal=50.0,
         **{**_SINUS, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'},
         overvoltage=Fault(8, 'DC High', ('control.retard',)),
         hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
