@@ -229,8 +229,10 @@ def test_a_setpoint_in_the_wrong_unit_does_not_race_the_motor(bench: Bench) -> N
             status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
             assert status.setpoint == nominal
             client.wait_for('status', lambda status: abs(status.actual - nominal) < 0.3, 'nominal')
-            assert abs(drive.state()['setpoint']) == nominal
+            drive.wait_for(lambda state: abs(state['setpoint']) == nominal, timeout=PATIENCE)
         assert client.enable(False).success
+        # what is shown is of the next run then, and not of this one
+        client.wait_for('status', lambda status: abs(status.actual) < 0.1, 'standstill')
     if nominal < bench.drives.most:
         said = f'set-point 500 is limited to {nominal:g} Hz, which is nominal for this motor'
         wait_until(lambda: driver.text.count(said) == 2, 'said once for each run')

@@ -198,8 +198,8 @@ def test_the_action_is_cancelled(bench: Bench) -> None:
 def test_a_failure_and_a_procedure_that_there_is_not(bench: Bench) -> None:
     simulator, client = start(bench)
     tuner = Tuner(client)
-    status, result = tuner.result(tuner.begin(9))
-    assert status == GoalStatus.STATUS_ABORTED and 'procedure 9' in result.message
+    assert not tuner.ask(9).accepted
+    wait_until(lambda: '/nfo_sinus/tune rejected: there is no procedure 9' in bench.log, 'said')
     simulator.inject('tuning-fails', 17)
     status, result = tuner.result(tuner.begin(Tune.Goal.STATOR_RESISTANCE))
     assert status == GoalStatus.STATUS_ABORTED
