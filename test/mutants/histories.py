@@ -172,7 +172,7 @@ HISTORIES = (
         3,
         'in any order: a clean-up does not stop the motor',
         DRIVE,
-        '            return await self._controller.release(timeout)\n',
+        '            answer = await self._controller.release(timeout)\n',
         '            return Report(Cause.ONLY_WATCHED)\n',
         OPTIMAL_SCMD,
     ),
