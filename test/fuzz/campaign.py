@@ -96,7 +96,8 @@ def _judged(seed: int, case: int) -> Iterable[Finding]:
 def _allocated() -> int:
     # what a cache keeps is bounded, and fills slowly
     for one in gc.get_objects():
-        if isinstance(one, functools._lru_cache_wrapper):
+        # its type, for some objects raise at whatever they are asked
+        if type(one) is functools._lru_cache_wrapper:
             one.cache_clear()
     # the newest object may be of a case: it would keep all that it knows
     del one

@@ -229,10 +229,12 @@ def test_roles() -> None:
     assert indices == {
         'status_word': 284,
         'control_source': 205,
+        'local_operation': 196,
         'actual_frequency': 0,
         'actual_speed': 17,
         'output_voltage': 1,
         'dc_link_voltage': 2,
+        'pole_pairs': 106,
         'communication_timeout': 285,
         'bus_address': 206,
     }

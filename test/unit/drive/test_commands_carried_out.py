@@ -58,6 +58,9 @@ class Noted:
             raise answer
         return answer
 
+    def require_fitted(self, key: str) -> None:
+        pass
+
     async def read(self, key: str, priority: Priority, *, once: bool) -> Any:
         return self._next('read', key, priority, once)
 

@@ -54,7 +54,7 @@ class _Deaf:
 def test_a_stop_goes_ahead_of_all_that_waits(tmp_path) -> None:
     trace = tmp_path / 'trace.jsonl'
     with Simulator(baud=57600, trace=str(trace)) as simulator:
-        link = open_link('modbus_rtu', simulator.port, LineSettings(57600))
+        link = open_link('modbus_rtu', simulator.port, LineSettings(57600, response_timeout=2.0))
         bus = Bus(link)
         bus.start()
         drive = Drive(bus, DriveSettings(), _Deaf())
