@@ -29,8 +29,10 @@ from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.modbus_frames import ThroughPlc
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.movitrac_frames import ADDRESSES
+from nfo_sinus_driver.simulator.plc import TELEGRAM
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PtyPort
 from nfo_sinus_driver.simulator.ports import TcpPort
@@ -65,6 +67,7 @@ PROTOCOLS: Mapping[str, _Row] = {
     ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
     Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
     Movitrac.name: _Row(lambda _: Movitrac(), 'movitrac', 9600, '8N1', '8', ADDRESSES),
+    ThroughPlc.name: _Row(ThroughPlc, TELEGRAM, 19200, '8E1', '8'),
 }
 
 
@@ -98,6 +101,11 @@ class Endpoint:
         """Return the protocol; a gateway waits so long for a drive (s)."""
         return PROTOCOLS[self.protocol].make(gateway_timeout)
 
+    @property
+    def through_plc(self) -> bool:
+        """Whether a PLC stands between the line and the drives."""
+        return self.protocol == ThroughPlc.name
+
     def open(self) -> Port:
         """Return its port (PortError: it cannot be had)."""
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
@@ -123,7 +131,7 @@ def endpoint(
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
         raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
-    if protocol == ModbusTcp.name:
+    if not PROTOCOLS[protocol].make(0.0).serial:
         if link is not None:
             raise ValueError(f'{protocol} needs a TCP port, not a link')
         tcp = tcp or 0

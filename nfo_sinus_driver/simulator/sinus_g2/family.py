@@ -28,6 +28,7 @@ from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus_g2 import classic
+from nfo_sinus_driver.simulator.sinus_g2 import telegram1
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.firmware import DIALECTS
@@ -86,7 +87,7 @@ def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
     factory=FACTORY,
-    servers={'modbus': ModbusServer, 'classic': classic.Server},
+    servers={'modbus': ModbusServer, 'classic': classic.Server, 'telegram1': telegram1.Server},
     options=(
         Option(
             'dialect',
