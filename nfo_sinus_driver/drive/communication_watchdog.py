@@ -95,6 +95,9 @@ class CommunicationWatchdog:
         inverter, model = self._inverter, self._inverter.model
         timeout, margin = inverter.sio_tot, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
+        method = inverter.settings.method_class
+        if method.watched_for:
+            return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=method.caution) if method.caution else None
         if not inverter.can_time_out:
             return Report(Cause.NO_OWN_TIMEOUT)
         name = model[model.key(Role.COMMUNICATION_TIMEOUT)].name

@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import LAST_BLOCK
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link.interface import BAUD_RATES
@@ -158,6 +159,14 @@ DRIVE_SETTINGS = (
         "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone",
         0,
         247,
+    ),
+    Setting(
+        'block_address',
+        0,
+        'With control_method telegram1: the first of the registers that the PLC shows for this '
+        'drive',
+        0,
+        LAST_BLOCK,
     ),
     Setting(
         'model',
