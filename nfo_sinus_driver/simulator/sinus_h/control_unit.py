@@ -36,10 +36,9 @@ from nfo_sinus_driver.simulator.sinus_h.state_machine import State
 from nfo_sinus_driver.simulator.sinus_h.state_machine import StateMachine
 from nfo_sinus_driver.simulator.sinus_h.state_machine import Status
 from nfo_sinus_driver.simulator.sinus_h.state_machine import Stop
+from nfo_sinus_driver.simulator.sinus_h.trips import LOST_COMMAND
 from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
 
-#: "Lost Command", of the trip names [M3 §9].
-LOST_COMMAND = 35
 #: How bits 1 and 2 of the status word are read [C63].
 STATE, WORD = 'state', 'word'
 #: What STOP at the keypad does while the fieldbus commands: no manual says.
@@ -139,7 +138,8 @@ class SinusHControlUnit(ControlUnit):
         status |= _if(self.word & Control.NO_QUICK_STOP, Status.NO_QUICK_STOP)
         status |= _if(self.word & Control.CONTROL_BY_PLC, Status.CONTROL_REQUESTED)
         status |= _if(self.faults, Status.FAULT)
-        status |= _if(self._lost is not Lost.NOTHING or self.motor.limited, Status.WARNING)
+        lost = self._lost is not Lost.NOTHING
+        status |= _if(lost or self.motor.limited or self.faults.alarms, Status.WARNING)
         return status | _if(self._runs and self.motor.reached, Status.SPEED_REACHED)
 
     @property

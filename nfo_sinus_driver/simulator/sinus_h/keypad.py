@@ -32,6 +32,7 @@ from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.parameter import Address
+from nfo_sinus_driver.simulator.sinus_h.trips import TRIPS
 
 _KEYPAD = 'keypad'
 _HUNDREDTH = Fraction(1, 100)
@@ -120,9 +121,10 @@ def _settings() -> Iterator[Parameter]:
 
 
 def with_keypad(model: Family) -> Family:
-    """Return the tables of the family with the settings at its keypad."""
+    """Return the tables of the family with the settings and the trips that its keypad shows."""
     own = {setting.key: setting for setting in _settings()}
-    return replace(model, parameters={**model, **own})
+    codes = {**model.status_codes, **TRIPS}
+    return replace(model, parameters={**model, **own}, status_codes=codes)
 
 
 def _choice(
