@@ -47,24 +47,36 @@ class Exchange:
 def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) -> Iterator[Exchange]:
     """Return what was written to a block, from the frames of a trace on Modbus TCP."""
     zsw1, flags = None, 0
-    reads: dict[bytes, bool] = {}
+    #: What is on its way: whether the block is read, and what is written.
+    asked: dict[bytes, tuple[bool, Exchange | None]] = {}
     for frame in frames:
         data = bytes.fromhex(frame['hex'])
         if len(data) < 8 or data[6] != unit:
             continue
-        function = data[7]
+        number, function = data[:2], data[7]
         if frame['direction'] == 'request':
+            # of what was not answered nobody knows
+            for _, unanswered in asked.values():
+                if unanswered is not None:
+                    yield unanswered
             words = struct.unpack_from('>HH', data, 8) if function in (3, 16, 23) else ()
-            reads[data[:2]] = function in (3, 23) and words == (start, 5)
-            if function == 23 and struct.unpack_from('>HH', data, 12) == (start + 8, 3):
-                yield Exchange(*struct.unpack_from('>3H', data, 17), zsw1, flags)
-            elif function == 16 and words == (start + 8, 3):
-                yield Exchange(*struct.unpack_from('>3H', data, 13), zsw1, flags)
-            else:
-                assert function in (3, 23, 43, 17), f'function {function} at a block'
-        elif reads.pop(data[:2], False) and function in (3, 23):
-            zsw1, _, _, flags, version = struct.unpack_from('>5H', data, 9)
-            assert version == 1
+            at = {
+                23: 17 if function == 23 and struct.unpack_from('>HH', data, 12) == (start + 8, 3)
+                else 0,
+                16: 13 if words == (start + 8, 3) else 0,
+            }.get(function, 0)
+            assert at or function in (3, 43, 17), f'function {function} at a block'
+            written = Exchange(*struct.unpack_from('>3H', data, at), zsw1, flags) if at else None
+            asked = {number: (function in (3, 23) and words == (start, 5), written)}
+        elif number in asked:
+            reads, written = asked.pop(number)
+            if function & 0x80:
+                continue
+            if written is not None:
+                yield written
+            if reads:
+                zsw1, _, _, flags, version = struct.unpack_from('>5H', data, 9)
+                assert version == 1
 
 
 class Judge:
