@@ -82,6 +82,8 @@ class SinusHControlUnit(ControlUnit):
     word: Control
     setpoint: float
     machine: StateMachine
+    #: The last word that was not ignored [C107].
+    _obeyed: Control
     _lost: Lost
     _held: float
     _keypad_runs: bool
@@ -120,9 +122,10 @@ class SinusHControlUnit(ControlUnit):
         rises = word & ~self.word
         self.word = word
         self.setpoint = (setpoint & 0xFFFF) / 100
-        by_plc = bool(word & Control.CONTROL_BY_PLC)
-        if by_plc and rises & Control.FAULT_ACKNOWLEDGE:
-            self.faults.acknowledge()
+        if word & Control.CONTROL_BY_PLC:
+            self._obeyed = word
+            if rises & Control.FAULT_ACKNOWLEDGE:
+                self.faults.acknowledge()
         self.machine.update(word, inhibited=bool(self.faults))
         self.settle()
 
@@ -165,7 +168,7 @@ class SinusHControlUnit(ControlUnit):
     def restart(self) -> None:
         """Begin as after power-on."""
         self.initialised = False
-        self.word = Control(0)
+        self.word = self._obeyed = Control(0)
         self.setpoint = 0.0
         self.machine = StateMachine(self._unlisted)
         self.fieldbus.forget()
@@ -269,9 +272,10 @@ class SinusHControlUnit(ControlUnit):
         if self._number(keypad.FREQ_REF_SRC) == keypad.FIELDBUS_REFERENCE:
             reference = self.setpoint
         if self._commanded:
-            if not self.word & Control.ENABLE_RAMP or not self.word & Control.ENABLE_SETPOINT:
+            word = self._obeyed
+            if not word & Control.ENABLE_RAMP or not word & Control.ENABLE_SETPOINT:
                 reference = 0.0
-            elif not self.word & Control.UNFREEZE_RAMP:
+            elif not word & Control.UNFREEZE_RAMP:
                 reference = self.motor.ramp
         return min(reference, self.memory.number(keypad.MAX_FREQ))
 
