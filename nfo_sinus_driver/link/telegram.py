@@ -49,23 +49,23 @@ from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 _T = TypeVar('_T')
 
-#: How parameters are addressed that stand in a block; the index is where the block begins.
+#: How parameters are addressed that stand in a block, and their space; the index is where the block
+#: begins, and the sub-index which part of it is meant, as follows.
 ADDRESSING = 'telegram1'
 #: To be read: ZSW1, and in the higher word what the PLC says of it, bit 0: valid, 1: released.
-STATUS = 'telegram1.status'
+STATUS = 0
 #: The actual value.
-ACTUAL = 'telegram1.actual'
+ACTUAL = 1
 #: To be written: STW1 and the set-point, by which no motor is let run. It is written whatever was
 #: before.
-BEGIN = 'telegram1.begin'
+BEGIN = 2
 #: The same, by which one may run: it goes on from the words before, and is refused after a gap.
-NEXT = 'telegram1.next'
+NEXT = 3
 #: Which bits of the STW1 that stands are to be cleared, so that no motor is let run, and the
 #: set-point with them; refused where none stands.
-CLEAR = 'telegram1.clear'
+CLEAR = 4
 #: The set-point alone; refused where no STW1 stands.
-SETPOINT = 'telegram1.setpoint'
-SPACES = frozenset((STATUS, ACTUAL, BEGIN, NEXT, CLEAR, SETPOINT))
+SETPOINT = 5
 
 #: Without a new count from us for so long the PLC stops the drive, s.
 PLC_TIME = 1.0
@@ -150,14 +150,14 @@ class Block:
                 f'unit {self._unit} is 0): check the fieldbus between them and that the drive has '
                 'power'
             )
-        return struct.pack('>HH', word, flags) if address.space == STATUS else _word(actual)
+        return struct.pack('>HH', word, flags) if address.sub_index == STATUS else _word(actual)
 
     def _exchange(self, write: _Written | None = None) -> _Told:
         """Carry out a transaction; return the five registers, and since when they were seen."""
         began = time.monotonic()
         if self._live and began - self._sent_at > PLC_TIME:
             self._command, self._live = None, False
-            if write is None or write[0].space != BEGIN:
+            if write is None or write[0].sub_index != BEGIN:
                 raise self._interrupted(began - self._sent_at, maybe_done=False)
         if write is None and self._command is None:
             return self._look()
@@ -192,17 +192,18 @@ class Block:
         if write is None:
             assert self._command is not None
             return self._command, self._live
-        (space, *_), data = write
-        if space in (BEGIN, NEXT) and (space == BEGIN or self._command is not None):
+        address, data = write
+        part = address.sub_index
+        if part == BEGIN or (part == NEXT and self._command is not None):
             word, setpoint = struct.unpack('>HH', data)
-            return (word, setpoint), space == NEXT
+            return (word, setpoint), part == NEXT
         if self._command is None:
             raise Refused(Refused.DEVICE_FAILURE, _NOTHING_STANDS)
         word, _ = self._command
         value = int.from_bytes(data, 'big')
-        if space == CLEAR:
+        if part == CLEAR:
             return (word & ~value, 0), False
-        assert space == SETPOINT, space
+        assert part == SETPOINT, part
         return (word, value), self._live
 
     def _look(self) -> _Told:

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field
+import itertools
 import struct
 from types import SimpleNamespace
 from typing import Any
@@ -42,12 +43,12 @@ from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 START = 100
-STATUS = Address(telegram.STATUS, START, None, 4)
-ACTUAL = Address(telegram.ACTUAL, START, None, 2)
-BEGIN = Address(telegram.BEGIN, START, None, 4)
-NEXT = Address(telegram.NEXT, START, None, 4)
-CLEAR = Address(telegram.CLEAR, START, None, 2)
-SETPOINT = Address(telegram.SETPOINT, START, None, 2)
+STATUS = Address('telegram1', START, telegram.STATUS, 4)
+ACTUAL = Address('telegram1', START, telegram.ACTUAL, 2)
+BEGIN = Address('telegram1', START, telegram.BEGIN, 4)
+NEXT = Address('telegram1', START, telegram.NEXT, 4)
+CLEAR = Address('telegram1', START, telegram.CLEAR, 2)
+SETPOINT = Address('telegram1', START, telegram.SETPOINT, 2)
 READY, RUN = 0x0408, 0x0409
 
 
@@ -137,7 +138,7 @@ def test_our_count_moves_with_each(plc: Plc, block: telegram.Block) -> None:
     for _ in range(20):
         block.read(STATUS)
     counts = [written[3] for written in plc.written]
-    assert all(one != other for one, other in zip(counts, counts[1:], strict=False))
+    assert all(one != other for one, other in itertools.pairwise(counts))
 
 
 def test_a_stop_is_one_telegram(plc: Plc, block: telegram.Block) -> None:
