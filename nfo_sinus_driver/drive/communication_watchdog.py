@@ -97,7 +97,8 @@ class CommunicationWatchdog:
         least = inverter.settings.lost_after + margin
         method = inverter.settings.method_class
         if method.watched_for:
-            return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=method.caution) if method.caution else None
+            caution = method.caution
+            return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if not inverter.can_time_out:
             return Report(Cause.NO_OWN_TIMEOUT)
         name = model[model.key(Role.COMMUNICATION_TIMEOUT)].name

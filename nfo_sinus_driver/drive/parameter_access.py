@@ -48,7 +48,7 @@ class ParameterAccess:
     The parameters of one drive, for coroutines on the bus.
 
     :param addressing: how they are addressed; ``''``: as the line does.
-    :param block_address: where the block of registers begins that they stand in, with a PLC between.
+    :param block_address: where the block of registers begins that they stand in, behind a PLC.
     :param retries: how often a request that nobody answered is sent again, where ``once`` is false.
     :raises LinkError: reading or writing fails, as the link does.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.

@@ -49,7 +49,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
     Cause.OLD_DATA: 'the data from the drive stand still in the PLC since {age:.1f} s (its life '
-    'counter does not change): check the fieldbus between them, and that the program of the PLC runs',
+    'counter does not change): check the fieldbus between them and that the program of the PLC '
+    'runs',
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
     Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
     Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
@@ -147,8 +148,8 @@ TEMPLATES: Mapping[Cause, str] = {
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
     f'switched off and on, or somebody used its keypad: check its mains; {_GO_ON}',
-    Cause.CONTROL_WITHHELD: 'the PLC has taken the release to ROS back ({status}): give it in the PLC, '
-    f'{_GO_ON}',
+    Cause.CONTROL_WITHHELD: 'the PLC has taken the release to ROS back ({status}): give it in the '
+    f'PLC, {_GO_ON}',
     Cause.RUNS_UNASKED: 'it runs under bus control although nobody enabled it: find out whether '
     'another master commands it',
     Cause.FOUND_RUNNING: 'the motor runs under bus control, started by an earlier session '
@@ -194,8 +195,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.OWN_TIMEOUT_STOPS_NOTHING: _NO_TIMEOUT.format(
         why='{name} is OFF', remedy='{call.set_drive_timeout}'
     ),
-    Cause.OWN_TIMEOUT_UNKNOWN: 'the PLC stops the motor if this {call.program} dies; what the drive '
-    'does if the PLC does, nobody here can read: {what}',
+    Cause.OWN_TIMEOUT_UNKNOWN: 'the PLC stops the motor if this {call.program} dies; what the '
+    'drive does if the PLC does, nobody here can read: {what}',
     Cause.OWN_TIMEOUT_SHORT: 'the time-out of the drive itself ({name} {timeout:g} s) is less than '
     'lost_after + {margin:g} s: noise that this {call.program} waits out may stop the '
     'motor; {call.set_drive_timeout}, at least {least:g} s',

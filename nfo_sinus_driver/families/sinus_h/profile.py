@@ -52,8 +52,8 @@ class HTelegram1(Telegram1):
 
     coasts = True
     caution = (
-        'at its keypad set PRT-12 Lost Cmd Mode to Free-Run or Dec (from the factory it is None, and '
-        'the motor runs on), and PRT-13 to the time after which it does that'
+        'at its keypad set PRT-12 Lost Cmd Mode to Free-Run or Dec (from the factory it is None, '
+        'and the motor runs on), and PRT-13 to the time after which it does that'
     )
     ready = int(_OFF)
     runs = int(Control.ENABLE_OPERATION)
