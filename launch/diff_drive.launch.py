@@ -21,15 +21,28 @@ What it needs beside this package, and what the files of the folder mean: docs/r
 No motor turns before the drives are enabled.
 """
 
+from ament_index_python.packages import get_package_prefix
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import IncludeLaunchDescription
+from launch.actions import OpaqueFunction
 from launch.substitutions import FileContent
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+
+from nfo_sinus_driver.launch_arguments import require_packages
+
+#: What is started here, and what it is for.
+NEEDED = {
+    'robot_state_publisher': 'the frames of the robot',
+    'controller_manager': 'ros2_control',
+    'diff_drive_controller': 'the velocities of the wheels',
+    'joint_state_broadcaster': 'the positions of the wheels',
+    'joint_state_topic_hardware_interface': 'the way from ros2_control to the drives',
+}
 
 
 def generate_launch_description():
@@ -79,9 +92,16 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'port', default_value='', description='serial port; empty: as drives.yaml says'
             ),
+            # before the driver: a launch that fails half-way would leave half a robot
+            OpaqueFunction(function=_require_packages),
             driver,
             robot_state_publisher,
             controller_manager,
             spawner,
         ]
     )
+
+
+def _require_packages(context):
+    """Refuse to start anything where a package is missing."""
+    require_packages(NEEDED, get_package_prefix)

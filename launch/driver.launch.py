@@ -24,20 +24,26 @@ The node action has no ``name=``: it would rename every node of the process, and
 several, the bus node and one for each drive. The drives are named by the parameter ``drives`` of
 ``nfo_sinus_bus`` instead.
 
+The driver ends, with its motors stopped, when this launch is gone, however that happened.
+
 The driver is not respawned. When it ended, somebody ended it or something is wrong that a person
 should look at; and a new one lets no motor turn before it is enabled anyway.
 """
 
 import json
+import os
+from pathlib import Path
 import tempfile
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import OpaqueFunction
 from launch.substitutions import LaunchConfiguration
-from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
+
+from nfo_sinus_driver.launch_arguments import number
+from nfo_sinus_driver.launch_arguments import parameter_file
 
 #: Launch arguments that overrule a parameter of the same name in the parameter file: for which
 #: nodes, and what it is.
@@ -53,7 +59,6 @@ OVERRIDES = {
 
 def generate_launch_description():
     """Return the launch description."""
-    single = PathJoinSubstitution([FindPackageShare('nfo_sinus_driver'), 'config', 'single.yaml'])
     declare = DeclareLaunchArgument
     overrides = [
         declare(name, default_value='', description=f'{what}; empty: as the parameter file says')
@@ -61,7 +66,11 @@ def generate_launch_description():
     ]
     return LaunchDescription(
         [
-            declare('params_file', default_value=single, description='parameter file'),
+            declare(
+                'params_file',
+                default_value='single.yaml',
+                description='parameter file: a path, or the name of one in config/',
+            ),
             declare('namespace', default_value='', description='namespace of all nodes'),
             *overrides,
             declare('log_level', default_value='info', description='debug, info, warn or error'),
@@ -78,13 +87,23 @@ def generate_launch_description():
 
 def _start_driver(context):
     """Return the driver, with the overrides that were given."""
-    exit_timeout = LaunchConfiguration('exit_timeout')
+
+    def given(name):
+        return LaunchConfiguration(name).perform(context)
+
+    # all of it before the driver is started
+    exit_timeout = str(number('exit_timeout', given('exit_timeout')))
+    share = FindPackageShare('nfo_sinus_driver').perform(context)
+    params_file = parameter_file(given('params_file'), Path(share) / 'config')
+    overrides = _overrides(context)
     return [
         Node(
             package='nfo_sinus_driver',
             executable='driver',
             namespace=LaunchConfiguration('namespace'),
-            parameters=[LaunchConfiguration('params_file'), *_overrides(context)],
+            # a launch that fails or is killed leaves nobody to stop the motors
+            arguments=['--end-with', str(os.getpid())],
+            parameters=[params_file, *overrides],
             ros_arguments=['--log-level', LaunchConfiguration('log_level')],
             output='screen',
             respawn=False,
@@ -102,7 +121,8 @@ def _overrides(context):
         given = LaunchConfiguration(name).perform(context)
         if given:
             section = sections.setdefault(nodes, {'ros__parameters': {}})
-            section['ros__parameters'][name] = type_(given)
+            value = number(name, given, whole=True) if type_ is int else given
+            section['ros__parameters'][name] = value
     if not sections:
         return []
     # not a dictionary: launch_ros puts that under '/**', which a section for the bus node in the

@@ -25,12 +25,14 @@ The driver needs not wait for the simulated drive: it tries the port until it is
 the drive has to outlast the driver, which stops the motor first; see below.
 """
 
+import os
 import signal
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import EmitEvent
 from launch.actions import ExecuteProcess
+from launch.actions import OpaqueFunction
 from launch.actions import RegisterEventHandler
 from launch.actions import Shutdown
 from launch.event_handlers import OnProcessExit
@@ -39,6 +41,8 @@ from launch.events.process import SignalProcess
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import ExecutableInPackage
+
+from nfo_sinus_driver.launch_arguments import number
 
 _EXIT_TIMEOUT = '15'
 #: Runs a command that Ctrl-C does not end, whether terminal or launch pass it on; SIGTERM does.
@@ -80,6 +84,8 @@ def generate_launch_description():
         package='nfo_sinus_driver',
         executable='driver',
         namespace=LaunchConfiguration('namespace'),
+        # a launch that fails or is killed leaves nobody to stop the motor
+        arguments=['--end-with', str(os.getpid())],
         parameters=[
             {
                 'port': link,
@@ -117,8 +123,14 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'namespace', default_value='', description='namespace of all nodes'
             ),
+            OpaqueFunction(function=_require_numbers),
             simulator,
             driver,
             RegisterEventHandler(OnProcessExit(target_action=driver, on_exit=[end_simulator])),
         ]
     )
+
+
+def _require_numbers(context):
+    """Refuse what is no number before anything is started."""
+    number('baud_rate', LaunchConfiguration('baud_rate').perform(context), whole=True)

@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which signals end a process that drives motors, which it must not obey, and how it gets them."""
+"""
+What ends a process that drives motors: which signals, which it must not obey, how it gets them; and
+the end of the process that it was started by.
+"""
 
 from __future__ import annotations
 
@@ -131,3 +134,38 @@ def _put_back(number: int, handler: signal._HANDLER) -> None:
     # one that does not come from Python cannot be
     if handler is not None:
         signal.signal(number, handler)
+
+
+class OtherProcess:
+    """
+    A process that is somebody else's, such as the one that started this one.
+
+    :raises ProcessLookupError: there is none of that number.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        os.kill(pid, 0)
+        try:
+            # its number may be given to another one later
+            self._descriptor: int | None = os.pidfd_open(pid)
+        except ProcessLookupError:
+            raise
+        except OSError:
+            # some containers forbid it
+            self._descriptor = None
+
+    @property
+    def ended(self) -> bool:
+        """It has ended, waited for by its parent or not."""
+        if self._descriptor is not None:
+            readable, _, _ = select.select([self._descriptor], [], [], 0)
+            return bool(readable)
+        try:
+            os.kill(self.pid, 0)
+        except ProcessLookupError:
+            return True
+        except PermissionError:
+            # it is there, as somebody else's
+            pass
+        return False

@@ -36,6 +36,7 @@ from nfo_sinus_driver.link import Inquiry
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Watch
 
 _log = logging.getLogger(__name__)
 
@@ -124,6 +125,27 @@ async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identifica
         except LinkError as error:
             _log.debug('unit %d does not say who it is: %s', unit, error)
     return inquiry.found
+
+
+async def set_up(unit: int, watch: Watch, priority: Priority, tries: int) -> str:
+    """
+    Have a unit watch over this end, each step a transaction; return by what it does.
+
+    :param tries: how often a step is tried that nobody answers: each may be done again.
+    """
+    left = tries
+    while not watch.done:
+        try:
+            await Transfer(unit, _NOWHERE, priority, send=watch.step)
+        except PortError:
+            raise
+        except LinkError:
+            left -= 1
+            if left <= 0:
+                raise
+        else:
+            left = tries
+    return watch.means
 
 
 @dataclass(eq=False, slots=True)

@@ -28,7 +28,9 @@ from collections import deque
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
+from collections.abc import Iterator
 from concurrent.futures import Future
+import contextlib
 import ctypes
 import functools
 import logging
@@ -53,6 +55,7 @@ from nfo_sinus_driver.bus.tasks import Transfer
 from nfo_sinus_driver.bus.tasks import consistent_read
 from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
+from nfo_sinus_driver.bus.tasks import set_up
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LineProtocol
@@ -97,7 +100,12 @@ class Bus:
         self.recorder = Recorder()
         #: How many coroutines read parameters again and again; they share the time for it.
         self.refreshing = 0
+        #: The units whose settings are read for the first time, and those for which that was begun.
+        self._being_introduced: set[int] = set()
+        self._introduced: set[int] = set()
         self._current: Task | None = None
+        #: Who is told that a unit has started anew.
+        self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
 
     # --- for every thread ---------------------------------------------------------------------
@@ -141,6 +149,11 @@ class Bus:
         return self._link.protocol
 
     @property
+    def supervised(self) -> bool:
+        """More lives on this line than questions and answers; see :meth:`watch`."""
+        return self._link.supervision is not None
+
+    @property
     def alive(self) -> bool:
         """The worker works."""
         return self._thread.is_alive()
@@ -157,6 +170,10 @@ class Bus:
     def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
         """Tell the link which parameters of a unit it may read to find out if it hears it."""
         self.call(lambda: self._link.use_resync_reads(unit, addresses))
+
+    def on_restart(self, unit: int, tell: Callable[[], None]) -> None:
+        """Have a function called, on the worker, when a unit says that it has started anew."""
+        self._on_restart[unit] = tell
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
@@ -209,6 +226,18 @@ class Bus:
         """Ask a unit who it is, nothing twice; what it does not say stays empty."""
         return inquire(unit, self._link.identify(unit), priority)
 
+    async def watch(self, unit: int, seconds: float, priority: Priority, tries: int) -> str:
+        """
+        Have a unit notice a silence of so long, s, by what lives on the line; 0: nothing any more.
+
+        :param tries: how often each step is tried.
+        :returns: by what it notices; ``''`` if it has nothing for it, or nothing is to be noticed.
+        """
+        supervision = self._link.supervision
+        return '' if supervision is None else await set_up(
+            unit, supervision.watch(unit, seconds), priority, tries
+        )
+
     def sleep(self, seconds: float) -> Pause:
         """Let time pass (to be awaited)."""
         return Pause(time.monotonic() + seconds)
@@ -255,6 +284,23 @@ class Bus:
         if task is not None and task.asleep:
             self._end_pause(task)
 
+    @contextlib.contextmanager
+    def introducing(self, unit: int) -> Iterator[None]:
+        """Have units that only stand leave the line to this one, if it is read the first time."""
+        first = unit not in self._introduced
+        self._introduced.add(unit)
+        if first:
+            self._being_introduced.add(unit)
+        try:
+            yield
+        finally:
+            if first:
+                self._being_introduced.discard(unit)
+
+    def introduces_another(self, unit: int) -> bool:
+        """Tell whether any other unit is read for the first time just now."""
+        return bool(self._being_introduced - {unit})
+
     # --- the worker ---------------------------------------------------------------------------
 
     def _enter(self, item: Task | LatestValue | Callable[[], None]) -> None:
@@ -292,13 +338,33 @@ class Bus:
         self._ring_timers()
         if not self._port.is_open:
             self._open_when_due()
+        supervised_at = self._supervise() if self._port.is_open else math.inf
         if not self._port.is_open:
             self._fail_all(self._port.error)
             return min(self._sleepers.next_moment, self._port.reopen_at)
         if self._send_next():
             return -math.inf
         missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
-        return min(self._sleepers.next_moment, missing_from)
+        return min(self._sleepers.next_moment, missing_from, supervised_at)
+
+    def _supervise(self) -> float:
+        """Serve what lives on the line beside questions; return when that is due again, s."""
+        supervision = self._link.supervision
+        if supervision is None:
+            return math.inf
+        now = time.monotonic()
+        if now >= supervision.due:
+            try:
+                supervision.serve()
+            except PortError as error:
+                self._port.mark_lost(error, now + REOPEN_PERIOD)
+        for unit in supervision.take_restarted():
+            try:
+                self._on_restart.get(unit, lambda: None)()
+            except Exception:
+                # the other drives of the line have to be told all the same
+                _log.exception('a restart could not be told; the bus worker goes on')
+        return supervision.due
 
     def _take_in(self) -> None:
         while self._inbox:

@@ -22,6 +22,7 @@ from nfo_sinus_driver.catalog.codec import to_bytes
 from nfo_sinus_driver.catalog.codec import to_words
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
+from nfo_sinus_driver.catalog.family import example_setting
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.family import load_profile
@@ -79,6 +80,7 @@ __all__ = [
     'Text',
     'Value',
     'codec_of',
+    'example_setting',
     'families',
     'load_family',
     'load_profile',

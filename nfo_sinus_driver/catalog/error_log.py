@@ -44,6 +44,7 @@ class ErrorLogArea:
     :ivar stride: from an entry to the next older one.
     :ivar entries: how many every drive has.
     :ivar limit: how many some drives have; beyond ``entries`` stop at code 0 or a refusal [C4].
+    :ivar elsewhere: where the newest entry stands if there is none at ``first``; ``None``: nowhere.
     :ivar codec: how the bytes of an entry are read.
     :ivar factor: of entries that are a code alone: the code of one raw count.
     :ivar above: of those, too: what status codes of faults begin above; ``None``: they have a time.
@@ -61,6 +62,7 @@ class ErrorLogArea:
     factor: Fraction = Fraction(1)
     above: int | None = None
     readings: tuple[tuple[str, str], ...] = ()
+    elsewhere: int | None = None
 
     @property
     def timed(self) -> bool:

@@ -30,6 +30,7 @@ import re
 
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.family import Family
+from nfo_sinus_driver.catalog.family import example_setting
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
 from nfo_sinus_driver.catalog.family import usual_family
@@ -57,8 +58,8 @@ parameters of its node, and what it measures and is controlled by, which are
 [topics](interface.md#topics) and [services](interface.md#services).
 
     ros2 param list /nfo_sinus
-    ros2 param describe /nfo_sinus control.accel
-    ros2 param set /nfo_sinus control.accel 5.0
+    ros2 param describe /nfo_sinus {setting}
+    ros2 param set /nfo_sinus {setting} {value}
 
 How to read the tables:
 
@@ -118,9 +119,10 @@ def page() -> str:
     """Return the whole page in Markdown."""
     # the usual one first, so that who looks for it finds it there
     names = sorted(families(), key=lambda name: name != usual_family())
+    setting, value = example_setting()
     taken: list[str] = []
     parts = [part for name in names for part in _family(load_family(name), taken)]
-    return '\n'.join([_INTRODUCTION, *parts])
+    return '\n'.join([_INTRODUCTION.format(setting=setting, value=value), *parts])
 
 
 def _family(family: Family, taken: list[str]) -> Iterator[str]:

@@ -91,9 +91,10 @@ class Address:
         return (self.index,) if self.sub_index is None else (self.index, self.sub_index)
 
     @property
-    def place(self) -> tuple[str, int, int | None, int]:
-        """What a link is told: space, index, sub-index and size in bytes."""
-        return self.space, self.index, self.sub_index, self.codec.size
+    def place(self) -> tuple[str, int, int | None, int, bool | None]:
+        """What a link is told: space, index, sub-index, size in bytes, whether it has a sign."""
+        signed = self.codec.signed if isinstance(self.codec, Number) else None
+        return self.space, self.index, self.sub_index, self.codec.size, signed
 
     @property
     def occupied(self) -> Sequence[tuple[int, ...]]:

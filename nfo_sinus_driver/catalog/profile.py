@@ -178,17 +178,31 @@ class SetpointTarget:
     :ivar most: the greatest set-point in either direction, in the unit of the control mode.
     :ivar at: the parameter in whose place it is written, as for :class:`Write`.
     :ivar forward_only: the drive takes none below 0.
+    :ivar nominal: what the motor is made for, in the same unit: the parameter that tells it, or the
+        value itself; infinite where nothing tells it.
     """
 
     key: str
     most: float
     at: str = ''
     forward_only: bool = False
+    nominal: str | float = math.inf
 
     @property
     def least(self) -> float:
         """The least set-point: the greatest one in reverse, or 0."""
         return 0.0 if self.forward_only else -self.most
+
+    def read_nominal(self, has: Callable[[str], bool]) -> Steps[float]:
+        """
+        Find out what the motor is made for, in the unit of the control mode; it only reads.
+
+        :param has: tells whether the drive has a parameter.
+        :returns: infinite where nothing tells it.
+        """
+        if isinstance(self.nominal, float):
+            return self.nominal
+        return float((yield Read(self.nominal))) if has(self.nominal) else math.inf
 
     def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
         """
@@ -403,6 +417,8 @@ class Profile:
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
+    :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
+        the protocol over which that is so.
     """
 
     title: str
@@ -419,6 +435,7 @@ class Profile:
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
+    holds_control: Mapping[str, str] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

@@ -229,6 +229,8 @@ class Role(enum.Enum):
     STATUS_WORD = 'status_word'
     #: Who controls the drive.
     CONTROL_SOURCE = 'control_source'
+    #: Whether keypad or terminals command, whatever the control source says.
+    LOCAL_OPERATION = 'local_operation'
     FIRMWARE = 'firmware'
     MOTOR_FIRMWARE = 'motor_firmware'
 

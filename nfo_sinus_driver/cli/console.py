@@ -135,6 +135,7 @@ _CALLS = Calls(
     program='command',
     drive_timeout='--drive-timeout',
     set_drive_timeout='give --drive-timeout',
+    set_setpoint_max='give --setpoint-max',
     set_control_mode='give another --control-mode',
     set_model='give the right --model',
 )

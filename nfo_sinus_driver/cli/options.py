@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import math
 import shlex
 
+from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
@@ -28,8 +29,8 @@ from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
 DEFAULTS = {
@@ -95,28 +96,29 @@ def _common() -> argparse.ArgumentParser:
     add = group.add_argument
     # the line of a gateway is set in the gateway
     lines = [protocol for protocol in PROTOCOLS.values() if protocol.char_formats]
-    rates = [f'{protocol.name} {protocol.baud_rate}' for protocol in lines]
+    buses = [protocol for protocol in PROTOCOLS.values() if protocol.rates_disturb]
+    rates = [f'{protocol.name} {protocol.baud_rate}' for protocol in (*lines, *buses)]
     formats = [f'{protocol.name} {protocol.char_format}' for protocol in lines]
     add(
         '--port',
         help='a device path, or a URL such as socket://host:port; for modbus_tcp host:port of the '
-        'gateway (default: /dev/ttyUSB0)',
+        'gateway; for canopen a CAN interface such as can0, too (default: /dev/ttyUSB0)',
     )
     add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu')
     add(
         '--address',
         type=_address,
         metavar='N',
-        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone; movitrac: 0 to 63 '
-        '(default: 1)',
+        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone; movitrac: 0 to 63; '
+        'canopen: node id, 1 to 127 (default: 1)',
     )
     add('--model', choices=families(), help=f'default: {usual_family()}')
     add(
         '--baud-rate',
         type=int,
-        choices=(0, *BAUD_RATES),
+        choices=(0, *BIT_RATES),
         metavar='RATE',
-        help=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)} '
+        help=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as the protocol has it '
         f'(default: 0, the one of the factory: {", ".join(rates)})',
     )
     add(
@@ -163,10 +165,12 @@ def _parser() -> argparse.ArgumentParser:
         type=_addresses,
         default=(),
         metavar='LIST',
-        help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63)',
+        help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63; canopen: 1-127)',
     )
     scan.add_argument(
-        '--all-settings', action='store_true', help='try every baud rate and parity; takes long'
+        '--all-settings',
+        action='store_true',
+        help='try every baud rate and parity; takes long; not for canopen',
     )
     scan.add_argument(
         '--params',
@@ -182,11 +186,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar='GROUP',
         help='only this one, such as Motor; Status are the measured values',
     )
+    setting, value = example_setting()
     get = verb('get', 'show some parameters', json=True)
-    get.add_argument('names', nargs='+', metavar='NAME', help='such as control.accel')
+    get.add_argument('names', nargs='+', metavar='NAME', help=f'such as {setting}')
     set_ = verb('set', 'change parameters, all of them or none', json=True)
     set_.add_argument(
-        'changes', nargs='+', type=_change, metavar='NAME=VALUE', help='such as control.accel=5'
+        'changes',
+        nargs='+',
+        type=_change,
+        metavar='NAME=VALUE',
+        help=f'such as {setting}={value:g}',
     )
     set_.add_argument(_ALLOW, action='store_true', help='let parameters serial.* be changed')
     dump = verb('dump', 'save all settings of the drive')
@@ -286,6 +295,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         'this one (default: any; an Optimal: Freque)',
     )
     add(
+        '--setpoint-max',
+        type=_limit,
+        default=0.0,
+        metavar='VALUE',
+        help='the greatest SETPOINT that is meant to be one (default: what is nominal for the '
+        'motor, where the drive tells it)',
+    )
+    add(
         '--drive-timeout',
         type=float,
         default=0.0,
@@ -348,6 +365,13 @@ def _setpoint(text: str) -> float:
     if not math.isfinite(setpoint):
         raise argparse.ArgumentTypeError(f'{text} is no set-point')
     return setpoint
+
+
+def _limit(text: str) -> float:
+    limit = float(text)
+    if not 0 < limit <= 32767:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: more than 0')
+    return limit
 
 
 def _ride_seconds(text: str) -> float:

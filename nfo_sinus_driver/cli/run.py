@@ -42,6 +42,7 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive.commands import read_nominal
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1
@@ -81,6 +82,7 @@ class _Ride:
             reference=options.reference,
             expected_control_mode=options.control_mode,
             drive_timeout=options.drive_timeout,
+            setpoint_max=options.setpoint_max,
         )
         self._stopping = Stopping(control, self._drive, self._show)
         self._shown_at = -math.inf
@@ -137,11 +139,19 @@ class _Ride:
         target = remote.model.profile.setpoints.get(mode)
         if target is None:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
+        unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
         if not target.least <= options.setpoint <= target.most:
-            unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
             raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
                 f'in control mode {mode} {target.least:g} to {target.most:g} {unit}'
+            )
+        nominal = remote.do(lambda: read_nominal(remote.inverter, mode))
+        most = options.setpoint_max or nominal
+        if abs(options.setpoint) > most:
+            what = '--setpoint-max' if options.setpoint_max else 'what is nominal for this motor'
+            raise CliError(
+                f'set-point {options.setpoint:g} {unit} is beyond {what}, {most:g} {unit}: check '
+                f'the unit; if it is meant so, give --setpoint-max {abs(options.setpoint):g}'
             )
 
     def _start(self) -> None:

@@ -27,7 +27,10 @@ import json
 from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import listed
 from nfo_sinus_driver.cli.console import progress
 from nfo_sinus_driver.cli.console import put
@@ -51,11 +54,6 @@ _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
 #: The columns and their widths.
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
-_ADVICE = (
-    'no response: check in this order: BusType in the drives (MbusRtu; NFO is the factory '
-    'setting), jumper S5 (RS232 or RS485), baud rate and parity (--all-settings tries them all), '
-    'A and B of the wires'
-)
 
 
 def scan(options: argparse.Namespace) -> int:
@@ -76,7 +74,7 @@ def scan(options: argparse.Namespace) -> int:
             for _ in range(len(options.addresses) - len(asked)):
                 step()
             for address, facts in _who_answers(line, asked, step):
-                facts['line'] = f'{baud_rate} {char_format}' if baud_rate else 'gateway'
+                facts['line'] = f'{baud_rate} {char_format}'.rstrip() if baud_rate else 'gateway'
                 if not found and not options.json:
                     show(_row({name: name for name, _ in _COLUMNS}))
                 found[address] = facts
@@ -87,11 +85,11 @@ def scan(options: argparse.Namespace) -> int:
         drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
         show(json.dumps(drives, ensure_ascii=False, indent=2))
     if not found:
-        check = PROTOCOLS[options.protocol].check
-        raise CliError(
-            f'no response: check in this order: {check} (--all-settings tries all that the '
-            'protocol can have), A and B of the wires'
+        protocol = PROTOCOLS[options.protocol]
+        others = '' if protocol.rates_disturb else (
+            ' (--all-settings tries all that the protocol can have), A and B of the wires'
         )
+        raise CliError(f'no response: check in this order: {protocol.check}{others}')
     if options.params:
         _write_params(options, found, lines_of)
     return 0
@@ -105,10 +103,12 @@ def _write_params(
     """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
         told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
+        keys = {load_family(facts['model']).key(Role.BAUD_RATE) for facts in found.values()}
+        how = ', '.join(f'nfo-sinus set {key}=...' for key in sorted(keys - {''}))
         raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
-                'drives have several; set them alike (nfo-sinus set serial.si_baud=...)',
+                f'drives have several; set them alike ({how or "at the keypad"})',
                 told,
             )
         )
@@ -123,6 +123,13 @@ def _write_params(
 
 def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
     protocol = PROTOCOLS[options.protocol]
+    if protocol.rates_disturb:
+        if options.all_settings:
+            raise UsageError(
+                f'--all-settings: on {protocol.name} a wrong bit rate disturbs everybody else, so '
+                'none is tried; say --baud-rate'
+            )
+        return [(options.baud_rate or protocol.baud_rate, '')]
     if not protocol.char_formats:
         # the line is that of the gateway
         return [(0, '')]
@@ -222,7 +229,9 @@ def driver_params(
     names = {address: f'drive_{address}' for address in sorted(found)}
     line: dict[str, object] = {'port': options.port, 'protocol': options.protocol}
     if baud_rate:
-        line |= {'baud_rate': baud_rate, 'char_format': char_format}
+        line['baud_rate'] = baud_rate
+    if char_format:
+        line['char_format'] = char_format
     for name in _IF_OTHER:
         # a scan is content with less time than the driver should give
         if getattr(options, name) > DEFAULTS[name]:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 from collections.abc import Callable
+import math
 from typing import Any
 from typing import TypeVar
 
@@ -41,6 +42,7 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -98,6 +100,7 @@ async def carry_out(
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
+                registers.require_fitted(step.key)
                 brought = await registers.read(step.key, priority, once=step.once)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(step, registers, priority, tell)
@@ -114,6 +117,19 @@ async def carry_out(
         except Refused as error:
             refusal = Refusal(str(error))
             refusal.__cause__ = error
+
+
+async def read_nominal(inverter: DriveState, control_mode: str) -> float:
+    """
+    Read what the motor is made for, in the unit of a control mode.
+
+    :returns: infinite where the drive does not tell it, or takes no set-points in that mode.
+    """
+    target = inverter.model.profile.setpoints.get(control_mode)
+    if target is None:
+        return math.inf
+    steps = target.read_nominal(inverter.has)
+    return await carry_out(steps, inverter.registers, Priority.SERVICE)
 
 
 async def _store(
@@ -147,6 +163,8 @@ class Commands:
         method = inverter.model.profile.methods[inverter.settings.method]
         self._method = method(inverter.settings.reference, inverter.registers.reaches)
         self._registers = inverter.registers
+        #: Why the line has the bus keep control.
+        self._held = inverter.model.profile.holds_control.get(inverter.registers.protocol, '')
         self._tell = inverter.tell
         self._wait_until = inverter.wait_until
 
@@ -157,8 +175,17 @@ class Commands:
 
     @property
     def keeps_control(self) -> str:
-        """Why control stays with the bus at :meth:`release`; ``''`` where it does not."""
-        return self._method.keeps_control
+        """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
+        return self._method.keeps_control or self._held
+
+    async def kept(self) -> bool:
+        """Tell whether control has stayed with the bus; so it is where the drive does not tell."""
+        if not self._held:
+            return bool(self.keeps_control)
+        try:
+            return await self.in_control(Priority.SERVICE)
+        except LinkError:
+            return True
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""

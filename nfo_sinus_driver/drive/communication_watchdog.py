@@ -16,10 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
@@ -28,11 +31,15 @@ from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
+from nfo_sinus_driver.link import LinkError
 
 
 class CommunicationWatchdog:
     """
     SioTot with AutoStop of one drive [C91], or why not in a :class:`DriveError`; on the bus alone.
+
+    On a line on which something lives beside questions and answers, such as a heartbeat, the drive
+    watches over that, if it can.
 
     :param commanded: this driver may command the drive, and not only watch it.
     """
@@ -44,6 +51,9 @@ class CommunicationWatchdog:
         self._told: Report | None = None
         #: It could not be set yet.
         self._due = False
+        #: What this driver has changed: what was found before, and what it has set.
+        self._found: dict[str, Value] = {}
+        self._set: dict[str, Value] = {}
 
     async def prepare(self) -> None:
         """
@@ -74,14 +84,79 @@ class CommunicationWatchdog:
             raise DriveError(Cause.MONITOR_ONLY)
         if not seconds:
             return ()
-        if not self._inverter.can_time_out:
-            raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
-        key = self._inverter.model.key
-        wanted: dict[str, Value] = {key(Role.COMMUNICATION_TIMEOUT): seconds}
-        if key(Role.STOP_AT_TIMEOUT):
+        inverter = self._inverter
+        inverter.watched_by = await inverter.registers.watch(seconds, Priority.SERVICE)
+        inverter.watched_for = seconds if inverter.watched_by else 0.0
+        key = inverter.model.key
+        wanted: dict[str, Value] = {}
+        if not inverter.watched_by:
+            if not inverter.can_time_out:
+                raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
+            wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
+        if inverter.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
+        try:
+            changes = await self._change(wanted)
+        except DriveError as error:
+            faulted = inverter.seen is not None and inverter.seen.faulted
+            if faulted or not inverter.bus.supervised:
+                raise
+            # whether a drive has any means at all is nowhere written for such a line [C102]
+            inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
+            return ()
+        for change in changes:
+            self._found.setdefault(change.key, change.old)
+            self._set[change.key] = change.new
+        return changes
+
+    async def put_back(self) -> None:
+        """
+        Put back what was found, at a clean end after which the drive would go on watching.
+
+        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
+        if it will; nothing of that keeps the driver from ending.
+        """
+        inverter = self._inverter
+        await self._end_watch()
+        if not inverter.can_time_out:
+            return
+        try:
+            for key in reversed(self._found):
+                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                    await self._change({key: self._found[key]})
+            await inverter.read_timeout()
+        except (LinkError, DriveError) as error:
+            self._tell_left(explain_failure(error, inverter))
+        else:
+            if inverter.sio_tot and inverter.auto_stop:
+                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
+
+    async def _end_watch(self) -> None:
+        inverter = self._inverter
+        if not inverter.watched_by:
+            return
+        try:
+            await inverter.registers.watch(0.0, Priority.SERVICE)
+        except LinkError as error:
+            inverter.tell(
+                Severity.WARNING,
+                Cause.WATCH_LEFT,
+                why=explain_failure(error, inverter),
+                by=inverter.watched_by,
+                seconds=inverter.watched_for,
+            )
+        inverter.watched_by, inverter.watched_for = '', 0.0
+
+    async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
             wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
+        )
+
+    def _tell_left(self, why: Report) -> None:
+        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
+        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
+        self._inverter.tell(
+            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
         )
 
     def warn_if_unfit(self) -> None:
@@ -93,15 +168,19 @@ class CommunicationWatchdog:
 
     def _complaint(self) -> Report | None:
         inverter, model = self._inverter, self._inverter.model
-        timeout, margin = inverter.sio_tot, DRIVE_TIMEOUT_MARGIN
+        timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
+<<<<<<< HEAD
         method = inverter.settings.method_class
         if method.watched_for:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if not inverter.can_time_out:
+=======
+        if not inverter.can_time_out and not inverter.watched_by:
+>>>>>>> main
             return Report(Cause.NO_OWN_TIMEOUT)
-        name = model[model.key(Role.COMMUNICATION_TIMEOUT)].name
+        name = inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)
         if not inverter.auto_stop:

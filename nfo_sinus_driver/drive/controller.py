@@ -39,6 +39,7 @@ from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import COMMANDED
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.diagnosis import explain_fall
 from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.diagnosis import explain_stop
 from nfo_sinus_driver.drive.diagnosis import report_of
@@ -101,6 +102,8 @@ class Controller:
         self._sequence = StopSequence(inverter, method, self._happened)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
+        #: The status that was judged last.
+        self._judged: InverterStatus | None = None
         #: It was lost while it may have followed us.
         self._lost_in_use = False
 
@@ -254,8 +257,8 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            control_mode = await self._check()
-            await self._start(control_mode, prepare)
+            control_mode, nominal = await self._check()
+            await self._start(control_mode, nominal, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
@@ -265,8 +268,12 @@ class Controller:
         reference = self._inverter.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
-    async def _check(self) -> str:
-        """See to it that nothing keeps the motor from being started; return the control mode."""
+    async def _check(self) -> tuple[str, float]:
+        """
+        See to it that nothing keeps the motor from being started.
+
+        :returns: the control mode, and the nominal value of what it is about.
+        """
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
@@ -275,14 +282,16 @@ class Controller:
             self._happened(ControlEvent.REFUSED)
             raise DriveError(report_of(error)) from error
 
-    async def _start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+    async def _start(
+        self, control_mode: str, nominal: float, prepare: Callable[[], Awaitable[None]]
+    ) -> None:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._happened(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.arm(control_mode)
+            self._setpoint.arm(control_mode, nominal)
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
@@ -402,7 +411,8 @@ class Controller:
         Give control back once the motor stands.
 
         A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
-        time-out of its own it is released, for else that would end the ramp with a fault.
+        time-out of its own that goes on it is released, for else that would end the ramp with a
+        fault.
 
         :raises DriveError: the drive does not confirm that it stops.
         """
@@ -425,11 +435,11 @@ class Controller:
             await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
             await self._inverter.read_timeout()
-            if not self._inverter.sio_tot:
+            if not self._inverter.own_timeout or self.method.keeps_control:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self.method.release()
-        if self.method.keeps_control:
+        if await self.method.kept():
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
@@ -484,6 +494,7 @@ class Controller:
     def judge(self, seen: InverterStatus) -> bool:
         """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
+        before, self._judged = self._judged, seen
         if self.blocked_by_fault and not seen.faulted:
             self._sequence.request_anew()
         if self._explain_refusal(seen):
@@ -492,7 +503,7 @@ class Controller:
             return False
         reason = None
         if self.enabled:
-            reason = self._why_stopped(seen)
+            reason = self._why_stopped(seen) or self._why_slower(seen, before)
         elif not (self.commanded or self.stopping) and seen.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
@@ -529,6 +540,12 @@ class Controller:
 
     def _why_stopped(self, seen: InverterStatus) -> Report | None:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)
+
+    def _why_slower(self, seen: InverterStatus, before: InverterStatus | None) -> Report | None:
+        if before is None or before.at < self._since or self._setpoint.control_mode != 'Freque':
+            return None
+        least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
+        return explain_fall(self._inverter, before, seen, least)
 
     def _no_control(self, seen: InverterStatus | None) -> Report:
         if seen is not None and seen.driven:

@@ -51,7 +51,8 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))
     if isinstance(error, NoAnswer):
-        return Report(Cause.NO_RESPONSE, address=address, check=check)
+        behind = f' ({error.hint})' if error.hint else ''
+        return Report(Cause.NO_RESPONSE, address=address, behind=behind, check=check)
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
@@ -114,6 +115,33 @@ def _why_control_is_lost(inverter: DriveState, seen: InverterStatus) -> Cause:
     return Cause.POWER_CYCLED if inverter.was_silent else Cause.CONTROL_LOST
 
 
+def explain_fall(
+    inverter: DriveState, before: InverterStatus, seen: InverterStatus, least: float
+) -> Report | None:
+    """
+    Return why a motor turns slower than it was told to, if it does so after a silence.
+
+    A drive that keeps its run command without power turns the motor by it when it is back, from
+    standstill on. Where the status word shows the same then as before, the frequency alone tells.
+
+    :param before: the status before the silence.
+    :param least: Hz, the slowest that the drive can have been told to turn since then.
+    """
+    was = min(abs(before.frequency), least)
+    silent = inverter.was_silent and seen.at - before.at >= _SHORTEST_POWER_OFF
+    if not (silent and seen.by_frequency and was >= _LEAST_FALL):
+        return None
+    if not abs(seen.frequency) < was / 2:
+        return None
+    return inverter.report(
+        Cause.SLOWER_AFTER_SILENCE, before=abs(before.frequency), now=abs(seen.frequency)
+    )
+
+
+#: No drive is off and on again, and answers, within less, s; a single lost answer takes less.
+_SHORTEST_POWER_OFF = 0.4
+#: A frequency from which on a fall is looked at, Hz: what is less may be a wobble.
+_LEAST_FALL = 0.5
 #: What comes and goes is told again only when it was away for so long, s.
 _AGAIN_AFTER = 10.0
 

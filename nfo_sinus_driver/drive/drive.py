@@ -115,6 +115,7 @@ class Drive:
         self.log = ErrorLog(self.inverter, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
         self._tuning = Tuning(self.inverter, self.parameters, procedures)
+        bus.on_restart(self._unit, self._watch.restarted)
         #: What goes on while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -260,7 +261,11 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            return await self._controller.release(timeout)
+            answer = await self._controller.release(timeout)
+            # whoever has control at this moment: it may come back to the bus by itself
+            if self._controller.method.keeps_control:
+                await self._watchdog.put_back()
+            return answer
         finally:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
@@ -396,6 +401,7 @@ class Drive:
 
     async def _connect(self, patient: bool) -> None:
         inverter = self.inverter
+        self.registers.connected()
         try:
             await inverter.identify(patient=patient)
         except Refused as error:
@@ -424,6 +430,9 @@ class Drive:
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
         inverter.tell(Severity.INFO, Cause.CONNECTED, drive=told)
+        held = inverter.model.profile.holds_control.get(self.registers.protocol)
+        if self._controller is None and held:
+            inverter.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
 
     def _set_disconnected(self) -> None:
@@ -456,5 +465,6 @@ class Drive:
         self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
-            self._telemetry_task = self._bus.spawn(watch_telemetry(self.inverter))
+            telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
+            self._telemetry_task = self._bus.spawn(telemetry)
             self._watch.wake()

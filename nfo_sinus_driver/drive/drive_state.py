@@ -145,6 +145,10 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
+        #: How long the drive may hear nothing of what lives on the line, s, and by what it notices;
+        #: 0: it does not.
+        self.watched_for = 0.0
+        self.watched_by = ''
         #: SioTot, s; 0 turns the drive's own time-out off.
         self.sio_tot = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
@@ -296,7 +300,15 @@ class DriveState:
         source = self.model.key(Role.CONTROL_SOURCE)
         reply = await self.registers.read_reply(source, priority, once=once)
         holder = self.model.profile.holders.get(self.registers.value(source, reply.data))
-        return replace(seen, by_mode=holder is Holder.BUS, by_mode_at=reply.arrived)
+        by_bus = holder is Holder.BUS and not await self._operated_locally(priority, once)
+        return replace(seen, by_mode=by_bus, by_mode_at=reply.arrived)
+
+    async def _operated_locally(self, priority: Priority, once: bool) -> bool:
+        """Tell whether keypad or terminals command, whatever the control source says."""
+        key = self.model.key(Role.LOCAL_OPERATION)
+        if not self.registers.reaches(key):
+            return False
+        return bool(await self.registers.read(key, priority, once=once))
 
     def _saw(self, seen: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -361,6 +373,11 @@ class DriveState:
     def speed(self) -> float:
         """The speed as last polled, rpm."""
         return self.last_polled(Role.ACTUAL_SPEED).value
+
+    @property
+    def own_timeout(self) -> float:
+        """After which silence the drive itself does something, s; 0: after none."""
+        return min(filter(None, (self.sio_tot, self.watched_for)), default=0.0)
 
     @property
     def can_time_out(self) -> bool:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import logging
 import math
 import time
@@ -113,6 +114,8 @@ class ErrorLog:
         self.clock = OperatingClock()
         #: Entries that were seen to come, and when, the newest first.
         self._sightings: list[tuple[int, float]] = []
+        #: Where it stands, if not where it was looked for first.
+        self._moved: ErrorLogArea | None = None
 
     @property
     def documented(self) -> bool:
@@ -183,7 +186,7 @@ class ErrorLog:
             area = self.area
             async with self._procedures.in_standby(access):
                 await self._procedures.command(access, Reset.ERROR_LOG)
-                if area.code(await self._entry(area, 0, Priority.POLL)):
+                if area.code(await self._entry(0, Priority.POLL)):
                     raise DriveError(Cause.LOG_NOT_ERASED)
         return Report(Cause.LOG_ERASED)
 
@@ -213,7 +216,7 @@ class ErrorLog:
         """Where it stands."""
         if not self.documented:
             raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name)
-        return self._inverter.model.error_logs[self._registers.protocol]
+        return self._moved or self._inverter.model.error_logs[self._registers.protocol]
 
     async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
@@ -221,7 +224,7 @@ class ErrorLog:
         for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
-            if not entries or await self._entry(area, 0, priority) == entries[0]:
+            if not entries or await self._entry(0, priority) == entries[0]:
                 return entries
         raise DriveError(Cause.LOG_CHANGES)
 
@@ -232,7 +235,7 @@ class ErrorLog:
         found: list[int] = []
         while len(found) < limit:
             try:
-                entry = await self._entry(area, len(found), priority)
+                entry = await self._entry(len(found), priority)
             except Refused:
                 if len(found) < area.entries:
                     raise
@@ -242,7 +245,22 @@ class ErrorLog:
             found.append(entry)
         return found
 
-    async def _entry(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
+    async def _entry(self, number: int, priority: Priority) -> int:
+        area = self.area
+        try:
+            return await self._entry_of(area, number, priority)
+        except Refused as error:
+            if number or area.elsewhere is None or error.code != Refused.ILLEGAL_ADDRESS:
+                raise
+            area = replace(area, first=area.elsewhere, elsewhere=None)
+            try:
+                entry = await self._entry_of(area, number, priority)
+            except Refused:
+                raise error from None
+            self._moved = area
+            return entry
+
+    async def _entry_of(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
         # nobody waits for what is read in the background, so it is not asked for again at once
         data = await self._registers.read_from(
             Address(*area.place(number)), priority, once=priority > Priority.POLL

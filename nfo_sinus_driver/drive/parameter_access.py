@@ -36,6 +36,10 @@ from nfo_sinus_driver.link import Reply
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
+#: What a drive answers that lacks the option card of a parameter, and how often until that is
+#: believed.
+_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
+_DENIALS = 2
 #: How often at most what cannot be is read, until it is believed that the drive has it.
 _READINGS = 3
 #: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
@@ -71,6 +75,8 @@ class ParameterAccess:
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, bytes] = {}
+        #: What it has refused because no option card for it is there, each time in a row.
+        self._denials: dict[str, list[Refused]] = {}
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = addressing or bus.protocol.addressing
@@ -123,6 +129,16 @@ class ParameterAccess:
         high = self._highest(key) or high
         return float(low), float(high), float(parameter.step(self.protocol))
 
+    def connected(self) -> None:
+        """Take note that the drive was found: it may have another option card than before."""
+        self._denials.clear()
+
+    def require_fitted(self, key: str) -> None:
+        """Raise what the drive has answered each time, if it lacks the option card for a key."""
+        denials = self._denials.get(key, [])
+        if len(denials) >= _DENIALS:
+            raise denials[-1]
+
     def _highest(self, key: str) -> Fraction | None:
         """Return the end that the line sets: beyond it a drive could not be asked again [C10]."""
         if self.model.role_of.get(key) is not Role.BUS_ADDRESS:
@@ -151,6 +167,10 @@ class ParameterAccess:
     async def identify(self, priority: Priority) -> Identification:
         """Ask the drive who it is; what it does not tell stays empty."""
         return await self._bus.identify(self._unit, priority)
+
+    async def watch(self, seconds: float, priority: Priority) -> str:
+        """Have the drive notice a silence of the line; see :meth:`Bus.watch`."""
+        return await self._bus.watch(self._unit, seconds, priority, 1 + self._retries)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
@@ -201,7 +221,13 @@ class ParameterAccess:
     async def read_reply(self, key: str, priority: Priority, *, once: bool = False) -> Reply:
         """Read a parameter as it stands in the drive; what cannot be counts when it comes again."""
         address = self.address(key)
-        reply = await self._ask(address, priority, None, once)
+        try:
+            reply = await self._ask(address, priority, None, once)
+        except Refused as error:
+            if error.code in _NONE_SUCH and self.model[key].option:
+                self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
+            raise
+        self._denials.pop(key, None)
         before = self._odd.pop(key, None)
         readings = 1
         while not self.can_be(key, reply.data):

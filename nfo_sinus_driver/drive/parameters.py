@@ -211,7 +211,8 @@ class Parameters:
         self._unread = self._total = len(keys)
         started = time.monotonic()
         try:
-            await self._read_first(keys)
+            with self._bus.introducing(inverter.settings.address):
+                await self._read_first(keys)
         except BaseException:
             self._data, self._values = {}, {}
             raise

@@ -58,6 +58,8 @@ _T = TypeVar('_T')
 
 #: How often a drive is looked at while its node is not active, s.
 _INACTIVE_PERIOD = 0.5
+#: How often one that stands is polled at most while another one is read for the first time, s.
+_YIELDING_PERIOD = 2.0
 #: How often the control mode is read, while no motor that stands may start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
@@ -173,6 +175,16 @@ class Poller:
             self._told = reply
             self.wake()
 
+    def restarted(self) -> None:
+        """Take note that the drive has started anew: it is lost until it is connected to again."""
+        if self._task is None or not self._inverter.connected:
+            return
+        # what is asked of it just now was begun before
+        self._bus.cancel(self._task)
+        self._lose(DriveError(Cause.RESTARTED))
+        self._failures = 0
+        self.begin()
+
     def wake(self) -> None:
         """Look at the drive at once."""
         if self._task is not None:
@@ -248,11 +260,23 @@ class Poller:
         period = 1 / rate if rate else 0.0
         if not self.active:
             period = _INACTIVE_PERIOD
+<<<<<<< HEAD
         inverter = self._inverter
         for patience in (inverter.sio_tot, inverter.watched_for):
             if patience:
                 period = min(period, patience * _KEEP_ALIVE_SHARE)
+=======
+        if self.yields:
+            period = max(period, _YIELDING_PERIOD)
+        if self._inverter.sio_tot:
+            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
+>>>>>>> main
         return period
+
+    @property
+    def yields(self) -> bool:
+        """It leaves the line to one whose settings nobody knows yet: that takes many reads."""
+        return self._bus.introduces_another(self._unit) and self._is_idle
 
     @property
     def _is_idle(self) -> bool:
@@ -508,11 +532,13 @@ _DENIALS = 3
 _OFF_PERIOD = 0.5
 
 
-async def watch_telemetry(inverter: DriveState) -> None:
+async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> None:
     """
     Measure at ``telemetry_rate`` until cancelled; a value the drive does not have stays NaN.
 
     One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
+
+    :param yields: tells whether the line is left to others just now.
     """
     values = dict.fromkeys((*FAST, *SLOW), NAN)
     #: How often in a row the drive said that it has none of them.
@@ -536,7 +562,7 @@ async def watch_telemetry(inverter: DriveState) -> None:
     while True:
         started = time.monotonic()
         rate = inverter.settings.telemetry_rate
-        if rate and inverter.connected and inverter.answering:
+        if rate and inverter.connected and inverter.answering and not yields():
             try:
                 for role in (*FAST, *due) if first else (*FAST, due[0]):
                     await measure(role)

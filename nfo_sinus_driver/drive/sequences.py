@@ -33,6 +33,7 @@ from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.commands import read_nominal
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
@@ -294,8 +295,12 @@ class StartSequence:
         self._inverter = inverter
         self._method = method
 
-    async def check(self) -> str:
-        """See to it that the motor may be started, writing nothing; return the control mode."""
+    async def check(self) -> tuple[str, float]:
+        """
+        See to it that the motor may be started, writing nothing.
+
+        :returns: the control mode, and the nominal value of what it is about.
+        """
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
         require_no_fault(inverter, seen)
@@ -307,7 +312,7 @@ class StartSequence:
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self._method.require_startable()
-        return control_mode
+        return control_mode, await read_nominal(inverter, control_mode)
 
     async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
         """

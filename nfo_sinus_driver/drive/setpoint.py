@@ -52,6 +52,8 @@ _KEEP_ALIVE_SHARE = 1 / 3
 _LONGEST_BUSY = 1.0
 #: The watch looks at least this often, so that a changed time-out takes effect, s.
 _WATCH_PERIOD = 0.25
+#: How long it is known which set-points the drive had, s.
+_REMEMBERED = 10.0
 #: How often at most it is read back whether the drive took what was told to all drives, s.
 _READ_BACK_PERIOD = 0.5
 
@@ -106,6 +108,7 @@ class Setpoint:
         #: The newest one to all drives of the line.
         self._shared = _NONE
         self.control_mode = ''
+        self._nominal = math.inf
         self._target: SetpointTarget | None = None
         #: The parameters that a set-point is written to, by where that is.
         self._keys: dict[Address, str] = {}
@@ -123,6 +126,8 @@ class Setpoint:
         self._waits_for_answer = False
         self._busy_since = math.inf
         self._clamp_told = False
+        #: The set-points that the drive may have had lately, and until when; newest last.
+        self._had: list[tuple[float, float]] = []
         #: What the drive was last given, in the unit of the control mode.
         self.commanded = NAN
         self.clamped = False
@@ -156,13 +161,16 @@ class Setpoint:
         able = self._registers.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
-    def arm(self, control_mode: str) -> None:
+    def arm(self, control_mode: str, nominal: float) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
 
         With a reference of the drive's own, none is followed and none is missed.
+
+        :param nominal: what the motor is made for, in the unit of the control mode.
         """
         self.control_mode = control_mode
+        self._nominal = nominal
         follows = self._inverter.settings.follows_setpoints
         self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
         self._armed_at = time.monotonic()
@@ -173,7 +181,8 @@ class Setpoint:
                 self._keys[address] = step.key
                 self._written[address] = data, self._armed_at
         self.commanded = 0.0 if follows else NAN
-        self.clamped = False
+        self._had = [(0.0, math.inf)]
+        self.clamped = self._clamp_told = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
@@ -197,6 +206,34 @@ class Setpoint:
         if self._waits_for_answer:
             self._waits_for_answer = False
             self._bus.request(self._slot)
+
+    def least_since(self, at: float, *, reverse: bool) -> float:
+        """
+        Return the slowest that the drive can have been told to turn since then, in one direction.
+
+        :param at: s of ``time.monotonic``; longer ago than 10 s nobody knows any more.
+        """
+        return min(
+            (max(0.0, -value if reverse else value) for value, until in self._had if until >= at),
+            default=0.0,
+        )
+
+    def _may_have(self, value: float) -> None:
+        """Take note that the drive may have a set-point from now on; NaN: nobody knows which."""
+        value = 0.0 if math.isnan(value) else value
+        oldest = time.monotonic() - _REMEMBERED
+        self._had = [one for one in self._had if one[1] >= oldest]
+        if (value, math.inf) not in self._had:
+            self._had.append((value, math.inf))
+
+    def _has(self, value: float) -> None:
+        """Take note that the drive has a set-point, and none of the others any more."""
+        self.commanded = value
+        self._may_have(value)
+        now = time.monotonic()
+        self._had = [
+            (one, until if one == value else min(until, now)) for one, until in self._had
+        ]
 
     @property
     def _rewrite_period(self) -> float:
@@ -238,9 +275,14 @@ class Setpoint:
 
     @property
     def most(self) -> float:
-        """The greatest set-point that it may be given, in either direction."""
+        """
+        The greatest set-point that it may be given, in either direction.
+
+        More than nominal only where somebody says so: what was meant in another unit, rpm for Hz,
+        must not race the motor.
+        """
         assert self._target is not None
-        return min(self._target.most, self._inverter.settings.setpoint_max or math.inf)
+        return min(self._target.most, self._inverter.settings.setpoint_max or self._nominal)
 
     def counts(self, request: Request) -> bool:
         """Tell whether a request to all came after the drive was enabled, and is still fresh."""
@@ -275,6 +317,7 @@ class Setpoint:
 
     def was_told(self, address: Address, data: bytes) -> None:
         """Take note of what was written to all drives; it is read back whether this one took it."""
+        self._may_have(self._meant({**self._standing, address: data}))
         if not self._inverter.answering:
             # it gets its own when it answers
             self._written = {}
@@ -334,19 +377,28 @@ class Setpoint:
             return None
         limited = self._accept(request)
         if self.clamped and not self._clamp_told:
-            self._inverter.tell(
-                Severity.WARNING, Cause.SETPOINT_LIMITED, value=request.value, limited=limited
-            )
+            self._tell_limited(request.value, limited)
         self._clamp_told = self.clamped
         due = self.due(request)
         if not due:
             return None
         # of several writes each has a turn of its own, and a newer set-point comes between
         address, data = due[0]
+        self._may_have(self._meant({**self._standing, address: data}))
         if self._combining is _Combining.GIVEN_UP or len(due) > 1:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
         status = self._registers.address(self._inverter.word_key)
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
+
+    def _tell_limited(self, value: float, limited: float) -> None:
+        nominal = self._inverter.settings.setpoint_max == 0 and abs(limited) == self._nominal
+        self._inverter.tell(
+            Severity.WARNING,
+            Cause.SETPOINT_BEYOND_NOMINAL if nominal else Cause.SETPOINT_LIMITED,
+            value=value,
+            limited=limited,
+            unit=self._inverter.unit,
+        )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
         if not self.armed:
@@ -375,7 +427,7 @@ class Setpoint:
         self._busy_since = math.inf
         self._written[address] = data, time.monotonic()
         if len(self._written) == len(self._keys):
-            self.commanded = self._meant(self._standing)
+            self._has(self._meant(self._standing))
 
     def was_missed(self, error: LinkError, address: Address | None = None) -> None:
         """
@@ -460,6 +512,7 @@ class Setpoint:
                 if self._request is not before:
                     # that one is written instead
                     return
+                self._may_have(0.0)
                 try:
                     await self._registers.write(replace(step, once=True), Priority.STOP)
                 except LinkError as error:
@@ -474,5 +527,5 @@ class Setpoint:
                 self._written[address] = data, time.monotonic()
                 self._busy_since = math.inf
             if self._request is before:
-                self.commanded = 0.0
+                self._has(0.0)
         self._expired = True

@@ -18,12 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 import functools
 import math
 
 from nfo_sinus_driver.catalog import ControlMethod
 from nfo_sinus_driver.catalog import Profile
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.link import PROTOCOLS
@@ -63,17 +66,34 @@ def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
     return tuple(dict.fromkeys(mode for profile in profiles for mode in profile.setpoints))
 
 
+def _own_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
+    """Return the longest time-out of a model's own, and its step, s; of all while not known."""
+    found = []
+    for name in families() if model == AUTO else (model,):
+        family = load_family(name)
+        parameter = family.get(family.key(Role.COMMUNICATION_TIMEOUT))
+        if parameter is not None:
+            protocol = next(iter(parameter.addresses))
+            found.append((parameter.span(protocol)[1], parameter.step(protocol)))
+    return found
+
+
 #: Those of all models together.
 CONTROL_METHODS = _control_methods(AUTO)
 #: Where a running drive takes its reference from.
 REFERENCES = _references(AUTO, MONITOR)
 #: The control modes by the names that ``expected_control_mode`` takes.
 CONTROL_MODES = _control_modes(AUTO)
+#: The longest of the time-outs that drives have themselves, s.
+LONGEST_DRIVE_TIMEOUT = float(max(longest for longest, _ in _own_timeouts(AUTO)))
 
+<<<<<<< HEAD
 #: How many registers a PLC shows for one drive, and where the last of them can begin.
 BLOCK_SIZE = 11
 LAST_BLOCK = 0x10000 - BLOCK_SIZE
 _LONGEST_DRIVE_TIMEOUT = 25.0
+=======
+>>>>>>> main
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
@@ -96,9 +116,10 @@ class DriveSettings:
     :ivar telemetry_rate: Hz; 0 turns telemetry off.
     :ivar lost_after: s; after so long without a valid frame a drive that is asked is lost.
     :ivar setpoint_timeout: s; 0 turns it off.
-    :ivar setpoint_max: in the unit of the control mode; 0 is the drive's own limit.
-    :ivar drive_timeout: s; what SioTot shall be, with AutoStop on; 0 leaves both as they are. At
-        least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
+    :ivar setpoint_max: in the unit of the control mode; 0 is the nominal value of what it is
+        about, where the drive tells it, else the drive's own limit.
+    :ivar drive_timeout: s; the drive's own time-out, within its limits and on a step of it; 0
+        leaves it as it is. At least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
     :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
         older ``v5.0``; '' asks it for its firmware, while the bus has no control.
     :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
@@ -185,22 +206,30 @@ class DriveSettings:
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
         _between('lost_after', self.lost_after, 0.2, 60, 's')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
-        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: the limit of the drive)')
+        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: what the motor is made for)')
         _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
-        _between('drive_timeout', self.drive_timeout, 0, _LONGEST_DRIVE_TIMEOUT, 's (0: as it is)')
+        self._check_drive_timeout()
+
+    def _check_drive_timeout(self) -> None:
+        # a drive that has none refuses any, with the reason
+        own = _own_timeouts(self.model) or _own_timeouts(AUTO)
+        longest, step = max(most for most, _ in own), min(least for _, least in own)
+        whose = f' with {self.model}' if len(own) == 1 else ''
+        _between('drive_timeout', self.drive_timeout, 0, float(longest), f's{whose} (0: as it is)')
         least = self.lost_after + DRIVE_TIMEOUT_MARGIN
         if 0 < self.drive_timeout < least - 1e-9:
             raise ValueError(
                 f'drive_timeout {self.drive_timeout:g} s: at least '
-                f'{math.ceil(least * 10 - 1e-6) / 10:g} s, half a second more than lost_after '
-                f'({self.lost_after:g} s), so that noise which the driver waits out does not stop '
-                'the motor'
+                f'{float(math.ceil((least - 1e-7) / step) * step):g} s, half a second more than '
+                f'lost_after ({self.lost_after:g} s), so that noise which the driver waits out '
+                'does not stop the motor'
             )
-        tenths = self.drive_timeout * 10
-        if abs(tenths - round(tenths)) > 1e-3:
+        steps = self.drive_timeout / step
+        if abs(steps - round(steps)) > 1e-3:
+            below, above = (float(whole(steps) * step) for whole in (math.floor, math.ceil))
             raise ValueError(
                 f'drive_timeout {self.drive_timeout:g} s lies between two steps of the drive, '
-                f'{math.floor(tenths) / 10:g} and {math.ceil(tenths) / 10:g}'
+                f'{below:g} and {above:g}'
             )
 
     def _require_known_method(self) -> None:

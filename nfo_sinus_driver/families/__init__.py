@@ -17,3 +17,5 @@
 
 #: The family of a drive of which nobody says what it is.
 USUAL = 'sinus_g2'
+#: A setting of such a drive, and a value, for help and documentation.
+EXAMPLE = ('control.accel', 5.0)

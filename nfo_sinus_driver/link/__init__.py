@@ -31,12 +31,16 @@ from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Supervision
+from nfo_sinus_driver.link.interface import Watch
+from nfo_sinus_driver.link.protocols import BIT_RATES
 from nfo_sinus_driver.link.protocols import PROTOCOLS
 from nfo_sinus_driver.link.protocols import line_settings
 from nfo_sinus_driver.link.protocols import open_link
 from nfo_sinus_driver.link.reconnect import Reconnect
 
 __all__ = [
+    'BIT_RATES',
     'PROTOCOLS',
     'Address',
     'DamagedAnswer',
@@ -56,6 +60,8 @@ __all__ = [
     'Reconnect',
     'Refused',
     'Reply',
+    'Supervision',
+    'Watch',
     'line_settings',
     'open_link',
 ]

@@ -30,13 +30,15 @@ FUNCTION_CODE = 0x780
 
 class Frame(NamedTuple):
     """
-    A standard data frame.
+    A standard frame.
 
     :ivar identifier: which of :data:`IDENTIFIERS`; the least has precedence.
+    :ivar remote: it has no data, but asks for that of the same length; only ever sent.
     """
 
     identifier: int
     data: bytes
+    remote: bool = False
 
 
 #: What is wrong where frames do not leave.

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 import contextlib
 from dataclasses import replace
 import re
@@ -30,6 +31,7 @@ from nfo_sinus_driver.link.can import FUNCTION_CODE
 from nfo_sinus_driver.link.can import CanPort
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
+from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineProtocol
@@ -41,6 +43,8 @@ from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
+from nfo_sinus_driver.link.object_shapes import SECOND
+from nfo_sinus_driver.link.object_shapes import ObjectShapes
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.sdo import Download
 from nfo_sinus_driver.link.sdo import Kind
@@ -57,8 +61,6 @@ _ADAPTER_RATE = 115_200
 _EVERYWHERE = ((0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1))
 #: The name of a network interface, which no path of a device has.
 _INTERFACE = re.compile(r'[^/:\s]+')
-#: How often nodes hear that the client is there, s, as long as it talks to any of them.
-_HEARTBEAT = 0.1
 #: Bits of a frame with eight bytes, at least.
 _FRAME_BITS = 108
 #: The longest value that comes in one answer, bytes.
@@ -89,11 +91,12 @@ class CanopenLink:
     late to a question asked before, no answer to another write. Not told apart is an answer that is
     told twice just when the next one is lost.
 
-    A value is as long as the node says, whatever the table says [C102].
+    How long a number is, and where the sub-indices of an array begin, is for the node to say
+    [C102]; above this link a number has the length of the catalog (:class:`ObjectShapes`).
 
     A node is made operational before the first write to it, and again when it has started anew:
-    reading changes nothing. From then on the client's heartbeat is sent along with what it asks,
-    by the thread that asks: a node that watches over it (1016h) notices when that thread is gone.
+    reading changes nothing. From then on the client's heartbeat is sent, by the thread that asks:
+    a node that watches over it notices when that thread is gone (:class:`CanopenSupervision`).
     """
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
@@ -105,6 +108,7 @@ class CanopenLink:
         char_format='8N1',
         baud_rates=tuple(lawicel.BIT_RATES),
         identifies=True,
+        rates_disturb=True,
         check='power, the node id, the bit rate, CAN_H and CAN_L, 120 ohms at each end of the bus '
         'and nowhere else, and that the interface is up (ip -details link show)',
     )
@@ -117,7 +121,8 @@ class CanopenLink:
         )
         #: The nodes that were made operational.
         self._started: set[int] = set()
-        self._heartbeat_due = 0.0
+        self._shapes = ObjectShapes()
+        self.supervision = CanopenSupervision(port, self._take, self.read, self.write)
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
@@ -131,7 +136,7 @@ class CanopenLink:
         if _INTERFACE.fullmatch(port):
             wanted = ((sdo.ANSWERS, FUNCTION_CODE), (nmt.HEARTBEATS, FUNCTION_CODE))
             return cls(SocketCan(port, wanted), settings)
-        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE))
+        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
         return cls(LawicelPort(serial, settings.baud_rate), settings)
 
     def open(self) -> None:
@@ -143,6 +148,8 @@ class CanopenLink:
         self._port.close()
         self._late.clear()
         self._started.clear()
+        self._shapes.clear()
+        self.supervision.closed()
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Take parameters that are safe to read; here those are asked that every node has."""
@@ -152,8 +159,31 @@ class CanopenLink:
         return (address,)
 
     def read(self, unit: int, address: Address) -> Reply:
-        """Read one parameter; it has as many bytes as the node says."""
-        upload = _upload(unit, address)
+        """Read one parameter; a number in as many bytes as the catalog has for it."""
+        sub_index = self._shapes.sub_index(unit, address)
+        if sub_index is None:
+            second = self._read_second(unit, address)
+            if second is not None and address.sub_index == SECOND:
+                return self._fitted(unit, address, SECOND, second)
+            return self.read(unit, address)
+        reply = self._read_object(unit, address, sub_index)
+        return self._fitted(unit, address, sub_index, reply)
+
+    def _fitted(self, unit: int, address: Address, sub_index: int, reply: Reply) -> Reply:
+        return reply._replace(data=self._shapes.fit_read(unit, address, sub_index, reply.data))
+
+    def _read_second(self, unit: int, address: Address) -> Reply | None:
+        """Find out how a node numbers an array; return what was read for it, if anything was."""
+        reply, refusal = None, None
+        try:
+            reply = self._read_object(unit, address, SECOND)
+        except Refused as error:
+            refusal = error
+        self._shapes.note_array(unit, address.index, refusal)
+        return reply
+
+    def _read_object(self, unit: int, address: Address, sub_index: int) -> Reply:
+        upload = Upload(unit, address.index, sub_index)
         kinds = upload.kinds[:1] + (sdo.SEGMENTS if address.size > _EXPEDITED else ())
         questions = ((upload, kinds), *self._resync_reads(unit))
         certain = self._late.first_certain(unit, questions, time.monotonic())
@@ -167,14 +197,26 @@ class CanopenLink:
         return Reply(upload.value, arrived)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """Write one parameter; the length has to be the one that the node knows."""
-        download = Download(unit, address.index, address.sub_index or 0, data)
+        """Write one parameter; a number in as many bytes as the node has for it."""
+        sub_index = self._shapes.sub_index(unit, address)
+        if sub_index is None:
+            self._read_second(unit, address)
+            return self.write(unit, address, data)
+
+        def send(fitted: bytes) -> float:
+            return self._write_object(Download(unit, address.index, sub_index, fitted))
+
+        return Reply(b'', self._shapes.write(unit, address, sub_index, data, send))
+
+    def _write_object(self, download: Download) -> float:
+        unit = download.unit
         self._drain()
         if unit not in self._started:
             self._port.send(nmt.start(unit))
             self._started.add(unit)
+        self.supervision.asks(unit, writes=True)
         try:
-            return Reply(b'', self._transact(download))
+            return self._transact(download)
         except _Ambiguous:
             # not after mere silence: a stop that is given again would only have to wait for it
             self._settle(unit)
@@ -195,8 +237,12 @@ class CanopenLink:
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
+        sub_index = self._shapes.sub_index(unit, source)
+        if sub_index is None:
+            self._read_second(unit, source)
+            return self.read_then_write(unit, source, address, data)
         with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
-            self._transact(_upload(unit, source))
+            self._transact(Upload(unit, source.index, sub_index))
         try:
             return self.write(unit, address, data)
         except LinkError as error:
@@ -240,13 +286,12 @@ class CanopenLink:
     def _transact(self, transfer: Transfer) -> float:
         """Carry out a transfer; return when its last answer came."""
         self._drain()
+        self.supervision.asks(transfer.unit, writes=False)
         arrived = 0.0
         while transfer.request is not None:
             self._late.sent(transfer)
             sent = time.monotonic()
-            if self._started and sent >= self._heartbeat_due:
-                self._port.send(nmt.HEARTBEAT)
-                self._heartbeat_due = sent + _HEARTBEAT
+            self.supervision.send_due(sent)
             self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.request))
             try:
                 arrived = self._receive(transfer, sent)
@@ -270,8 +315,13 @@ class CanopenLink:
     def _take(self, until: float) -> Sequence[Frame]:
         """Return what has come, as the port does; note which nodes have started anew."""
         frames = self._port.receive(until)
-        self._started.difference_update(map(nmt.booted, frames))
+        self._note_restarts(frames)
         return frames
+
+    def _note_restarts(self, frames: Sequence[Frame]) -> AbstractSet[int]:
+        restarted = self.supervision.heard(frames)
+        self._started -= restarted
+        return restarted
 
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
@@ -280,8 +330,11 @@ class CanopenLink:
         deadline = sent + self._settings.response_timeout
         other = 0
         while True:
-            frames = self._take(deadline)
+            frames = self._port.receive(min(deadline, self.supervision.sign_due))
             now = time.monotonic()
+            self.supervision.send_due(now)
+            if unit in self._note_restarts(frames):
+                raise NoAnswer(f'unit {unit} has started anew')
             for frame in frames:
                 if frame.identifier != sdo.ANSWERS + unit:
                     continue
@@ -298,8 +351,10 @@ class CanopenLink:
                 break
         if other:
             raise DamagedAnswer(f'unit {unit}: {other} answers came, but none to this request')
-        why = f': {self._port.trouble}' if self._port.trouble else ''
-        raise NoAnswer(f'unit {unit} did not answer{why}')
+        hint = self._port.trouble
+        silent = NoAnswer(f'unit {unit} did not answer{": " if hint else ""}{hint}')
+        silent.hint = hint
+        raise silent
 
     def _require_one(self, transfer: Transfer, answer: Frame, sent: float, now: float) -> None:
         """
@@ -318,7 +373,3 @@ class CanopenLink:
                 if any(frame.identifier == answer.identifier for frame in came):
                     raise DamagedAnswer(f'unit {unit}: an answer came twice')
         self._late.took(unit, now - sent)
-
-
-def _upload(unit: int, address: Address) -> Upload:
-    return Upload(unit, address.index, address.sub_index or 0)

@@ -106,6 +106,7 @@ class ClassicLink:
     protects them, so choose a format that has it.
     """
 
+    supervision = None
     #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
     #: [M0 §6.1.2], [C10].
     protocol = LineProtocol(

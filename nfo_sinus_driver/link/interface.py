@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 import functools
 import re
@@ -41,12 +42,15 @@ class Address(NamedTuple):
     :ivar index: its number there; of several registers the first.
     :ivar sub_index: which part of it; on Classic the id of the high word.
     :ivar size: how many bytes it takes.
+    :ivar signed: whether the number in them may be negative, for a line where the drive says how
+        many bytes it has for it; ``None``: it is no number, and they count as they come.
     """
 
     space: str
     index: int  # type: ignore[assignment]  # hides a method of tuples that nobody calls
     sub_index: int | None
     size: int
+    signed: bool | None = None
 
 
 class Reply(NamedTuple):
@@ -103,6 +107,48 @@ class Inquiry(Protocol):
         """
 
 
+class Watch(Protocol):
+    """
+    How a unit is made to notice that nobody talks to it any more; step by step, as an inquiry.
+
+    :ivar means: by what it notices; ``''``: it has nothing for it, or it is turned off.
+    """
+
+    means: str
+
+    @property
+    def done(self) -> bool:
+        """There is nothing left to do."""
+
+    def step(self) -> Reply:
+        """
+        Do the next step: one transaction, which is done again after an error.
+
+        :raises LinkError: as its subclasses say.
+        """
+
+
+class Supervision(Protocol):
+    """
+    What lives on a line beside questions and answers; for the thread that has the line.
+
+    Units notice by it that this end is gone, and this end that a unit has started anew.
+    """
+
+    @property
+    def due(self) -> float:
+        """When :meth:`serve` has to be called again, s of ``time.monotonic``; or infinity."""
+
+    def serve(self) -> None:
+        """Send what is due, and take what came unasked (PortError: the port is lost)."""
+
+    def take_restarted(self) -> AbstractSet[int]:
+        """Return the units that have started anew since this was asked last."""
+
+    def watch(self, unit: int, seconds: float) -> Watch:
+        """Return how a unit is made to notice a silence of so long, s; 0: nothing any more."""
+
+
 class NothingToAsk:
     """The inquiry of a protocol that knows nothing but parameters: it has no questions."""
 
@@ -131,7 +177,12 @@ class LineProtocol:
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
+<<<<<<< HEAD
     :ivar carries: what else it reaches parameters by, that stand at who is between: a PLC.
+=======
+    :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
+        is tried.
+>>>>>>> main
     :ivar check: what to look at, in this order, where no drive answers.
     """
 
@@ -146,7 +197,11 @@ class LineProtocol:
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
+<<<<<<< HEAD
     carries: frozenset[str] = frozenset()
+=======
+    rates_disturb: bool = False
+>>>>>>> main
     check: str = _CHECK
 
     def require_unit(self, address: int) -> None:
@@ -192,6 +247,10 @@ class Link(Protocol):
     """
 
     protocol: LineProtocol
+
+    @property
+    def supervision(self) -> Supervision | None:
+        """What lives on it beside questions and answers; ``None``: nothing."""
 
     def open(self) -> None:
         """Open the port (PortError: it cannot be opened; the message says what to do)."""
@@ -254,6 +313,8 @@ class LinkError(Exception):
     maybe_done = False
     #: The unit answered a question before, for the sake of this one: it is there.
     heard = False
+    #: What the port knows of why, as it may be told; ``''`` if nothing.
+    hint = ''
 
 
 class PortError(LinkError):

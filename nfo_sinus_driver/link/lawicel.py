@@ -15,7 +15,8 @@
 """
 Frames of a CAN bus as lines of text, without I/O: LAWICEL's protocol, which Linux calls slcan.
 
-A line ends with CR: ``t`` identifier (three digits) length data. A BEL stands for *no* in place of
+A line ends with CR: ``t`` identifier (three digits) length data; ``r`` and no data is a remote
+frame, which is only sent. A BEL stands for *no* in place of
 a line; an empty line, ``z`` and ``Z`` stand for *done*. Digits are sent in upper case and read in
 both. Lines of other kinds, such as those of extended and remote frames, are passed over.
 """
@@ -82,6 +83,8 @@ def encode(frame: Frame) -> bytes:
     """
     if frame.identifier not in IDENTIFIERS or len(frame.data) > MOST_DATA:
         raise ValueError(f'{frame} is no standard frame')
+    if frame.remote:
+        return f'r{frame.identifier:03X}{len(frame.data)}'.encode() + CR
     data = frame.data.hex().upper()
     return f't{frame.identifier:03X}{len(frame.data)}{data}'.encode() + CR
 

@@ -44,6 +44,7 @@ class ModbusLink(ABC):
     """A Modbus master, whatever carries its requests."""
 
     protocol: LineProtocol
+    supervision = None
 
     def parts(self, address: Address) -> tuple[Address]:
         """Return the whole: registers that belong together are read together."""

@@ -97,6 +97,7 @@ class MovitracLink:
     the check is a sum: choose short wires.
     """
 
+    supervision = None
     #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
     protocol = LineProtocol(
         name='movitrac',

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
@@ -29,10 +30,13 @@ from nfo_sinus_driver.link.rtu import RtuLink
 
 #: A new protocol is a file of this folder, and its link stands here.
 _LINKS = {
-    link.protocol.name: link for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink)
+    link.protocol.name: link
+    for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink, CanopenLink)
 }
 #: What the driver's ``protocol`` parameter takes, and what each is.
 PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}
+#: The bit rates of all of them.
+BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.baud_rates}))
 
 
 def protocol_of(name: str) -> LineProtocol:
@@ -71,7 +75,8 @@ def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
     Return the link for a protocol on a port; it is not open yet.
 
     :param port: a device path, or a URL of pyserial (``socket://host:port``); ``host:port`` of
-        the gateway for ``modbus_tcp``, where only the ``response_timeout`` of the settings counts.
+        the gateway for ``modbus_tcp``, where only the ``response_timeout`` of the settings counts;
+        for ``canopen`` the name of a CAN interface, such as ``can0``, too.
     :raises ValueError: no such protocol or kind of URL, or a setting with which the protocol can
         never work; the message says what can.
     """

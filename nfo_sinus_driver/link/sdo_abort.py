@@ -23,6 +23,22 @@ from nfo_sinus_driver.link.interface import Refused
 
 #: What a client says that has waited in vain.
 TIMED_OUT = 0x0504_0000
+#: The object has no such sub-index.
+NO_SUB_INDEX = 0x0609_0011
+#: The value has another length there: any other, a shorter one, a longer one.
+WRONG_LENGTH, TOO_LONG, TOO_SHORT = 0x0607_0010, 0x0607_0012, 0x0607_0013
+
+
+class Aborted(Refused):
+    """
+    The node has ended the transfer.
+
+    :ivar abort: with which of :data:`ABORT_CODES`.
+    """
+
+    def __init__(self, abort: int, kind: int, reason: str) -> None:
+        super().__init__(kind, reason)
+        self.abort = abort
 
 
 class AbortCode(NamedTuple):
@@ -58,10 +74,10 @@ ABORT_CODES: Mapping[int, AbortCode] = {
     0x0604_0043: AbortCode(_STATE, 'the parameters do not fit together'),
     0x0604_0047: AbortCode(_STATE, 'the drive is not compatible within itself'),
     0x0606_0000: AbortCode(_STATE, 'a hardware error of the drive'),
-    0x0607_0010: AbortCode(_VALUE, 'the value has the wrong length'),
-    0x0607_0012: AbortCode(_VALUE, 'the value is too long'),
-    0x0607_0013: AbortCode(_VALUE, 'the value is too short'),
-    0x0609_0011: AbortCode(_NO_SUCH, 'the object has no such sub-index'),
+    WRONG_LENGTH: AbortCode(_VALUE, 'the value has the wrong length'),
+    TOO_LONG: AbortCode(_VALUE, 'the value is too long'),
+    TOO_SHORT: AbortCode(_VALUE, 'the value is too short'),
+    NO_SUB_INDEX: AbortCode(_NO_SUCH, 'the object has no such sub-index'),
     0x0609_0030: AbortCode(_VALUE, 'the drive does not accept this value'),
     0x0609_0031: AbortCode(_VALUE, 'the value is too large'),
     0x0609_0032: AbortCode(_VALUE, 'the value is too small'),
@@ -77,7 +93,7 @@ ABORT_CODES: Mapping[int, AbortCode] = {
 _UNKNOWN = AbortCode(_STATE, 'the drive refused')
 
 
-def refusal(code: int) -> Refused:
+def refusal(code: int) -> Aborted:
     """Return what an abort says."""
     kind, meaning = ABORT_CODES.get(code, _UNKNOWN)
-    return Refused(kind, f'{meaning} (SDO abort {code:08X}h)')
+    return Aborted(code, kind, f'{meaning} (SDO abort {code:08X}h)')

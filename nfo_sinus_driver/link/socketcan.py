@@ -36,6 +36,8 @@ _FRAME = struct.Struct('=IB3x8s')
 _FILTER = struct.Struct('=II')
 #: Extended, remote and error frames: in the identifier.
 _OTHER_FRAMES = 0xE000_0000
+#: The second of them alone.
+_REMOTE = 0x4000_0000
 #: The type of a network interface that is a CAN bus (linux/if_arp.h).
 _IS_CAN = '280'
 _INTERFACES = Path('/sys/class/net')
@@ -91,7 +93,8 @@ class SocketCan:
         """
         data = frame.data.ljust(MOST_DATA, b'\0')
         try:
-            self._bus.send(_FRAME.pack(frame.identifier, len(frame.data), data))
+            flags = _REMOTE if frame.remote else 0
+            self._bus.send(_FRAME.pack(frame.identifier | flags, len(frame.data), data))
         except OSError as error:
             if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
                 raise self._lost(error) from error

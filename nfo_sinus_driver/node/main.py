@@ -49,11 +49,13 @@ from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import refuse_other_arguments
+from nfo_sinus_driver.node.overrides import take_out_end_with
 from nfo_sinus_driver.node.overrides import take_out_node_name
 from nfo_sinus_driver.node.overrides import unknown_nodes
 from nfo_sinus_driver.node.overrides import unknown_parameters
 from nfo_sinus_driver.signals import ENDING
 from nfo_sinus_driver.signals import HeldSignals
+from nfo_sinus_driver.signals import OtherProcess
 from nfo_sinus_driver.signals import signal_name
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
@@ -264,7 +266,9 @@ def _limit_arenas() -> None:
 
 def _run(signals: HeldSignals, arguments: list[str], single_name: str | None) -> int:
     try:
+        arguments, pid = take_out_end_with(arguments)
         refuse_other_arguments(arguments)
+        starter = None if pid is None else _starter(pid)
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         process = DriverProcess(arguments, single_name)
     except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:
@@ -275,18 +279,29 @@ def _run(signals: HeldSignals, arguments: list[str], single_name: str | None) ->
     process.start()
     why = 'error in the driver'
     try:
-        why = _await_end(process, signals)
+        why = _await_end(process, signals, starter)
     finally:
         confirmed = process.stop(why)
         rclpy.shutdown()
     return 0 if confirmed else 1
 
 
-def _await_end(process: DriverProcess, signals: HeldSignals) -> str:
+def _starter(pid: int) -> OtherProcess:
+    try:
+        return OtherProcess(pid)
+    except ProcessLookupError:
+        raise ValueError(f'--end-with {pid}: that process has ended already') from None
+
+
+def _await_end(
+    process: DriverProcess, signals: HeldSignals, starter: OtherProcess | None
+) -> str:
     """Wait until something ends the driver; return what."""
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
         number = signals.next(_POLL_SIGNALS)
+        if starter is not None and starter.ended:
+            return f'process {starter.pid}, which this driver ends with, has ended'
         if number is None:
             continue
         name = signal_name(number)

@@ -29,6 +29,7 @@ from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
 import yaml
 
+from nfo_sinus_driver import __version__
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 
 _PARAMS_FILE = '--params-file'
@@ -138,12 +139,15 @@ _REMAP_FLAGS = ('-r', '--remap')
 _NODE = re.compile(r'(?:__node|__name):=(.+)')
 
 
-_HELP = """usage: driver [--ros-args ...]
+_END_WITH = '--end-with'
+_HELP = """usage: driver [--version] [--end-with PID] [--ros-args ...]
 
 Drives NFO Sinus inverters on one serial line. For example:
 
   driver --ros-args -p port:=/dev/ttyUSB0 -p address:=1
   driver --ros-args --params-file conveyor.yaml
+
+  --end-with PID   stop the motors and end when that process has ended; launch files give their own
 """
 
 
@@ -153,10 +157,29 @@ def refuse_other_arguments(arguments: list[str]) -> None:
     if '-h' in others or '--help' in others:
         print(_HELP)
         raise SystemExit(0)
+    if '--version' in others:
+        print(f'nfo_sinus_driver {__version__}')
+        raise SystemExit(0)
     if others:
         raise ValueError(
             f'unknown argument {others[0]}: parameters are given as --ros-args -p name:=value'
         )
+
+
+def take_out_end_with(arguments: list[str]) -> tuple[list[str], int | None]:
+    """
+    Split off the number of the process that this one is to end with.
+
+    :returns: the other arguments, and the number if there was one.
+    :raises ValueError: it is no number of a process.
+    """
+    if _END_WITH not in arguments:
+        return arguments, None
+    at = arguments.index(_END_WITH)
+    given = arguments[at + 1] if at + 1 < len(arguments) else ''
+    if not given.isdecimal() or not int(given):
+        raise ValueError(f'{_END_WITH} {given!r}: the number of a process, such as 1234')
+    return arguments[:at] + arguments[at + 2 :], int(given)
 
 
 def take_out_node_name(arguments: list[str]) -> tuple[list[str], str | None]:

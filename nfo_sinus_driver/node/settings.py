@@ -25,13 +25,18 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+<<<<<<< HEAD
 from nfo_sinus_driver.drive.settings import LAST_BLOCK
+=======
+from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
+>>>>>>> main
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link.interface import BAUD_RATES
 
 #: What YAML makes of a character format without quotes.
 _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}
@@ -100,7 +105,7 @@ BUS_SETTINGS = (
         'port',
         '/dev/ttyUSB0',
         'Serial port: a device path, or a pyserial URL such as socket://host:port; '
-        'for modbus_tcp host:port of the gateway',
+        'for modbus_tcp host:port of the gateway; for canopen a CAN interface such as can0, too',
         fixed=True,
     ),
     Setting(
@@ -114,7 +119,8 @@ BUS_SETTINGS = (
         'baud_rate',
         0,
         'Bit rate, bit/s, as SiBaud in the drive says; 0: the factory default of the protocol',
-        constraints=f'0 or one of {", ".join(str(rate) for rate in BAUD_RATES)}',
+        constraints=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as '
+        'the protocol has it',
         fixed=True,
     ),
     Setting(
@@ -156,7 +162,8 @@ DRIVE_SETTINGS = (
     Setting(
         'address',
         1,
-        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone",
+        "The drive's address on the bus: Modbus 1 to 247; Classic 1 to 94, 0 for one alone; "
+        'CANopen (node id) 1 to 127',
         0,
         247,
     ),
@@ -170,7 +177,7 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'model',
-        'sinus_g2',
+        usual_family(),
         'The drive family; auto: find out',
         constraints=f'one of {", ".join((*families(), AUTO))}',
     ),
@@ -229,7 +236,8 @@ DRIVE_SETTINGS = (
     Setting(
         'setpoint_max',
         0.0,
-        "Set-points are clamped to this, in the unit of the control mode; 0: the drive's own limit",
+        'Set-points are clamped to this, in the unit of the control mode; 0: what is nominal for '
+        "the motor, or the drive's own limit where it does not tell that",
         0,
         32767,
         unit='in the unit of the control mode',
@@ -243,12 +251,12 @@ DRIVE_SETTINGS = (
     Setting(
         'drive_timeout',
         0.0,
-        "The drive's own time-out (SioTot, with AutoStop = ON), s, in steps of 0.1: it stops the "
-        'motor when this driver dies; 0: leave it as it is',
+        "The drive's own time-out (G2: SioTot, with AutoStop = ON), s: it stops the motor when "
+        'this driver dies; 0: leave it as it is',
         0,
-        25,
+        LONGEST_DRIVE_TIMEOUT,
         unit='s',
-        constraints='0 or at least lost_after + 0.5',
+        constraints='0 or at least lost_after + 0.5; the most and the step are those of the drive',
     ),
     Setting(
         'shutdown_timeout',

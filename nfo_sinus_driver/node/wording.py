@@ -39,6 +39,7 @@ class Wording:
             program='driver',
             drive_timeout='drive_timeout',
             set_drive_timeout='set drive_timeout',
+            set_setpoint_max=f'set setpoint_max of {node.get_fully_qualified_name()}',
             set_control_mode='expected_control_mode in the driver',
             set_model='set model to auto or to what it is',
         )

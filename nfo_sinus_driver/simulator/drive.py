@@ -60,6 +60,7 @@ class SimulatedDrive:
     :ivar settings: the keys of the parameters that live in EEPROM: no set-points, no commands.
     :ivar step: the longest step of model time while something moves (s).
     :ivar time: model time since the start (s).
+    :ivar boots: how often it has come up after power-on.
     :ivar writes: how often the bus wrote each parameter that lives in EEPROM, by key.
     :ivar command_writes: how often it wrote each set-point or command, by key.
     """
@@ -89,6 +90,7 @@ class SimulatedDrive:
         self.command_writes: Counter[str] = Counter()
         self.step = _STEP
         self.time = 0.0
+        self.boots = 0
         self._origin: float | None = None
         self._boot_left = 0.0
         self._silent_left = 0.0
@@ -234,6 +236,7 @@ class SimulatedDrive:
 
     def _booted(self) -> None:
         self._boot_left = 0.0
+        self.boots += 1
         self.control_unit.boot()
         self.heard()
         self._settle()

@@ -22,10 +22,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from nfo_sinus_driver.simulator.can_line import CanLine
+from nfo_sinus_driver.simulator.canopen import NODES
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.lawicel import BIT_RATES
+from nfo_sinus_driver.simulator.lawicel import Adapter
+from nfo_sinus_driver.simulator.line import Line
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
@@ -37,7 +45,11 @@ from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PtyPort
 from nfo_sinus_driver.simulator.ports import TcpPort
 from nfo_sinus_driver.simulator.protocol import Protocol
+from nfo_sinus_driver.simulator.socketcan import CanInterface
+from nfo_sinus_driver.simulator.socketcan import CanPort
+from nfo_sinus_driver.simulator.socketcan import is_interface
 from nfo_sinus_driver.simulator.timing import Timing
+from nfo_sinus_driver.simulator.wire import Wire
 
 #: How long a gateway waits for a drive by default (s).
 GATEWAY_TIMEOUT = 0.1
@@ -48,17 +60,19 @@ class _Row:
     """
     A protocol and its defaults ([M0 §6.1.2, §6.2.2], [M4 §2.2.2]).
 
-    :ivar make: makes it; it gets the time that a gateway waits.
+    :ivar make: makes it; it gets the time that a gateway waits. ``None``: a CAN bus has no bytes.
     :ivar tables: its name in the tables of the families, by which a drive has a server for it.
     :ivar data_bits: those it can do with.
+    :ivar bauds: the rates that it has; none: the drives say.
     """
 
-    make: Callable[[float], Protocol]
+    make: Callable[[float], Protocol] | None
     tables: str
     baud: int
     char_format: str
     data_bits: str
     addresses: range = range(1, 248)
+    bauds: tuple[int, ...] = ()
 
 
 PROTOCOLS: Mapping[str, _Row] = {
@@ -67,7 +81,11 @@ PROTOCOLS: Mapping[str, _Row] = {
     ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
     Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
     Movitrac.name: _Row(lambda _: Movitrac(), 'movitrac', 9600, '8N1', '8', ADDRESSES),
+<<<<<<< HEAD
     ThroughPlc.name: _Row(ThroughPlc, TELEGRAM, 19200, '8E1', '8'),
+=======
+    CanLine.name: _Row(None, 'canopen', 125_000, '8N1', '8', NODES, BIT_RATES),
+>>>>>>> main
 }
 
 
@@ -77,8 +95,10 @@ class Endpoint:
     One end of a line.
 
     :ivar protocol: the name of its protocol.
-    :ivar timing: speed and format; of :class:`ModbusTcp` those of the line behind the gateway.
-    :ivar link: a symbolic link to its pseudo-terminal, if it has one.
+    :ivar timing: speed and format; of :class:`ModbusTcp` those of the line behind the gateway, of
+        a CAN bus the bit rate alone.
+    :ivar link: a symbolic link to its pseudo-terminal, if it has one; of a CAN bus also the name of
+        an interface.
     :ivar tcp: its TCP port, if it has one.
     """
 
@@ -95,11 +115,18 @@ class Endpoint:
     @property
     def spoken(self) -> str:
         """The protocol that the drives themselves speak."""
-        return self.make(0.0).spoken
+        return self.tables if self._is_can else self.make(0.0).spoken
+
+    @property
+    def can_echo(self) -> bool:
+        """Whether a half-duplex adapter can be at the line."""
+        return not self._is_can and self.make(0.0).serial
 
     def make(self, gateway_timeout: float) -> Protocol:
-        """Return the protocol; a gateway waits so long for a drive (s)."""
-        return PROTOCOLS[self.protocol].make(gateway_timeout)
+        """Return the protocol of a serial line; a gateway waits so long for a drive (s)."""
+        make = PROTOCOLS[self.protocol].make
+        assert make is not None
+        return make(gateway_timeout)
 
     @property
     def through_plc(self) -> bool:
@@ -108,7 +135,56 @@ class Endpoint:
 
     def open(self) -> Port:
         """Return its port (PortError: it cannot be had)."""
+        if self._is_interface:
+            assert self.link is not None
+            return CanPort(self.link)
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
+
+    def wire(
+        self,
+        port: Port,
+        drives: Sequence[SimulatedDrive],
+        clock: Callable[[], float],
+        *,
+        gateway_timeout: float,
+        paced: bool,
+        turnaround: float,
+        echo: bool,
+        always_heard: bool,
+        trace: Trace | None,
+    ) -> Wire:
+        """Return the line on its port; for what is given see :class:`Line` and `CanLine`."""
+        if self._is_can:
+            return CanLine(
+                port,
+                CanInterface() if self._is_interface else Adapter(),
+                drives,
+                self.timing,
+                paced=paced,
+                turnaround=turnaround,
+                always_heard=always_heard,
+                trace=trace,
+            )
+        return Line(
+            port,
+            self.make(gateway_timeout),
+            drives,
+            self.timing,
+            clock,
+            paced=paced,
+            turnaround=turnaround,
+            echo=echo,
+            always_heard=always_heard,
+            trace=trace,
+        )
+
+    @property
+    def _is_can(self) -> bool:
+        return self.protocol == CanLine.name
+
+    @property
+    def _is_interface(self) -> bool:
+        return self._is_can and self.tcp is None and is_interface(self.link)
 
     def check(self, address: int) -> None:
         """Look whether an address is one of the protocol (ValueError: it is not)."""
@@ -139,6 +215,8 @@ def endpoint(
     timing = Timing(row.baud if baud is None else baud, char_format or row.char_format)
     if timing.char_format[0] not in row.data_bits:
         raise ValueError(f'{protocol} has {row.data_bits} data bits, {timing.char_format} has not')
+    if row.bauds and timing.baud not in row.bauds:
+        raise ValueError(f'{timing.baud} bit/s: choose one of {", ".join(map(str, row.bauds))}')
     return Endpoint(protocol, timing, link, tcp)
 
 

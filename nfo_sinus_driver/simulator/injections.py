@@ -31,10 +31,13 @@ from typing import Any
 from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
+<<<<<<< HEAD
 from nfo_sinus_driver.simulator.plc import Channel
 from nfo_sinus_driver.simulator.plc import Plc
+=======
+from nfo_sinus_driver.simulator.wire import Wire
+>>>>>>> main
 
 #: Stands for an argument that must be given.
 _REQUIRED: Any = object()
@@ -97,7 +100,7 @@ class Argument:
 class Target:
     """What a verb works on; ``drive`` is ``None`` when it concerns any drive of the line."""
 
-    line: Line
+    line: Wire
     drive: SimulatedDrive | None
     now: float
     plc: Plc | None = None

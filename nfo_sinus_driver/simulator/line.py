@@ -33,13 +33,11 @@ from typing import TextIO
 from nfo_sinus_driver.simulator.line_faults import LineFaults
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.ports import Port
-from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.protocol import Protocol
 from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
+from nfo_sinus_driver.simulator.wire import Wire
 
-#: How long to wait before a port that could not come back is tried again (s).
-_TRY_AGAIN = 0.1
 #: By how much an RTU frame is shorter than the same one of Modbus TCP.
 _SHORTER = 4
 #: Whose echo is.
@@ -67,9 +65,13 @@ class _Delivery:
     until: int = field(compare=False)
 
 
-class Line:
+class Line(Wire):
     """
+<<<<<<< HEAD
     One line with several stations on it: drives, or what stands before them.
+=======
+    One serial line with several drives on it.
+>>>>>>> main
 
     :param paced: bytes take the time that they take on a real line, never less.
     :param turnaround: time a drive takes before it answers (s).
@@ -92,11 +94,17 @@ class Line:
         always_heard: bool = False,
         trace: Trace | None = None,
     ) -> None:
-        self.port = port
+        super().__init__(port, timing, LineFaults(int(timing.char_format[0])))
         self.protocol = protocol
+<<<<<<< HEAD
         self.stations = stations
         self.timing = timing
         self.faults = LineFaults(int(timing.char_format[0]))
+=======
+        self.drives = drives
+        self.name = protocol.name
+        self.speed = f'{timing.baud} {timing.char_format}'
+>>>>>>> main
         self._clock = clock
         self._trace = trace
         self._echo = echo
@@ -110,14 +118,6 @@ class Line:
         self._echo_end = float('-inf')
         self._deliveries: list[_Delivery] = []
         self._order = itertools.count()
-        self._gone_until: float | None = None
-        self._going = False
-
-    def hang_up(self, until: float) -> None:
-        """Let the port disappear, as an adapter that is pulled out, and come back ``until``."""
-        # not here: the thread of the line may be waiting for the port
-        self._going = True
-        self._gone_until = until
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""
@@ -126,33 +126,22 @@ class Line:
         for arrived in self._receiver.feed(data, now):
             self._handle(arrived)
 
-    def act(self, now: float) -> None:
-        """Do everything that is due."""
+    def _act(self, now: float) -> None:
         for arrived in self._receiver.take(now):
             self._handle(arrived)
         while self._deliveries and self._deliveries[0].at <= now:
             self._deliver(heapq.heappop(self._deliveries), now)
-        if self._going:
-            self._going = False
-            self.port.hang_up()
-            self._receiver.clear()
-            self._deliveries.clear()
-        if self._gone_until is not None and self._gone_until <= now:
-            try:
-                self.port.come_back()
-                self._gone_until = None
-            except PortError:
-                self._gone_until = now + _TRY_AGAIN
 
     @property
-    def due(self) -> float:
-        """When :meth:`act` has something to do again; infinity when nothing is to come."""
-        if self._going:
-            return float('-inf')
-        times = [self._receiver.due, self._gone_until]
+    def _due(self) -> float:
+        times = [self._receiver.due]
         if self._deliveries:
             times.append(self._deliveries[0].at)
         return min((time for time in times if time is not None), default=float('inf'))
+
+    def _unplugged(self) -> None:
+        self._receiver.clear()
+        self._deliveries.clear()
 
     def _handle(self, arrived: Arrived) -> None:
         request = self.protocol.unwrap(arrived.data)

@@ -129,6 +129,12 @@ class LineFaults:
                 replies = [new for reply in replies for new in self._spoiled(rate, reply, instead)]
         return replies
 
+    def noise(self) -> bytes:
+        """Return some bytes that nobody has sent."""
+        noise = self._random.randbytes(self._random.randint(1, 5))
+        mask = (1 << self._bits) - 1
+        return bytes(byte & mask for byte in noise)
+
     def _spoiled(self, fault: _Pending | _Rate, reply: Reply, instead: Reply | None) -> list[Reply]:
         if fault.what in _NOTES and instead is not None:
             delay = reply.delay + instead.delay
@@ -141,13 +147,18 @@ class LineFaults:
             note = _noted(reply, 'delayed')
             return [replace(reply, delay=reply.delay + fault.seconds, note=note)]
         if fault.what == 'noise':
-            noise = self._random.randbytes(self._random.randint(1, 5))
-            mask = (1 << self._bits) - 1
-            data = bytes(byte & mask for byte in noise) + reply.data
-            return [replace(reply, data=data, note=_noted(reply, 'noise'))]
+            return [replace(self.noisy(reply), note=_noted(reply, 'noise'))]
+        return [replace(self.damaged(reply), note=_noted(reply, 'damaged'))]
+
+    def noisy(self, reply: Reply) -> Reply:
+        """Return an answer with noise before it."""
+        return replace(reply, data=self.noise() + reply.data)
+
+    def damaged(self, reply: Reply) -> Reply:
+        """Return an answer with a flipped bit."""
         damaged = bytearray(reply.data)
         damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(self._bits)
-        return [replace(reply, data=bytes(damaged), note=_noted(reply, 'damaged'))]
+        return replace(reply, data=bytes(damaged))
 
 
 def _noted(reply: Reply, note: str) -> str:

@@ -83,8 +83,7 @@ def _serve(simulator: Simulator) -> int:
     drives = 'drive' if len(simulator.drives) == 1 else 'drives'
     addresses = ', '.join(str(address) for address in simulator.drives)
     first, *others = (
-        f'{line.protocol.name} at {line.timing.baud} {line.timing.char_format} on {line.port.name}'
-        for line in simulator.lines
+        f'{line.name} at {line.speed} on {line.port.name}' for line in simulator.lines
     )
     also = ''.join(f'; also {other}' for other in others)
     print(f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True)
@@ -209,7 +208,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar='N',
         help='address of a drive, as its protocol has them; once for each drive (default: 1)',
     )
-    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
+    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal; of '
+        'canopen also a CAN interface, such as can0')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
     add(
         '--also',
@@ -219,7 +219,11 @@ def _parser() -> argparse.ArgumentParser:
         help='serve the same drives by another protocol as well, at a link or TCP port; may be '
         'repeated',
     )
-    add('--baud', type=int, help='default: 19200, of classic and movitrac 9600')
+    add(
+        '--baud',
+        type=int,
+        help='default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s)',
+    )
     add(
         '--char-format',
         metavar='FORMAT',

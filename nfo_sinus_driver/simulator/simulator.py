@@ -39,7 +39,6 @@ from nfo_sinus_driver.simulator.endpoints import parse_endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.family import verbs_of
 from nfo_sinus_driver.simulator.injections import Target
-from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc
 from nfo_sinus_driver.simulator.plc import PlcSetting
@@ -59,7 +58,8 @@ class Simulator:
     :param addresses: one drive for each.
     :param model: the drive family, by the name of its folder.
     :param protocol: one of :data:`~nfo_sinus_driver.simulator.endpoints.PROTOCOLS`.
-    :param link: a symbolic link to the pseudo-terminal; without it, only the device.
+    :param link: a symbolic link to the pseudo-terminal; without it, only the device. On CANopen
+        also the name of a CAN interface, such as ``can0``.
     :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
     :param baud: of the line and of the drives; by default the protocol's.
     :param char_format: likewise.
@@ -115,7 +115,7 @@ class Simulator:
     ) -> None:
         first = endpoint(protocol, link=link, tcp=tcp, baud=baud, char_format=char_format)
         endpoints = [first, *map(parse_endpoint, also)]
-        if echo and not first.make(0.0).serial:
+        if echo and not first.can_echo:
             raise ValueError(f'{protocol} has no echo')
         for address in _checked(addresses):
             for one in endpoints:
@@ -171,12 +171,17 @@ class Simulator:
                 if trace is not None:
                     name = f'{trace}.{number + 1}' if number else trace
                     stream = stack.enter_context(open(name, 'w', encoding='utf-8'))
-                line = Line(
+                line = one.wire(
                     port,
+<<<<<<< HEAD
                     one.make(gateway_timeout),
                     stations,
                     one.timing,
+=======
+                    list(self.drives.values()),
+>>>>>>> main
                     time.monotonic,
+                    gateway_timeout=gateway_timeout,
                     paced=paced,
                     turnaround=turnaround,
                     echo=echo and not number,

@@ -42,15 +42,21 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.DRIVER_ERROR: 'error in the driver: {error}',
     Cause.LINE_FAILED: '{error}',
     Cause.NOT_REACHED: '{error}: check the cable and that the drive has power',
-    Cause.NO_RESPONSE: 'no response from address {address}: check in this order: {check}',
+    Cause.NO_RESPONSE: 'no response from address {address}{behind}: check in this order: '
+    '{check}',
     Cause.NO_VALID_ANSWER: 'what comes from address {address} is no answer ({error}): check baud '
     'rate and parity, that no other master is on the line, and the wiring',
     Cause.TOO_LATE: 'no answer within {timeout:g} s',
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
+<<<<<<< HEAD
     Cause.OLD_DATA: 'the data from the drive stand still in the PLC since {age:.1f} s (its life '
     'counter does not change): check the fieldbus between them and that the program of the PLC '
     'runs',
+=======
+    Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
+    Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
+>>>>>>> main
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
     Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
     Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
@@ -144,6 +150,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'press STOP there',
     Cause.POWER_CYCLED: 'the drive did not answer for a moment, and the bus has lost control '
     '({status}). It was switched off and on: check its mains',
+    Cause.SLOWER_AFTER_SILENCE: 'the drive did not answer for a moment, and the motor turns slower '
+    'than it was told to ({now:g} Hz, before {before:g} Hz; {status}). It may have been switched '
+    'off and on: check its mains and the line',
     Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
@@ -162,6 +171,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'set reference to fieldbus, where its control method has that',
     Cause.SETPOINT_LIMITED: 'set-point {value:g} is limited to {limited:g} (setpoint_max, or the '
     'limit of the drive)',
+    Cause.SETPOINT_BEYOND_NOMINAL: 'set-point {value:g} is limited to {limited:g} {unit}, which is '
+    'nominal for this motor: check in which unit it was meant; if the motor may go beyond, '
+    '{call.set_setpoint_max}',
     Cause.SETPOINT_TIMED_OUT: 'no set-point for {timeout:g} s: the motor ramps to a stop until the '
     'next one arrives; check what publishes them',
     Cause.SETPOINTS_AGAIN: 'set-points arrive again',
@@ -204,6 +216,15 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
+        why='{why}', remedy='use the RUN input'
+    ),
+    Cause.OWN_TIMEOUT_LEFT: 'control stays with the bus, and the time-out of the drive itself '
+    '({name} {timeout:g} s) goes on: {why}. So it will have a fault when nothing is said to it for '
+    'so long; set {key} to 0 if it shall not',
+    Cause.OWN_TIMEOUT_NOT_OURS: 'this {call.program} has not set it, and leaves it as it is',
+    Cause.WATCH_LEFT: 'the drive may go on watching over this {call.program} ({by}): {why}. So it '
+    'may have a fault {seconds:g} s after this end, which is acknowledged as any other',
     # --- procedures
     Cause.UNKNOWN_PROCEDURE: '{what} is not known of this model ({model}): its manual lists no '
     'command for it; do it at the keypad',
@@ -308,6 +329,7 @@ class Calls:
     :ivar program: what this is that speaks.
     :ivar drive_timeout: the name of that setting.
     :ivar set_drive_timeout: such as ``set drive_timeout``.
+    :ivar set_setpoint_max: how to let set-points go beyond what is nominal.
     :ivar set_control_mode: how to expect another control mode.
     :ivar set_model: how to correct the model.
     """
@@ -317,6 +339,7 @@ class Calls:
     program: str
     drive_timeout: str
     set_drive_timeout: str
+    set_setpoint_max: str
     set_control_mode: str
     set_model: str
 

@@ -62,7 +62,7 @@ from ways import Way
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: Machines are shared and slow: a condition that does not come true in this time never will, s.
-PATIENCE = 40.0
+PATIENCE = 90.0
 #: All settings of a drive are read before its node is active, of some over 9600 bit/s.
 _STARTING = 3 * PATIENCE
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
@@ -293,10 +293,18 @@ class Client(contextlib.ExitStack):
         self._clients: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        thread = threading.Thread(target=self._executor.spin, daemon=True)
+        # the thread ends by itself before what it waits for is gone
+        ended = threading.Event()
+
+        def spin() -> None:
+            while not ended.is_set():
+                self._executor.spin_once()
+
+        thread = threading.Thread(target=spin, daemon=True)
         thread.start()
-        self.callback(thread.join, 5.0)
-        self.callback(self._executor.shutdown, 5.0)
+        self.callback(self._executor.shutdown, PATIENCE)
+        self.callback(thread.join, PATIENCE)
+        self.callback(self._executor.create_task, ended.set)
 
     def where_it_spins(self, call: Callable[[], Any]) -> Any:
         """Call something in the thread that hears the answers; return what it returned."""

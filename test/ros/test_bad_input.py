@@ -209,10 +209,36 @@ def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -
         assert status.setpoint == -12.0
         client.wait_for('status', lambda status: abs(status.actual + 12) < 0.3, '-12 Hz')
         _says(driver, 'set-point -4000 is limited to -12')
-        assert client.set_parameters(setpoint_max=0.0).successful
+        # as far as the drive goes, where somebody says that the motor may
+        assert client.set_parameters(setpoint_max=1000.0).successful
         most = bench.drives.most
         client.wait_for('status', lambda status: status.setpoint == -most, "the drive's limit")
     assert abs(drive.state()['setpoint']) == most
+
+
+def test_a_setpoint_in_the_wrong_unit_does_not_race_the_motor(bench: Bench) -> None:
+    drive = bench.simulator(*bench.drives.ramps(1))
+    driver = bench.driver()
+    client = bench.client().connected()
+    nominal = bench.drives.nominal
+    for _ in range(2):
+        assert client.enable().success
+        # meant as rpm
+        with client.setpoints(500.0):
+            status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
+            assert status.setpoint == nominal
+            client.wait_for('status', lambda status: abs(status.actual - nominal) < 0.3, 'nominal')
+            assert abs(drive.state()['setpoint']) == nominal
+        assert client.enable(False).success
+    if nominal < bench.drives.most:
+        said = f'set-point 500 is limited to {nominal:g} Hz, which is nominal for this motor'
+        wait_until(lambda: driver.text.count(said) == 2, 'said once for each run')
+        assert 'set setpoint_max of /nfo_sinus' in driver.text
+    # more, where somebody says so
+    assert client.set_parameters(setpoint_max=nominal - 10.0).successful
+    assert client.enable().success
+    with client.setpoints(500.0):
+        client.wait_for('status', lambda status: status.setpoint == nominal - 10.0, 'as said')
 
 
 def test_enable_with_a_standing_fault_says_which_and_what_to_do(bench: Bench) -> None:

@@ -134,7 +134,9 @@ def _mode_changed_by_somebody(bench: Bench, drive: Simulated, client: Client) ->
 
 
 def _stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
-    assert client.call('stop').message == 'stopping: it ramps down'
+    # the ramp is short, and its end may come before the drive is asked
+    answer = client.call('stop').message
+    assert answer.startswith(('stopping: it ramps down', 'stopped (')), answer
 
 
 def _quick_stop_service(bench: Bench, drive: Simulated, client: Client) -> None:

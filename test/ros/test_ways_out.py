@@ -19,6 +19,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 import signal
+import subprocess
 
 from bench import A_WHILE
 from bench import PATIENCE
@@ -85,6 +86,34 @@ def test_a_signal_that_comes_to_a_thread_of_a_library_stops_the_motor(bench: Ben
     assert state['fault'] == 0
 
 
+def test_the_end_of_the_launch_that_started_it_stops_the_motor(bench: Bench) -> None:
+    drive = bench.simulator(*bench.drives.ramps(1))
+    with subprocess.Popen(('sleep', '1000')) as launch:
+        driver = bench.driver('--', '--end-with', str(launch.pid))
+        client = bench.client().connected()
+        with client.run_at(20.0):
+            assert drive.state()['turning']
+            # it says nothing to the driver, and nobody waits for it
+            launch.kill()
+            assert driver.wait() == 0, driver.text
+            state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+        assert bench.drives.left(state), 'control was not given back'
+        assert state['fault'] == 0
+        said = f'process {launch.pid}, which this driver ends with, has ended: stopping the motors'
+        assert said in driver.text
+
+
+@pytest.mark.parametrize('given', ['gone', 'soon', '0', ''])
+def test_a_driver_that_ends_with_nobody_does_not_start(bench: Bench, given: str) -> None:
+    if given == 'gone':
+        with subprocess.Popen(('true',)) as launch:
+            launch.wait()
+        given = str(launch.pid)
+    driver = bench.bare_driver('--', '--end-with', given)
+    assert driver.wait() == 2
+    assert 'cannot start: --end-with' in driver.text
+
+
 def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1, 60))
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
@@ -99,7 +128,7 @@ def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None
     assert state['fault'] == 0
 
 
-@needs('timeout', 'quiet')
+@needs('timeout')
 def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:
@@ -112,7 +141,8 @@ def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     ended = drive.state()['time']
     state = drive.wait_for(lambda state: state['time'] > ended + 3.0, timeout=PATIENCE)
     assert state['fault'] == 0
-    assert not state['driven']
+    assert bench.drives.stopping(state)
+    assert not bench.drives.commanded(state)
     assert not state['error_log']
 
 
@@ -242,13 +272,13 @@ def test_lifecycle_shutdown_stops_the_motor(bench: Bench) -> None:
 
 def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
-    driver = bench.driver('-p', 'setpoint_timeout:=0.5')
+    driver = bench.driver('-p', 'setpoint_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(20.0):
         pass
     drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
     assert bench.drives.commanded(drive.state()), 'it is still enabled'
-    wait_until(lambda: 'no set-point for 0.5 s' in driver.text, 'the warning')
+    wait_until(lambda: 'no set-point for 3 s' in driver.text, 'the warning')
     with client.setpoints(15.0):
         client.wait_for('status', lambda status: status.actual > 14, 'it moves again')
     assert driver.text.count('no set-point for') == 1

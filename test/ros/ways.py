@@ -45,12 +45,13 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
-    'quiet': 'its time-out goes on where nobody is: control stays with the bus',
     'nominal': 'this model does not tell the nominal speed of its motor',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
+    'canopen': 'it is about CANopen',
+    'local': 'the module holds the drive in bus mode: keypad and terminals never get control',
 }
 
 #: How unit and PDU are got out of a frame of Modbus.
@@ -62,6 +63,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
 #: What a driver says where nobody answers, and what is to be checked, in order.
 SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 _SILENCE_OF_MOVITRACS = 'no response', 'power', 'USS 11A', 'P880', 'P842', 'wires'
+_SILENCE_OF_NODES = 'no response', 'power', 'the node id', 'the bit rate', 'CAN_H', '120 ohms'
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Way:
     :ivar baud_rate: bit/s, of both ends.
     :ivar dialect: the manual that describes the Classic protocol; of the simulator.
     :ivar features: those of :data:`WITHOUT` that it has.
+    :ivar method: the control method that the driver is told, where it is not the usual one.
+    :ivar block: the first register of the block, behind a PLC.
     :ivar beyond: the settings of the drive that it does not reach.
     :ivar untold: what a running drive does not tell of itself, by the fields of `DriveStatus`.
     :ivar unmeasured: the same of `Telemetry`.
@@ -83,6 +87,8 @@ class Way:
     model: str = 'sinus_g2'
     dialect: str = ''
     baud_rate: int = 57600
+    method: str = ''
+    block: int = 0
     beyond: frozenset[str] = frozenset()
     untold: frozenset[str] = frozenset()
     unmeasured: frozenset[str] = frozenset()
@@ -95,11 +101,14 @@ class Way:
     @property
     def drives(self) -> Drives:
         """What is to be known of its drives."""
-        return DRIVES[self.model]
+        return DRIVES.get(f'{self.model} {self.protocol}', DRIVES[self.model])
 
     @property
     def simulator(self) -> dict[str, str | int]:
         """The settings of a simulated line, as `Simulator` names them."""
+        if self.method == 'telegram1':
+            block = f'1:{self.block}'
+            return {'protocol': self.method, 'model': self.model, 'address': 1, 'block': block}
         settings: dict[str, str | int] = {
             'protocol': self.protocol, 'model': self.model, 'baud': self.baud_rate
         }
@@ -111,6 +120,8 @@ class Way:
         settings: dict[str, str | int] = {
             'protocol': self.protocol, 'model': self.model, 'baud_rate': self.baud_rate
         }
+        if self.method:
+            settings |= {'control_method': self.method, 'block_address': self.block}
         # v2.03 is what a driver takes a drive for that is not said to be older
         return {**settings, 'classic_dialect': 'v5.0'} if self.dialect == '5.0' else settings
 
@@ -131,6 +142,8 @@ class Way:
         """What a driver says where nobody has its address, and what is to be checked, in order."""
         if self.protocol == 'modbus_tcp':
             return 'has no path to unit', 'table of units', 'serial port'
+        if self.protocol == 'canopen':
+            return _SILENCE_OF_NODES
         return _SILENCE_OF_MOVITRACS if self.protocol == 'movitrac' else SILENCE
 
     @property
@@ -141,7 +154,7 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'quiet', 'timeout'))
+_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer', 'nominal',
@@ -197,7 +210,17 @@ WAYS = {
             'movitrac', 'movitrac', frozenset(('movitrac', 'serial', 'states', 'timeout')),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
         ),
+        Way(
+            'canopen', 'canopen', (_G2 | {'canopen', 'fine', 'identity'}) - {'local', 'fast'},
+            baud_rate=125_000, beyond=_NOT_ON_MODBUS,
+        ),
     )
+}
+#: Through a PLC, by telegram 1, which tells less than any line of the drives themselves: their tests
+#: are their own.
+TELEGRAM1 = {
+    model: Way(f'telegram1_{model}', 'modbus_tcp', frozenset(), model, method='telegram1', block=7)
+    for model in ('sinus_optimal', 'sinus_h', 'sinus_g2')
 }
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.

@@ -52,6 +52,7 @@ class Drives(abc.ABC):
     :ivar stopped: the text that it shows when nobody has it run.
     :ivar running: the text while it runs under control of the bus.
     :ivar most: the highest set-point, Hz.
+    :ivar nominal: what its motor is made for, Hz; `most` where the drive does not tell it.
     :ivar without_run_input: what is said where the input that has to be closed is open.
     :ivar tells_run_input: it is read whether that input is closed, before anything is enabled.
     :ivar coasts: a quick stop releases the motor.
@@ -68,6 +69,7 @@ class Drives(abc.ABC):
     stopped: str
     running: str
     most: float
+    nominal: float
     without_run_input: str
     no_timeout: tuple[str, ...] = ()
     tells_run_input: bool = False
@@ -164,6 +166,20 @@ class Sinus(Drives):
         drive.inject('keypad', 'stop')
 
 
+class OnCanopen(Sinus):
+    """
+    A G2 on CANopen: its module holds it in bus mode, whoever is there [M0 §6.4].
+
+    It watches over the heartbeat of the driver, which shows in no parameter.
+    """
+
+    def left(self, state: State) -> bool:
+        return state['mode'] == 3 and not state['scmd'] and not state['mode_ext_writes']
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        return state['parameters']['serial.auto_stop'] is True
+
+
 class Movitrac(Drives):
     """Those with function bits, which count while P841 is Remote control."""
 
@@ -215,12 +231,20 @@ _SINUS = {
 DRIVES = {
     'sinus_g2': Sinus(
         **_SINUS,
+        nominal=50.0,
+        overvoltage=Fault(8, 'DC High', ('control.retard',)),
+        hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
+        no_timeout=('--set', 'serial.auto_stop=OFF'),
+    ),
+    'sinus_g2 canopen': OnCanopen(
+        **{**_SINUS, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'},
         overvoltage=Fault(8, 'DC High', ('control.retard',)),
         hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
         no_timeout=('--set', 'serial.auto_stop=OFF'),
     ),
     'sinus_optimal': Sinus(
         **_SINUS,
+        nominal=150.0,
         overvoltage=Fault(8, 'DC High', ('Lengthen the retardation time',)),
         hot_motor=Fault(4, 'PTC Temp', ('temperature sensor', 'Let the motor cool')),
         coasts=False,
@@ -237,6 +261,7 @@ DRIVES = {
         stopped='No enable',
         running='Enable',
         most=400.0,
+        nominal=50.0,
         without_run_input='terminal 43 (Enable/Stop) is open',
         no_timeout=('--set', 'serial.pc_timeout=0'),
         tells_run_input=True,

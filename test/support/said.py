@@ -36,6 +36,7 @@ CALLS = Calls(
     program='driver',
     drive_timeout='drive_timeout',
     set_drive_timeout='set drive_timeout',
+    set_setpoint_max='set setpoint_max',
     set_control_mode='expected_control_mode in the driver',
     set_model='set model to auto or to what it is',
 )

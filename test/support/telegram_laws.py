@@ -191,7 +191,9 @@ JUDGES: Mapping[str, type[Judge]] = {
 }
 
 
-def violations(frames: Iterable[Mapping[str, Any]], model: str, unit: int = 1) -> list[str]:
+def violations(
+    frames: Iterable[Mapping[str, Any]], model: str, unit: int = 1, start: int = 0
+) -> list[str]:
     """Return what is wrong with all that was written to the block of a unit."""
     judge = JUDGES[model]()
-    return [wrong for one in exchanges(frames, unit) for wrong in judge.complaints(one)]
+    return [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]

@@ -16,11 +16,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+import functools
 from functools import reduce
 from operator import xor
 import re
 import struct
 from typing import NamedTuple
+
+from nfo_sinus_driver.catalog import load_family
 
 #: Protocols whose frames are kept apart by silence.
 WITH_GAP = frozenset(('modbus_rtu',))
@@ -46,7 +50,9 @@ class Request(NamedTuple):
     """
     A read or a write.
 
-    :ivar place: the register or the Classic id of the first word; the index.
+    :ivar place: the register or the Classic id of the first word; the index. Of CANopen it is the
+        register of the same parameter, and its words are those of Modbus: one instance has all of
+        its addresses by formula [M0 §6.2.5], [M0 §6.4.3].
     :ivar count: how many registers, else 1.
     :ivar words: what is written, ``None`` for a read.
     :ivar source: place and count of what is read in the same transaction as the write.
@@ -61,7 +67,8 @@ class Request(NamedTuple):
 
 def understand(data: bytes, protocol: str) -> Request | None:
     """
-    Return what a request asks for; ``None`` if it only asks the drive who it is.
+    Return what a request asks for; ``None`` if it only asks the drive who it is, or on CANopen is
+    about the node and not the drive.
 
     :raises ValueError: it is no request for parameters; says why.
     """
@@ -69,6 +76,8 @@ def understand(data: bytes, protocol: str) -> Request | None:
         return _of_classic(data)
     if protocol == 'movitrac':
         return _of_movitrac(data)
+    if protocol == 'canopen':
+        return _of_canopen(data)
     return _of_message(_message(data, protocol))
 
 
@@ -147,3 +156,62 @@ def _of_movitrac(data: bytes) -> Request:
     if unit not in _MOVITRACS:
         raise ValueError(f'is for address {unit}')
     return Request(unit, index, 1, tuple(words) or None)
+
+
+#: The frames of a client that are no requests: network management, its own heartbeat, the asking
+#: for the state of a node, which has no data.
+_NETWORK_MANAGEMENT, _ERROR_CONTROL, _REQUESTS = 0x000, 0x700, 0x600
+_NODES = range(1, 128)
+#: Objects of the communication profile, and of the drive.
+_OF_THE_NODE, _OF_THE_DRIVE = range(0x1000, 0x2000), range(0x2001, 0x2F00)
+#: Where the error log begins, as printed and by formula [C2], and on Modbus.
+_LOGS, _LOG_REGISTER, _LOG_ENTRIES = (0x2F7C, 0x4F7D), 0xC000, 32
+#: Commands of a client: it writes, it reads; anything else goes on with what has begun, or ends it.
+_DOWNLOAD, _UPLOAD = 1, 2
+
+
+def _of_canopen(data: bytes) -> Request | None:
+    identifier, message = int.from_bytes(data[:2], 'big'), data[2:]
+    unit = identifier - _REQUESTS
+    if unit not in _NODES:
+        known = identifier == _NETWORK_MANAGEMENT or identifier - _ERROR_CONTROL in _NODES
+        if not known:
+            raise ValueError(f"has identifier {identifier:03X}h, which is no client's")
+        return None
+    if len(message) != 8:
+        raise ValueError(f'has {len(message)} bytes, and a request has eight')
+    command = message[0] >> 5
+    index, sub_index = int.from_bytes(message[1:3], 'little'), message[3]
+    if command not in (_DOWNLOAD, _UPLOAD) or index in _OF_THE_NODE:
+        return None
+    register, count = _register(index, sub_index)
+    if command == _UPLOAD:
+        return Request(unit, register, count, None)
+    if not message[0] & 2:
+        raise ValueError('writes more than four bytes, which no parameter has')
+    value = message[4 : 8 - (message[0] >> 2 & 3 if message[0] & 1 else 0)]
+    number = int.from_bytes(value, 'little', signed=True)
+    words = struct.unpack('<2H', (number & 0xFFFF_FFFF).to_bytes(4, 'little'))
+    return Request(unit, register, count, words[:count])
+
+
+def _register(index: int, sub_index: int) -> tuple[int, int]:
+    """Return the register of an object, and how many there are of it."""
+    for first in _LOGS:
+        if index - first in range(_LOG_ENTRIES):
+            return _LOG_REGISTER + 4 * (index - first), 2
+    if index not in _OF_THE_DRIVE:
+        raise ValueError(f'is about object {index:04X}h, which is no parameter')
+    base = 0x210 + 4 * (index - 0x2001)
+    counts = _counts()
+    # the second value stands behind the first
+    register = base if sub_index < 2 else base + counts.get(base, 2)
+    return register, counts.get(register, 1)
+
+
+@functools.cache
+def _counts() -> Mapping[int, int]:
+    """Return how many registers each parameter has, by the first one; of a ramp the second half."""
+    rows = load_family('sinus_g2').values()
+    places = [row.at('modbus') for row in rows if 'modbus' in row.addresses]
+    return {place.index: place.codec.size // 2 for place in places}

@@ -24,6 +24,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from nfo_sinus_driver.catalog import usual_family
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
 INTERFACE = ROOT / 'docs' / 'interface.md'
@@ -79,8 +81,9 @@ def settings(source: str) -> dict[str, object]:
     """The parameters that a module declares as a ``Setting``, and their defaults."""
     found = {}
     for call in calls(source, 'Setting'):
-        name, default = (ast.literal_eval(argument) for argument in call.args[:2])
-        found[name] = default
+        name, default = call.args[:2]
+        usual = ast.unparse(default) == 'usual_family()'
+        found[ast.literal_eval(name)] = usual_family() if usual else ast.literal_eval(default)
     return found
 
 

@@ -58,14 +58,6 @@ MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'
 OPENS_NO_PORT = frozenset({'node/nonblocking_stdio.py'})
 #: Rooms that are about families and name them.
 NAMES_FAMILIES = {'families', 'simulator'}
-#: Files elsewhere that name some family or parameter, and what: to be made general, never more.
-NAMED = {
-    'catalog/page.py': {'control.accel'},
-    'cli/options.py': {'control.accel'},
-    'cli/scan.py': {'serial.si_baud'},
-    # the default of a public parameter, which the documentation shows
-    'node/settings.py': {'sinus_g2'},
-}
 #: Rooms in which serial ports are opened.
 OPENS_PORTS = {'link', 'simulator'}
 PORT_MODULES = {'serial', 'termios', 'pty', 'tty', 'fcntl'}
@@ -182,8 +174,7 @@ def violations(path: str, source: str) -> list[str]:
         found += [f'{room} opens ports with {call}' for call in opens_ports(tree)]
     general = room == 'simulator' and path.count('/') == 1
     if general or room not in NAMES_FAMILIES:
-        more = named(tree) - NAMED.get(path, set())
-        found += [f'{room} names {name}' for name in sorted(more)]
+        found += [f'{room} names {name}' for name in sorted(named(tree))]
     if general:
         words = FAMILY.findall(source.replace(PACKAGE, ''))
         found += [f'{room} knows {word}' for word in words]
@@ -272,12 +263,6 @@ def test_longer_file_is_still_longer(path: str) -> None:
     # once it is short enough, its exception has to go
     lines = (ROOT / PACKAGE / path).read_text(encoding='utf-8').count('\n')
     assert lines > MOST_LINES, f'{path} has {lines} lines: take it out of LONGER'
-
-
-@pytest.mark.parametrize('path', sorted(NAMED))
-def test_what_is_named_still_is(path: str) -> None:
-    # once it is general, its exception has to go
-    assert named(ast.parse((ROOT / PACKAGE / path).read_text(encoding='utf-8'))) == NAMED[path]
 
 
 def test_every_file_has_the_licence_header() -> None:

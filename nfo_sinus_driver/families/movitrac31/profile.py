@@ -23,6 +23,7 @@ is written.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
 import contextlib
@@ -84,6 +85,12 @@ _LEAST = {
     'V/f pattern 2': 'frequency.f_min_2',
     'V/f pattern 3': 'frequency.f_min_3',
 }
+#: The frequency at which a motor has its rated voltage, by pattern.
+_BASE = {
+    'V/f pattern 1': 'frequency.f_base_1',
+    'V/f pattern 2': 'frequency.f_base_2',
+    'V/f pattern 3': 'frequency.f_base_3',
+}
 
 
 class DirectionAndSize(SetpointTarget):
@@ -113,9 +120,21 @@ class DirectionAndSize(SetpointTarget):
         reverse = int(values[BITS]) & Bits.COUNTER_CLOCKWISE
         return math.copysign(float(values[self.key]), -1 if reverse else 1)
 
+    def read_nominal(self, has: Callable[[str], bool]) -> Steps[float]:
+        """Read the base frequency of the V/f pattern in use."""
+        base = _BASE.get((yield from _pattern()))
+        return math.inf if base is None else float((yield Read(base)))
+
     def zero(self, *, once: bool) -> Steps[None]:
         """Write size 0 and leave the bits alone, for a direction among them would be a command."""
         yield Write(self.key, 0.0, once=once)
+
+    def set_to_zero(self) -> Steps[None]:
+        """Write size 0, and read it back alone."""
+        yield from self.zero(once=False)
+        kept = float((yield Read(self.key)))
+        if kept:
+            raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
 
 
 def _reverse(value: float) -> bool:
@@ -311,14 +330,19 @@ def _require_still_at_zero() -> Steps[None]:
 
     :raises NotPossible: the parameter set in use has a least frequency.
     """
-    word = int((yield Read(STATUS_WORD)))
-    pattern = yield Read(_PATTERNS[bool(word & words.IN_SET_2)])
-    least = _LEAST.get(pattern)
+    least = _LEAST.get((yield from _pattern()))
     frequency: float = 0.0 if least is None else (yield Read(least))
     if frequency:
         raise NotPossible(
             f'the motor would turn at set-point 0: set {least} to 0 (it is {frequency:g} Hz)'
         )
+
+
+def _pattern() -> Steps[str]:
+    """Return the V/f pattern of the parameter set in use."""
+    word = int((yield Read(STATUS_WORD)))
+    pattern = yield Read(_PATTERNS[bool(word & words.IN_SET_2)])
+    return str(pattern)
 
 
 def _in_charge(status: Status | None) -> Steps[str]:

@@ -74,10 +74,10 @@ _HOLDERS: Mapping[Value, Holder] = {
 _COMMON = 'fieldbus.setpoint'
 #: The greatest ones are those over a bus [M2 table 2].
 _SETPOINTS = {
-    'Freque': SetpointTarget('status.frq_set', 150.0, at=_COMMON),
+    'Freque': SetpointTarget('status.frq_set', 150.0, at=_COMMON, nominal='motor.f_nom'),
     'PI-Reg': SetpointTarget('status.reg_set', 150.0, at=_COMMON),
-    'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON),
-    'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON),
+    'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON, nominal=100.0),
+    'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON, nominal='motor.n_nom'),
 }
 #: Beyond what any reference asks for in either direction, 150 Hz, 9000 rpm and 200 % ([M0 table 4],
 #: [M2 table 2]): by a fifth for slip and overshoot, twice for a torque peak.
@@ -480,4 +480,9 @@ PROFILE = Profile(
     most=MOST,
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
+    # [M0 §6.4]
+    holds_control={
+        'canopen': 'the CANopen module holds the drive in bus mode from the first request on, '
+        'until the drive is switched off',
+    },
 )

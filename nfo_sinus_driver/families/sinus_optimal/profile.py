@@ -129,6 +129,10 @@ class DriveControl(ControlMethod):
 
     means = 'control word'
     references = ('terminal',)
+    keeps_control = (
+        'from the terminals an active RUN input might start the motor; take control at the keypad '
+        'to give it to them'
+    )
 
     def in_control(self) -> Steps[bool]:
         """Tell whether the bus has control, by us or by whom was here before."""

@@ -30,7 +30,9 @@ from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The codes of BusType, SiBaud and SiProt [M0 table 4].
-BUS_TYPES: Mapping[str, int] = {'classic': 1, 'modbus_ascii': 2, 'modbus_rtu': 3}
+BUS_TYPES: Mapping[str, int] = {'classic': 1, 'modbus_ascii': 2, 'modbus_rtu': 3, 'canopen': 4}
+#: What a module speaks in place of the drive: SiBaud and SiProt have no codes for its line.
+OF_A_MODULE = 'canopen'
 BAUD_CODES = {1200: 16, 2400: 32, 4800: 64, 9600: 128, 19200: 256, 38400: 512, 57600: 768}
 FORMAT_CODES = {'7E1': 0, '7O1': 1, '7N2': 2, '8E1': 4, '8O1': 5, '8N2': 6}
 #: By these it hears the line.
@@ -103,13 +105,13 @@ class SerialSide:
         if 'serial.address' in self._memory.given:
             raise ValueError('serial.address: give the address with --address')
         for spoken, timing in lines:
-            self._rules(spoken).check(spoken, timing)
+            if spoken != OF_A_MODULE:
+                self._rules(spoken).check(spoken, timing)
         spoken, timing = lines[0]
-        codes = {
-            'serial.bus_type': BUS_TYPES[spoken],
-            'serial.si_baud': BAUD_CODES[timing.baud],
-            'serial.si_prot': self._rules(spoken).formats[timing.char_format],
-        }
+        codes = {'serial.bus_type': BUS_TYPES[spoken]}
+        if spoken != OF_A_MODULE:
+            codes['serial.si_baud'] = BAUD_CODES[timing.baud]
+            codes['serial.si_prot'] = self._rules(spoken).formats[timing.char_format]
         for key in codes.keys() - self._memory.given:
             self._memory.put(key, codes[key])
         self.initialise()
@@ -122,6 +124,8 @@ class SerialSide:
 
     def hears(self, protocol: str, timing: Timing) -> bool:
         """Whether it is set to this protocol, speed and format."""
+        if protocol == OF_A_MODULE:
+            return self.bus_type == BUS_TYPES[protocol]
         return (
             self.bus_type == BUS_TYPES[protocol]
             and self.baud == BAUD_CODES[timing.baud]

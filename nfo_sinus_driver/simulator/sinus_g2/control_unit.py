@@ -24,6 +24,7 @@ from collections.abc import Mapping
 from typing import Any
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -43,6 +44,8 @@ from nfo_sinus_driver.simulator.sinus.control_unit import Source
 from nfo_sinus_driver.simulator.sinus.control_unit import Variant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
+from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NAMES as CANOPEN_OPTIONS
+from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import CanopenShape
 from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import RELEASED
@@ -129,10 +132,12 @@ class G2ControlUnit(SinusControlUnit):
     Runs the motor of a G2, and tunes it.
 
     :param dialect: the manual that describes its firmware; by default as SWVer says.
-    :param options: those of every Sinus.
-    :raises ValueError: there is no such manual, or SWVer was given and is of another firmware.
+    :param options: those of every Sinus, and those of :class:`CanopenShape`.
+    :raises ValueError: there is no such manual, or SWVer was given and is of another firmware; or
+        an option cannot be that.
 
     :ivar firmware: what its firmware does its own way.
+    :ivar canopen: how it is on CANopen.
     :ivar self_restart: ends faults by itself.
     :ivar tuning: the procedure that is going on.
     """
@@ -155,7 +160,11 @@ class G2ControlUnit(SinusControlUnit):
     ) -> None:
         self.firmware = firmware_of(memory, dialect)
         faults = SinusFaults(memory.model, log_size=self.firmware.log_size)
+        shape = {name: options.pop(name) for name in CANOPEN_OPTIONS & options.keys()}
+        self.canopen = CanopenShape(**shape)
         super().__init__(memory, address, faults, **options)
+        #: The module of CANopen holds it in bus mode.
+        self._is_held = False
         self.self_restart = SelfRestart(memory, faults)
         self.machine = StateMachine()
         self.word = RELEASED
@@ -172,6 +181,7 @@ class G2ControlUnit(SinusControlUnit):
     def restart(self) -> None:
         """Begin as after power-on."""
         self.machine = StateMachine()
+        self._is_held = False
         super().restart()
 
     def take(self, source: Source) -> None:
@@ -185,6 +195,20 @@ class G2ControlUnit(SinusControlUnit):
         """Let a fault happen, and count the tries to end it."""
         super().trip(code, cause_present=cause_present)
         self.self_restart.tripped(code)
+
+    def hold_bus_mode(self) -> None:
+        """Be in bus mode, and come back to it whoever takes control, while that module talks."""
+        if not self._is_held:
+            self._is_held = True
+            self.settle()
+
+    def bus_lost(self) -> None:
+        """Be held no more; with AutoStop, a fault of the fieldbus where the bus commands [C91]."""
+        self._is_held = False
+        if self.memory.raw('serial.auto_stop') and self.bus_controls:
+            (code,) = (one.code for one in self.memory.model.codes(Meaning.FIELDBUS_FAILURE))
+            self.trip(code)
+            self.settle()
 
     def fail_tuning(self, code: int) -> None:
         """Let the next tuning end with a fault (ValueError: none that a tuning ends with)."""
@@ -337,6 +361,13 @@ class G2ControlUnit(SinusControlUnit):
 
     def settle(self) -> None:
         """Carry out what stands: control word, state machine, power stage, demand."""
+        self._settle()
+        if self._is_held and self.tuning is None and not self.on_bus and not self.faults.serial:
+            # whoever takes control ends a run; bus mode is entered again at once [M0 §6.4]
+            self.take(Source.SCMD)
+            self._settle()
+
+    def _settle(self) -> None:
         self._keep_delay()
         self.word = self._translated()
         effective = self.word

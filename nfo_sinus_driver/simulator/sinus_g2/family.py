@@ -27,6 +27,8 @@ from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.injections import Verb
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus import parts
+from nfo_sinus_driver.simulator.sinus_g2 import canopen
+from nfo_sinus_driver.simulator.sinus_g2 import canopen_shape
 from nfo_sinus_driver.simulator.sinus_g2 import classic
 from nfo_sinus_driver.simulator.sinus_g2 import telegram1
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
@@ -87,7 +89,11 @@ def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
     factory=FACTORY,
+<<<<<<< HEAD
     servers={'modbus': ModbusServer, 'classic': classic.Server, 'telegram1': telegram1.Server},
+=======
+    servers={'modbus': ModbusServer, 'classic': classic.Server, 'canopen': canopen.Server},
+>>>>>>> main
     options=(
         Option(
             'dialect',
@@ -96,6 +102,7 @@ FAMILY = SimulatedFamily(
             tuple(DIALECTS),
         ),
         *parts.OPTIONS,
+        *canopen_shape.OPTIONS,
     ),
     verbs={
         **parts.VERBS,

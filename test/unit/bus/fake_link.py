@@ -32,6 +32,7 @@ from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Supervision
 
 #: No honest wait takes this long, on any machine, s.
 PATIENCE = 30.0
@@ -68,6 +69,7 @@ class FakeLink:
     """
 
     protocol = PROTOCOLS['modbus_rtu']
+    supervision: Supervision | None = None
 
     def __init__(self) -> None:
         self.done: list[Done] = []

@@ -108,12 +108,17 @@ def test_numbers_of_profibus_and_canopen_are_unique() -> None:
             assert parts == [first, first + 1]
 
 
+#: Two words that count at the same moment: no transfer of CANopen writes two objects.
+MASK = 'fieldbus.drv_ctrl_write_mask'
+
+
 @pytest.mark.parametrize('parameter', MODBUS, ids=lambda parameter: parameter.key)
 def test_the_three_formulas(parameter: Parameter) -> None:
     number = instance(parameter)
     assert number >= 1
     # PNU = 1000 + ADI, index = 2000h + ADI, register = 210h + 4 (ADI - 1)
-    assert parameter.at('canopen').index == 0x2000 + number
+    if parameter.key != MASK:
+        assert parameter.at('canopen').index == 0x2000 + number
     base = 0x210 + 4 * (number - 1)
     offset = OFFSETS.get(parameter.key, 0)
     place = parameter.at('modbus')
@@ -125,8 +130,11 @@ def test_the_three_formulas(parameter: Parameter) -> None:
 def test_what_only_one_bus_has() -> None:
     assert {row.key for row in CLASSIC if row not in MODBUS} == CLASSIC_ONLY
     assert {row.key for row in MODBUS if row not in CLASSIC} == MODBUS_ONLY
-    for protocol in ('profibus', 'canopen'):
-        assert {key for key, row in G2.items() if protocol not in row.addresses} == CLASSIC_ONLY
+    def lacking(protocol: str) -> set[str]:
+        return {key for key, row in G2.items() if protocol not in row.addresses}
+
+    assert lacking('profibus') == CLASSIC_ONLY
+    assert lacking('canopen') == CLASSIC_ONLY | {MASK}
 
 
 def test_times_of_the_ramps_are_not_the_speeds_before_them() -> None:

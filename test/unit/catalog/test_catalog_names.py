@@ -25,7 +25,9 @@ from setting_names import SETTINGS
 
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import usual_family
 
 G2 = load_family('sinus_g2')
 NAMES = Path(__file__).resolve().parents[4] / 'shared' / 'design' / 'parameter_names.csv'
@@ -63,3 +65,10 @@ def test_what_is_no_setting() -> None:
     assert {row.group for row in others} == {'Status', 'Fieldbus'}
     assert len(others) == 20 + 15
     assert all(row.access is Access.READ_WRITE for row in G2.settings)
+
+
+def test_the_example_is_a_setting_of_the_usual_family() -> None:
+    key, value = example_setting()
+    parameter = load_family(usual_family())[key]
+    assert parameter.is_setting
+    assert parameter.decode(parameter.encode(value)) == value

@@ -41,8 +41,6 @@ import pytest
 
 Nfo = Callable[..., Done]
 RUN = (0x02, 0x98)
-#: A line that is cut is noticed soon.
-HASTY = ('--response-timeout', 0.3, '--retries', 2)
 OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
 #: Every protocol, model and control method.
 WAYS: dict[str, tuple[dict[str, Any], tuple[object, ...]]] = {
@@ -364,7 +362,7 @@ def test_a_fault(bench: Bench) -> None:
     ],
 )
 def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject(what, value, address=1)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1, err
@@ -384,7 +382,7 @@ def test_a_fault_as_json(bench: Bench) -> None:
 
 
 def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
@@ -394,7 +392,7 @@ def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
 
 
 def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         assert process.stderr is not None
         read_until(process.stderr, 'the stop is NOT confirmed')
@@ -407,7 +405,7 @@ def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
 
 
 def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
-    with bench.riding(*HASTY) as process:
+    with bench.riding() as process:
         bench.simulator.inject('line-dead', 600)
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None
@@ -464,6 +462,10 @@ def test_sigterm_does_not_wait_for_a_long_ramp(make_bench: MakeBench) -> None:
     [
         ({}, 150.1, 'Freque -150 to 150 Hz'),
         ({}, -151, 'set-point -151 Hz is out of range'),
+        # rpm, as it seems
+        ({}, 145, 'beyond what is nominal for this motor, 50 Hz: check the unit'),
+        ({'control.mode': 'Speed'}, -1500, '-1500 rpm is beyond what is nominal for this motor'),
+        ({'control.mode': 'Torque'}, 101, 'if it is meant so, give --setpoint-max 101'),
         ({'control.mode': 'Speed'}, 9001, 'Speed -9000 to 9000 rpm'),
         ({'control.mode': 'Torque'}, 201, 'Torque -200 to 200 %'),
     ],
@@ -475,6 +477,16 @@ def test_out_of_range(
     done = bench.run('run', setpoint)
     assert done.status == 1 and said in done.err
     assert nothing_commanded(bench)
+
+
+def test_beyond_nominal_where_that_is_said(bench: Bench) -> None:
+    done = bench.run('run', 61, '--for', 0.1, '--setpoint-max', 60)
+    assert done.status == 1 and 'beyond --setpoint-max, 60 Hz' in done.err
+    assert nothing_commanded(bench)
+    with bench.begun('run', 60, '--setpoint-max', 60) as process:
+        wait_until(lambda: bench.state()['frequency'] == pytest.approx(60, abs=0.2))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
 
 
 def test_out_of_range_of_an_optimal(make_bench: MakeBench) -> None:

@@ -253,7 +253,7 @@ def test_the_file_of_a_dump_is_whole_or_not_there(nfo: Nfo, bench: Bench, tmp_pa
     assert done.status == 1 and 'cannot be written' in done.err
     path = tmp_path / 'cell.yaml'
     bench.on_read('control.dc_brk', lambda: bench.simulator.inject('silence', 60, address=1))
-    done = nfo('dump', path, '--response-timeout', 0.2, '--retries', 0)
+    done = nfo('dump', path, '--retries', 0)
     assert done.status == 1
     assert os.listdir(tmp_path) == ['trace']
 
@@ -389,7 +389,7 @@ def test_a_drive_that_goes_silent_half_way(nfo: Nfo, bench: Bench, some: Path) -
     bench.on_write(
         'control.retard', lambda: bench.simulator.inject('silence', 120, address=1)
     )
-    done = nfo('load', some, '--put-back', '--response-timeout', 0.3, '--retries', 0)
+    done = nfo('load', some, '--put-back', '--retries', 0)
     assert done.status == 1
     assert 'written:\n  motor.p_nom: 1.5 -> 2.2 kW\n  control.accel: 5 -> 7.5 s\n' in done.err
     assert 'not written:\n  freque.f_fix1\n  freque.f_fix2\n' in done.err

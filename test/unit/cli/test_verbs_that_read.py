@@ -187,7 +187,7 @@ def test_what_makes_no_sense_is_a_matter_of_usage(
 
 
 def test_scan_finds_who_answers(nfo: Nfo, bench: Bench) -> None:
-    done = nfo('scan', '--addresses', '2-4,1', '--response-timeout', 0.5)
+    done = nfo('scan', '--addresses', '2-4,1')
     assert done.status == 0
     rows = [line.split() for line in done.out.splitlines()]
     assert rows[0][0] == 'address'
@@ -209,7 +209,7 @@ def test_scan_asks_every_address_that_a_drive_may_have(
 
 def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
     done = nfo(
-        'scan', '--addresses', '1-2', '--all-settings', '--json', '--response-timeout', 0.5
+        'scan', '--addresses', '1-2', '--all-settings', '--json'
     )
     assert done.status == 0
     found = json.loads(done.out)
@@ -231,7 +231,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
 ) -> None:
     file = tmp_path / 'line.yaml'
     arguments = ('scan', '--addresses', '1-3', '--params', file)
-    done = nfo(*arguments, '--response-timeout', 0.5)
+    done = nfo(*arguments)
     assert done.status == 0, done.err
     assert f'--params-file {file}' in done.err
     written = yaml.safe_load(file.read_text())
@@ -242,7 +242,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
                 'protocol': 'modbus_rtu',
                 'baud_rate': 19200,
                 'char_format': '8E1',
-                'response_timeout': 0.5,
+                'response_timeout': 2.0,
                 'drives': ['drive_1', 'drive_2'],
             }
         },
@@ -256,13 +256,13 @@ def test_scan_writes_a_parameter_file_for_the_driver(
     again = nfo(*arguments)
     assert again.status == 1 and 'exists already' in again.err
     assert file.read_text() == 'mine' and len(bench.requests()) == frames
-    assert nfo(*arguments, '--force', '--response-timeout', 0.5).status == 0
+    assert nfo(*arguments, '--force').status == 0
     assert 'drive_2' in file.read_text()
     assert bench.writes() == []
 
 
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
-    done = nfo('scan', '--addresses', '1', '--params', '-', '--response-timeout', 0.5)
+    done = nfo('scan', '--addresses', '1', '--params', '-')
     assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
     assert 'NFO1001' in done.err
 
@@ -273,11 +273,20 @@ def test_scan_writes_no_file_of_drives_that_make_no_line(
     file = tmp_path / 'line.yaml'
     done = nfo('scan', '--addresses', '7', '--params', file, '--response-timeout', 0.02)
     assert done.status == 1 and not file.exists()
-    found = {1: {'line': '19200 8E1'}, 2: {'line': '9600 8E1'}}
+    found = {
+        1: {'line': '19200 8E1', 'model': 'sinus_g2'},
+        2: {'line': '9600 8E1', 'model': 'sinus_g2'},
+    }
     options = argparse.Namespace(params=str(file))
     with pytest.raises(CliError, match='several') as raised:
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert '2: 9600 8E1' in str(raised.value)
+    assert '(nfo-sinus set serial.si_baud=...)' in str(raised.value)
+    # it has none that anybody knows
+    for facts in found.values():
+        facts['model'] = 'sinus_optimal'
+    with pytest.raises(CliError, match=r'set them alike \(at the keypad\)'):
+        scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert not file.exists()
 
 
@@ -331,7 +340,7 @@ def test_monitor_tells_which_of_several_drives_is_missing(nfo: Nfo, bench: Bench
     bench.simulator.inject('silence', 60, address=2)
     done = nfo(
         'monitor', '--addresses', '1,2', '--count', 2, '--period', 0.01,
-        '--response-timeout', 0.3, '--json',
+        '--json',
     )  # fmt: skip
     assert done.status == 1
     told = [json.loads(text) for text in done.out.splitlines()]
@@ -353,7 +362,7 @@ def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
 
 def test_monitor_tells_of_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> None:
     bench.on_read('status.dc_link', lambda: bench.simulator.inject('silence', 60, address=1))
-    done = nfo('monitor', '--count', 3, '--period', 0.01, '--response-timeout', 0.3, '--json')
+    done = nfo('monitor', '--count', 3, '--period', 0.01, '--json')
     assert done.status == 1
     assert [json.loads(line)['connected'] for line in done.out.splitlines()][-1] is False
 

@@ -76,6 +76,8 @@ class History:
         #: When what made it stop happened last, and from when on it may not run.
         self.lost_at = self._no_run_from = rig.clock.now
         self._setpoint: tuple[float, float] = (-math.inf, 0.0)
+        #: Since when the newest set-point has been what it is, and that.
+        self.setpoint_since: tuple[float, float] = (-math.inf, 0.0)
         #: This driver may have started the motor.
         self._ours = False
         #: A run command stood in the drive when it was looked at last.
@@ -156,6 +158,8 @@ class History:
 
     def gave(self, value: float) -> None:
         """Take note of a set-point that was given."""
+        if value != self._setpoint[1]:
+            self.setpoint_since = self.now, value
         self._setpoint = self.now, value
 
     def lose(self, within: float) -> None:

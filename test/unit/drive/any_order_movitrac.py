@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from any_order_machine import BOOT_TIMES
 from any_order_machine import WAITS
 from any_order_machine import WHOLE
 from any_order_machine import AnyOrder
@@ -42,6 +43,10 @@ _MODES = ('Standard', 'Remote setpoint', 'Remote control', 'Fieldbus')
 _REMOTE = 100 * Mode.REMOTE_CONTROL
 _20_HZ = 2000
 _RUNS = Bit.ENABLE | Bit.CW
+#: A power-off that ends before the drive is lost, s; and from which set-point on it is seen, Hz:
+#: the motor has to be slower yet when it is heard again than it was.
+_SHORT_BOOT = 0.5
+_SEEN_FROM = 19.0
 #: The directions at the terminals.
 _TERMINALS = (41, 42)
 #: How a drive may be, where the manual leaves it open: all that the simulated family offers but the
@@ -59,8 +64,8 @@ class MovitracOrder(AnyOrder):
     model = 'movitrac31'
     method = 'function_bits'
     faults = _FAULTS
-    #: Longer than ``lost_after``: nobody sees a drive start anew that is back before.
-    boot_times = (1.5, 4.0)
+    #: The first is less than ``lost_after``.
+    boot_times = (_SHORT_BOOT, 1.5, 4.0)
     enders = (
         'first_fault',
         'first_fault',
@@ -108,7 +113,7 @@ class MovitracOrder(AnyOrder):
             CONTROL_MODE: 'Remote control' if needs else stored,
             'serial.pc_timeout': drive_timeout if needs else 0.0,
             'serial.response_time': response_time,
-            'ramp.t11_up': 0.3,
+            'ramp.t11_up': 3.0 if slow else 0.3,
             'ramp.t11_down': 3.0 if slow else 0.3,
             'ramp.t13_stop': 0.3,
             'special.auto_reset': resets_itself,
@@ -167,9 +172,7 @@ class MovitracOrder(AnyOrder):
             self.laws.started_by_another()
         self.let(max(wait, 2.5))
 
-    # one that shows Enable all the time does not show who has control
     @WHOLE
-    @precondition(lambda self: self.rig.far.control_unit.variant.stop_status != 'enable')
     @rule(direction=st.sampled_from(('', '', 'cw', 'ccw')), wait=WAITS)
     def manual_operation(self, direction: str = '', wait: float = 1.0) -> None:
         """Take control at the keypad on X4, and turn the motor by it."""
@@ -181,6 +184,22 @@ class MovitracOrder(AnyOrder):
         if direction:
             self.rig.far.control_unit.press(direction)
             self.let(max(wait, 1.0))
+
+    @rule(boot=BOOT_TIMES, wait=WAITS)
+    def power_cycle(self, boot: float, wait: float = 1.0) -> None:
+        """Take the mains away, and hold the motor by its brake; for longer where nobody sees it."""
+        super().power_cycle(boot if boot > _SHORT_BOOT or self._is_seen else 1.5, 0.0)
+        self.rig.far.motor.rotor = 0.0
+        self.let(wait)
+
+    @property
+    def _is_seen(self) -> bool:
+        """Whether a motor that starts anew is seen to, though the drive is not lost before."""
+        far, link, laws = self.rig.far, self.rig.link, self.laws
+        since, value = laws.setpoint_since
+        steady = link.whole and laws.now - since > 0.5 and abs(value) > _SEEN_FROM
+        slow = far.memory.number('ramp.t11_up') > 1.0
+        return steady and slow and abs(far.motor.frequency) > _SEEN_FROM
 
     @WHOLE
     @precondition(lambda self: self.rig.far.memory.raw('serial.manual_operation'))
@@ -219,8 +238,7 @@ class MovitracOrder(AnyOrder):
         self.control_mode_at_keypad('Standard', wait)
 
     def keypad_in_control(self, wait: float) -> None:
-        if self.rig.far.control_unit.variant.stop_status != 'enable':
-            self.manual_operation('', wait)
+        self.manual_operation('', wait)
 
     def opposite_terminal(self, wait: float) -> None:
         """Give the other direction, too, which is none."""

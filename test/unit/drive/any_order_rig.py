@@ -206,6 +206,7 @@ class DirectLink(FaultyLine):
     """The line, without frames: what is asked is done at once, and the clock goes on."""
 
     protocol = PROTOCOLS['modbus_rtu']
+    supervision = None
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)

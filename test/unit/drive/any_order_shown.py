@@ -380,7 +380,7 @@ class ShownMovitrac(Shown):
         unit = self._unit
         # magnetizing is the beginning of a run
         shows_enable = unit.number in (*_RUNNING, Number.START_MAGNETIZATION)
-        remote = self._mode == Mode.REMOTE_CONTROL
+        remote = self.by_bus
         return {
             'code': unit.status_code,
             'fault': bool(self._far.faults),

@@ -25,6 +25,7 @@ from typing import Any
 
 from drive_rig import MakeRig
 from drive_rig import Rig
+from drive_rig import patient
 from line_rig import LineRig
 from line_rig import MakeLine
 import pytest
@@ -51,6 +52,7 @@ def make_rig(tmp_path: Path) -> Iterator[MakeRig]:
             link: str | None = None,
             **settings: Any,
         ) -> Rig:
+            settings.setdefault('lost_after', patient(settings.get('drive_timeout', 0.0)))
             rig = Rig(
                 tmp_path / 'trace',
                 DriveSettings(**settings),

@@ -37,6 +37,8 @@ from support.said import says
 from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import Fact
+from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
@@ -46,6 +48,7 @@ from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import LineSettings
@@ -58,7 +61,9 @@ from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 #: No honest wait takes this long, on any machine, s.
-PATIENCE = 30.0
+PATIENCE = 90.0
+#: s; see :func:`patient`.
+_LOST_AFTER = 4.0
 BAUD = 57600
 ACKNOWLEDGES = 'reads the status that acknowledges'
 SCMD = 0x298
@@ -66,6 +71,17 @@ MODE = 0x294
 RUN = 0x101
 #: Fast ramps: nobody wants to wait for a motor.
 QUICK = {'control.accel': 0.2, 'control.retard': 0.2}
+#: How a stop is answered: whether it is asked for before such a ramp is over is luck.
+STOPPING_OR_STOPPED = ('stopping: it ramps down', 'stopped (')
+
+
+def patient(drive_timeout: float) -> float:
+    """
+    Return a ``lost_after`` for a machine on which the simulated drive may be kept waiting, s.
+
+    Longer than a response time-out, so that one request without an answer loses no drive.
+    """
+    return min(_LOST_AFTER, drive_timeout - DRIVE_TIMEOUT_MARGIN) if drive_timeout else _LOST_AFTER
 
 
 def wait_until(condition: Callable[[], object], timeout: float = PATIENCE) -> None:
@@ -105,6 +121,13 @@ class Notes:
         """Whether an event says this."""
         return any(says(text, what) for grave, text in self.events if severity in (None, grave))
 
+    def wait_for(self, what: str | Cause, severity: Severity | None = None) -> None:
+        """Wait until an event says this: it may be told after what it is about is seen."""
+        deadline = time.monotonic() + PATIENCE
+        while not self.told(what, severity):
+            assert time.monotonic() < deadline, f'not told: {what}; but {self.events}'
+            time.sleep(0.002)
+
 
 class Tap:
     """A link with somebody who sees every transaction just before it is sent."""
@@ -119,6 +142,7 @@ class Tap:
         self.parts = link.parts
         self.use_resync_reads = link.use_resync_reads
         self.identify = link.identify
+        self.supervision = link.supervision
 
     def read(self, unit: int, address: Address) -> Reply:
         self.before(address.index, None)
@@ -303,6 +327,29 @@ class Rig:
         self.enable()
         self.publish(frequency)
         self.wait_for_frequency(frequency)
+        self.wait_until_it_shows()
+
+    def wait_until_it_shows(self) -> None:
+        """
+        Wait until a poll tells of a motor that turns steadily.
+
+        Until then the driver has seen no more than a drive that takes its command, or one that a
+        short ramp has brought to its current limit, whose code hides who has control.
+        """
+
+        steady = time.monotonic()
+
+        def shown(told: Snapshot) -> bool:
+            status = told.status
+            return (
+                told.at > steady
+                and told.enabled
+                and status is not None
+                and not status.means(Meaning.CURRENT_LIMIT)
+                and Fact.LIMIT_ACTIVE not in status.facts
+            )
+
+        wait_until(lambda: self.notes.snapshots and shown(self.notes.snapshots[-1]))
 
     @property
     def requests(self) -> list[bytes]:

@@ -183,11 +183,35 @@ class LineRig:
             drive.activate()
         self.pass_time(0.5)
 
+    def start(self, *addresses: int, apart: float = 0.0) -> float:
+        """
+        Connect to some drives, or to all, read their settings, and activate each as it is done.
+
+        :param apart: how much later than the one before each is begun, s.
+        :returns: how long it took, s.
+        """
+        began = self.clock.now
+        due = {
+            address: began + number * apart for number, address in enumerate(addresses or self.fars)
+        }
+        begun: dict[int, Future[Any]] = {}
+        while due or begun:
+            for address in [address for address, at in due.items() if at <= self.clock.now]:
+                del due[address]
+                begun[address] = self.drives[address].connect(parameters=True)
+            for address in [address for address, future in begun.items() if future.done()]:
+                begun.pop(address).result()
+                self.drives[address].activate()
+            self.pass_time(_SLICE)
+        return self.clock.now - began
+
     def enable(self, *addresses: int) -> None:
         """Enable some drives, or all."""
         chosen = addresses or tuple(self.drives)
         for future in [self.drives[address].enable() for address in chosen]:
             assert 'enabled' in self.answer(future)
+        # what is asked for in the very moment of enabling does not come after it
+        self.pass_time(_SLICE)
 
     def keep(self, program: Callable[[], None]) -> None:
         """Have a program do something again and again, as one that sends set-points."""
@@ -228,6 +252,10 @@ class LineRig:
                 for address, notes in self.notes.items()
             }
         )
+
+    def measured(self) -> Counter[int]:
+        """Return how often each drive was measured."""
+        return Counter({address: len(notes.telemetry) for address, notes in self.notes.items()})
 
 
 MakeLine = Callable[..., LineRig]

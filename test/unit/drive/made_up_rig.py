@@ -35,6 +35,7 @@ class FarEnd:
     """The registers of a drive; it refuses what it does not have."""
 
     protocol = PROTOCOLS['modbus_rtu']
+    supervision = None
 
     def __init__(self, registers: dict[int, int]) -> None:
         self.registers = registers

@@ -105,7 +105,7 @@ def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
     rig.publish(10.0)
     wait_until(lambda: not rig.drive.armed)
     reason = 'refused set-point 10: the drive is busy'
-    wait_until(lambda: rig.notes.told(reason, Severity.WARNING))
+    rig.notes.wait_for(reason, Severity.WARNING)
     rig.tap.before = lambda register, words: None
     rig.wait_until_still()
 

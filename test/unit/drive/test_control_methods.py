@@ -19,6 +19,7 @@ from __future__ import annotations
 import dataclasses
 
 from drive_rig import PATIENCE
+from drive_rig import STOPPING_OR_STOPPED
 from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import wait_until
@@ -69,7 +70,7 @@ def test_it_turns_and_stops(rig: Rig) -> None:
     turn(rig)
     reverse = rig.drive.settings.reference.endswith('reverse')
     assert (rig.far.motor.frequency < 0) is reverse
-    assert said(rig.drive.stop().result(PATIENCE)).startswith('stopping: it ramps down')
+    assert said(rig.drive.stop().result(PATIENCE)).startswith(STOPPING_OR_STOPPED)
     rig.wait_until_still()
     rig.next_snapshots(5)
     assert not rig.far.motor.driven
@@ -96,7 +97,7 @@ def test_fault_stops_and_nothing_starts_by_itself(rig: Rig) -> None:
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
     # a set-point that it refuses comes before the status that tells why
-    wait_until(lambda: rig.notes.told('fault 5 Overload'))
+    rig.notes.wait_for('fault 5 Overload')
     rig.acknowledged = 1
     assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
     wait_until(lambda: not rig.far.faults)
@@ -112,7 +113,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     turn(rig)
     rig.simulator.inject('run', False)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told('RUN input'))
+    rig.notes.wait_for('RUN input')
     rig.wait_until_still()
     rig.simulator.inject('run', True)
     rig.next_snapshots(5)
@@ -241,6 +242,16 @@ def test_optimal_is_enabled_again_after_its_keypad(make_rig: MakeRig, key: str) 
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     assert rig.enable().startswith('enabled')
+
+
+def test_optimal_that_stays_under_bus_control_says_so(make_rig: MakeRig) -> None:
+    rig = make_rig(model='sinus_optimal', control_method='drive_control', reference='terminal')
+    turn(rig)
+    answer = rig.drive.disconnect(PATIENCE).result(PATIENCE)
+    assert answer.cause is Cause.CONTROL_KEPT
+    assert 'the bus keeps control: from the terminals an active RUN input' in said(answer)
+    assert rig.far.read_raw('fieldbus.drive_control') == 0x4000
+    assert rig.far.control_unit.status_word & FROM_BUS
 
 
 # --- one method in a session ----------------------------------------------------------------------

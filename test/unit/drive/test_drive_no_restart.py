@@ -62,8 +62,8 @@ def test_fault(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('fault', OVERLOAD)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told('stopped: fault 5 Overload'))
-    assert rig.notes.told('~/enable to go on')
+    rig.notes.wait_for('stopped: fault 5 Overload')
+    rig.notes.wait_for('~/enable to go on')
     rig.assert_stays_still()
     rig.acknowledged = 1
     rig.drive.acknowledge().result(PATIENCE)
@@ -84,7 +84,10 @@ def test_fault_that_somebody_else_acknowledges(rig: Rig) -> None:
 
 def test_fault_that_ends_while_the_drive_is_polled_seldom(make_rig: MakeRig) -> None:
     rig = make_rig(poll_rate=0.02)
-    rig.turn()
+    rig.connect()
+    rig.enable()
+    rig.publish(20.0)
+    rig.wait_for_frequency(20.0)
     rig.simulator.inject('fault', OVERLOAD)
     # the drive refuses every command now, and its run command stands
     wait_until(lambda: rig.drive.blocked_by_fault)
@@ -111,7 +114,7 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('run', 'off')
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told(Cause.STOPPED_BY_ITSELF, Severity.WARNING))
+    rig.notes.wait_for(Cause.STOPPED_BY_ITSELF, Severity.WARNING)
     rig.assert_stays_still()
     rig.simulator.inject('run', 'on')
     assert_only_enable_helps(rig)
@@ -131,7 +134,7 @@ def test_stop_key(rig: Rig) -> None:
     rig.turn()
     rig.simulator.inject('keypad', 'stop')
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told(Cause.CONTROL_LOST, Severity.WARNING))
+    rig.notes.wait_for(Cause.CONTROL_LOST, Severity.WARNING)
     assert_only_enable_helps(rig)
 
 
@@ -157,14 +160,15 @@ def test_control_mode_changed_at_the_keypad(
     rig.turn()
     rig.simulator.inject('set', 'control.mode', 'Speed')
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told('the control mode was changed to Speed', Severity.WARNING))
+    rig.notes.wait_for('the control mode was changed to Speed', Severity.WARNING)
     rig.assert_stays_still()
 
 
 def test_power_cycle(make_rig: MakeRig) -> None:
     # silence of less than a time-out: it is never lost, yet another drive than before
-    rig = make_rig(boot_time=0.1, response_timeout=0.5)
+    rig = make_rig(boot_time=0.1)
     rig.turn()
+    rig.set_response_timeout(0.5)
     rig.simulator.inject('power-cycle')
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: rig.far.listening)
@@ -179,7 +183,7 @@ def test_long_power_cycle(make_rig: MakeRig) -> None:
     rig.simulator.inject('power-cycle', 3600)
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: not rig.drive.snapshot.connected)
-    assert rig.notes.told('retrying', Severity.ERROR)
+    rig.notes.wait_for('retrying', Severity.ERROR)
     rig.set_response_timeout(2.0)
     rig.boot()
     wait_until_connected(rig)
@@ -188,14 +192,14 @@ def test_long_power_cycle(make_rig: MakeRig) -> None:
 
 def test_drive_that_restarts_by_itself(make_rig: MakeRig) -> None:
     # AutoStart with RUN active: the terminals start it, and that is not for the bus to end
-    rig = make_rig(
-        boot_time=0.1, response_timeout=0.5, parameters={'control.auto_start': True}
-    )
+    rig = make_rig(boot_time=0.1, parameters={'control.auto_start': True})
     rig.drive.connect().result(PATIENCE)
     rig.drive.activate()
     rig.enable()
     rig.publish(20.0)
     rig.wait_for_frequency(20.0)
+    rig.wait_until_it_shows()
+    rig.set_response_timeout(0.5)
     rig.simulator.inject('power-cycle')
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: rig.far.control_unit.mode is Mode.EXT)
@@ -211,7 +215,7 @@ def test_line_that_is_dead_for_a_while(make_rig: MakeRig) -> None:
     rig.simulator.inject('line-dead', 3600)
     wait_until(lambda: not rig.drive.armed)
     wait_until(lambda: not rig.drive.snapshot.connected)
-    assert rig.notes.told('lost: ', Severity.ERROR)
+    rig.notes.wait_for('lost: ', Severity.ERROR)
     assert rig.drive.stop_unconfirmed
     # nobody could tell the drive: without a time-out of its own it runs on
     assert rig.far.motor.driven
@@ -227,7 +231,7 @@ def test_port_that_is_unplugged_for_a_while(make_rig: MakeRig, tmp_path: Path) -
     rig.turn()
     rig.simulator.inject('hangup', 0.5)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told('lost: ', Severity.ERROR))
+    rig.notes.wait_for('lost: ', Severity.ERROR)
     rig.wait_until_still()
     wait_until_connected(rig)
     assert rig.bus.statistics().reconnects >= 1
@@ -254,8 +258,9 @@ def test_time_out_of_the_drive(make_rig: MakeRig) -> None:
 
 
 def test_bad_line_is_no_reason_to_stop(make_rig: MakeRig) -> None:
-    rig = make_rig(response_timeout=0.5)
+    rig = make_rig(lost_after=30.0)
     rig.turn(10.0)
+    rig.set_response_timeout(0.5)
     for fault in ('noise', 'damage', 'drop', 'double', 'noise'):
         rig.simulator.inject(fault, 1)
         rig.next_snapshots(4)
@@ -313,7 +318,7 @@ def test_set_point_that_the_drive_refuses(rig: Rig, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(type(rig.far.memory), 'check', staticmethod(refuse))
     rig.publish(30.0)
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told('it refused set-point 30: ', Severity.WARNING))
+    rig.notes.wait_for('it refused set-point 30: ', Severity.WARNING)
     rig.assert_stays_still()
 
 
@@ -356,8 +361,8 @@ def test_motor_that_somebody_else_starts_is_stopped(rig: Rig) -> None:
     rig.connect()
     rig.publish(20.0)
     run_by_somebody_else(rig)
+    rig.notes.wait_for(Cause.RUNS_UNASKED, Severity.WARNING)
     rig.wait_until_still()
-    assert rig.notes.told(Cause.RUNS_UNASKED, Severity.WARNING)
     rig.assert_stays_still()
 
 
@@ -450,8 +455,8 @@ def test_stop_when_nobody_answers_is_tried_on_and_on(
     assert 'retrying' in message
     assert not rig.drive.armed
     assert rig.drive.stop_unconfirmed
-    wait_until(lambda: rig.notes.told(Cause.CANNOT_STOP, Severity.ERROR))
-    assert rig.notes.told('emergency stop')
+    rig.notes.wait_for(Cause.CANNOT_STOP, Severity.ERROR)
+    rig.notes.wait_for('emergency stop')
     rig.set_response_timeout(2.0)
     rig.simulator.inject('heal')
     rig.wait_until_still()

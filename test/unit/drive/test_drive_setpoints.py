@@ -77,7 +77,16 @@ def test_set_point_that_is_no_number(rig: Rig, value: float) -> None:
 
 @pytest.mark.parametrize(
     ('most', 'asked', 'given'),
-    [(0.0, 400.0, 150.0), (0.0, -1e30, -150.0), (10.0, 25.0, 10.0), (10.0, -10.01, -10.0)],
+    [
+        # the nominal frequency of the motor: 400 may have been meant as rpm
+        (0.0, 400.0, 50.0),
+        (0.0, -1e30, -50.0),
+        (10.0, 25.0, 10.0),
+        (10.0, -10.01, -10.0),
+        # more than nominal is what somebody says, up to what the drive takes
+        (87.0, 90.0, 87.0),
+        (500.0, 400.0, 150.0),
+    ],
 )
 def test_set_point_is_clamped(
     make_rig: MakeRig, most: float, asked: float, given: float
@@ -135,13 +144,13 @@ def test_set_points_stop_coming(make_rig: MakeRig) -> None:
     rig.wait_for_frequency(0.0)
     assert rig.far.memory.raw('status.frq_set') == 0
     wait_until(lambda: rig.drive.snapshot.setpoint == 0.0)
-    assert rig.notes.told('no set-point for 0.3 s: the motor ramps to a stop', Severity.WARNING)
+    rig.notes.wait_for('no set-point for 0.3 s: the motor ramps to a stop', Severity.WARNING)
     # it is no stop: the next set-point is followed
     assert rig.drive.armed
     assert rig.far.motor.driven
     rig.publish(8.0)
     rig.wait_for_frequency(8.0)
-    wait_until(lambda: rig.notes.told(Cause.SETPOINTS_AGAIN, Severity.INFO))
+    rig.notes.wait_for(Cause.SETPOINTS_AGAIN, Severity.INFO)
 
 
 def test_set_points_may_stop_coming_for_ever(make_rig: MakeRig) -> None:
@@ -166,8 +175,8 @@ def test_drive_timeout_is_set(make_rig: MakeRig) -> None:
     rig.connect()
     assert timeouts(rig) == (25, 1)
     assert rig.far.writes == {'serial.sio_tot': 1, 'serial.auto_stop': 1}
-    assert rig.notes.told('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
-    assert rig.notes.told('serial.auto_stop: false -> true (drive_timeout)')
+    rig.notes.wait_for('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
+    rig.notes.wait_for('serial.auto_stop: false -> true (drive_timeout)')
     assert not rig.notes.told(Cause.OWN_TIMEOUT_OFF)
     # parameters live in EEPROM: what is right is not written again
     assert rig.drive.set_drive_timeout(2.5).result(PATIENCE) == ()

@@ -247,7 +247,7 @@ def test_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts(
     rig.assert_stays_still()
     assert not rig.notes.told(Cause.CANNOT_STOP)
     assert not rig.notes.told(Cause.RUNS_UNASKED)
-    assert rig.notes.told('the motor started by the run command that stood there')
+    rig.notes.wait_for('the motor started by the run command that stood there')
     assert rig.enable().startswith('enabled')
     rig.wait_for_frequency(20.0)
 

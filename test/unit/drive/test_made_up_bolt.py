@@ -184,7 +184,7 @@ def test_who_has_control_is_asked_now_and_then(bolt: Bolt, bus: Bus) -> None:
     assert asked.index(SOURCE, first + 1) - first > 10
     with bolt.lock:
         bolt.registers[SOURCE] = 0
-    wait_until(lambda: notes.told(Cause.OTHERS_IN_CONTROL))
+    notes.wait_for(Cause.OTHERS_IN_CONTROL)
     wait_until(lambda: not drive.snapshot.enabled)
 
 
@@ -223,7 +223,7 @@ def test_a_fall_from_before_the_stop_confirms_nothing(bolt: Bolt, bus: Bus) -> N
         bolt.deaf, bolt.step = True, 0
     with raises(Cause.STOP_UNCONFIRMED):
         drive.stop().result(PATIENCE)
-    wait_until(lambda: notes.told('CANNOT STOP THE MOTOR'))
+    notes.wait_for('CANNOT STOP THE MOTOR')
     with bolt.lock:
         bolt.deaf, bolt.step = False, 5
     wait_until(lambda: not drive.stop_unconfirmed)
@@ -251,7 +251,7 @@ def test_a_motor_that_runs_unasked_is_stopped(bolt: Bolt, bus: Bus) -> None:
         before = dict(bolt.registers)
         bolt.registers.update({BITS: RUN, SIZE: 3000})
         bolt.was_written(before)
-    wait_until(lambda: notes.told(Cause.RUNS_UNASKED))
+    notes.wait_for(Cause.RUNS_UNASKED)
     wait_until(lambda: bolt.registers[BITS] == 0)
     wait_until(lambda: bolt.hertz == 0)
 
@@ -303,7 +303,7 @@ def test_a_fault_that_is_there_at_the_start_waits_for_a_person(bolt: Bolt, bus: 
     notes = Notes()
     bolt.fault, bolt.registers[SOURCE] = 145, 1
     drive = connected(bus, notes)
-    wait_until(lambda: notes.told('fault 145 Bus'))
+    notes.wait_for('fault 145 Bus')
     begun = len(bolt.writes)
     with raises(Cause.FAULT_FORBIDS):
         drive.enable().result(PATIENCE)
@@ -324,7 +324,7 @@ def test_a_time_out_that_always_stops_needs_nothing_else(bolt: Bolt, bus: Bus) -
 def test_a_time_out_that_is_off_is_called_by_its_name(bus: Bus) -> None:
     notes = Notes()
     connected(bus, notes)
-    wait_until(lambda: notes.told('no time-out of its own (T BUS is 0)'))
+    notes.wait_for('no time-out of its own (T BUS is 0)')
 
 
 def test_a_set_point_is_limited_to_the_one_direction(bolt: Bolt, bus: Bus) -> None:
@@ -332,7 +332,7 @@ def test_a_set_point_is_limited_to_the_one_direction(bolt: Bolt, bus: Bus) -> No
     drive = turning(bolt, bus, notes)
     drive.set_setpoint(-5.0)
     wait_until(lambda: bolt.hertz == 0)
-    wait_until(lambda: notes.told('set-point -5 is limited to 0'))
+    notes.wait_for('set-point -5 is limited to 0')
     assert drive.armed and drive.snapshot.setpoint_clamped
 
 

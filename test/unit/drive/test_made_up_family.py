@@ -184,7 +184,7 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
         acme.trip(70)
     wait_until(lambda: not drive.armed)
     wait_until(lambda: acme.registers[WORD] == REMOTE)
-    wait_until(lambda: notes.told('Too hot. Let it cool'))
+    notes.wait_for('Too hot. Let it cool')
     assert said(drive.acknowledge().result(PATIENCE)) == 'acknowledged 70 Hot'
     assert acme.hertz == 0
 
@@ -253,7 +253,7 @@ def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:
     drive = turning(acme, bus, notes)
     acme.fates[SIZE] = Refused(Refused.ILLEGAL_VALUE, 'not that')
     drive.set_setpoint(-35.0)
-    wait_until(lambda: notes.told('it refused set-point -35: not that'))
+    notes.wait_for('it refused set-point -35: not that')
     wait_until(lambda: acme.registers[WORD] == REMOTE)
     assert not drive.armed
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from concurrent.futures import Future
+import dataclasses
 import itertools
 from typing import Any
 
@@ -45,7 +46,7 @@ from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
 MODEL = 'movitrac31'
 OVERCURRENT = 101
 #: Indices [M4 §4].
-BITS, SIZE, P841, STATUS, FREQUENCY = 281, 223, 205, 284, 0
+BITS, SIZE, P841, STATUS, FREQUENCY, PC_TIMEOUT_INDEX = 281, 223, 205, 284, 0, 285
 DIRECTIONS = Bit.CW | Bit.CCW
 REMOTE = {CONTROL_MODE: 'Remote control'}
 
@@ -276,6 +277,104 @@ def test_a_power_cycle_ends_a_ride(make_virtual: MakeVirtual, kept: str) -> None
     assert_only_enable_helps(rig)
 
 
+def ride_and_slow_down_the_ramp(rig: VirtualRig, value: float) -> None:
+    """Ride; who starts anew then has not come far when it is heard again."""
+    rig.ride(value)
+    rig.far.set_from_keypad('ramp.t11_up', 3.0)
+    rig.pass_time(0.5)
+    assert rig.far.motor.frequency == value
+
+
+KEPT = {'bits_after_power_on': 'kept'}
+
+
+@pytest.mark.parametrize(
+    ('switch', 'value', 'moment'),
+    [
+        *((switch, 20.0, 0.0) for switch in SWITCHES.values()),
+        *((KEPT, value, moment) for value in (20.0, -20.0) for moment in (0.01, 0.03, 0.06)),
+        *(({**KEPT, 'stop_status': 'enable'}, value, 0.0) for value in (20.0, -20.0)),
+    ],
+)
+def test_a_short_power_cycle_ends_a_ride_in_which_the_frequency_falls(
+    make_virtual: MakeVirtual, switch: Mapping[str, str], value: float, moment: float
+) -> None:
+    rig = make(make_virtual, switch)
+    ride_and_slow_down_the_ramp(rig, value)
+    rig.pass_time(moment)
+    # less than lost_after; without power the brake holds the motor
+    rig.far.power_cycle(0.5)
+    rig.far.motor.rotor = 0.0
+    rig.pass_time(2.0)
+    assert not rig.drive.armed
+    assert not turns(rig)
+    assert rig.drive.snapshot.connected
+    if switch.get('bits_after_power_on') == 'kept':
+        assert rig.said(Cause.SLOWER_AFTER_SILENCE, Severity.WARNING)
+    assert_only_enable_helps(rig)
+
+
+@pytest.mark.parametrize('value', [5.0, 0.0, -5.0, 15.0])
+@pytest.mark.parametrize('lead', [0.3, 0.05, 0.0, -0.1])
+def test_a_set_point_that_was_lowered_in_noise_ends_no_ride(
+    make_virtual: MakeVirtual, value: float, lead: float
+) -> None:
+    rig = make_virtual({'ramp.t11_down': 1.0, 'ramp.t11_up': 0.3}, model=MODEL)
+    rig.ride(40.0)
+    rig.pass_time(1.0)
+    if lead > 0:
+        rig.send(value)
+        rig.pass_time(lead)
+    rig.link.state = 'silent'
+    rig.pass_time(max(-lead, 0.0))
+    rig.send(value)
+    rig.pass_time(0.7)
+    rig.link.mend()
+    rig.pass_time(3.0)
+    assert rig.drive.armed
+    assert rig.far.motor.frequency == pytest.approx(value, abs=0.1)
+
+
+def test_a_set_point_whose_answer_is_lost_ends_no_ride(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual({'ramp.t11_down': 0.3}, model=MODEL)
+    # with three the drive is lost
+    for losses in (1, 2):
+        rig.ride(40.0)
+        rig.pass_time(1.0)
+        rig.link.losses = losses
+        rig.send(5.0)
+        rig.pass_time(1.0)
+        rig.link.losses = losses
+        rig.send(-20.0)
+        rig.pass_time(2.0)
+        assert rig.drive.armed, losses
+
+
+def test_a_motor_that_is_held_back_for_a_moment_ends_no_ride(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    ride_and_slow_down_the_ramp(rig, 20.0)
+    rig.link.state = 'silent'
+    rig.pass_time(0.4)
+    rig.far.motor.load = 5.0
+    rig.pass_time(0.2)
+    assert 11 < rig.far.motor.frequency < 19
+    rig.link.mend()
+    rig.pass_time(3.0)
+    assert rig.drive.armed
+
+
+def test_noise_while_the_motor_speeds_up_ends_no_ride(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    ride_and_slow_down_the_ramp(rig, 5.0)
+    rig.send(40.0)
+    for _ in range(3):
+        rig.link.state = 'silent'
+        rig.pass_time(0.7)
+        rig.link.mend()
+        rig.pass_time(0.2)
+    assert rig.drive.armed
+
+
 @each_switch
 def test_a_lost_line_ends_a_ride(make_virtual: MakeVirtual, switch: Mapping[str, str]) -> None:
     rig = make(make_virtual, switch)
@@ -349,6 +448,25 @@ def test_who_takes_the_motor_away_ends_a_ride(
     assert_only_enable_helps(rig)
 
 
+@each_switch
+@pytest.mark.parametrize('key', ['stop', 'cw', 'ccw'])
+def test_a_keypad_that_takes_control_is_seen_whatever_the_drive_shows(
+    make_virtual: MakeVirtual, switch: Mapping[str, str], key: str
+) -> None:
+    rig = make(make_virtual, switch)
+    rig.ride()
+    rig.far.control_unit.press('manual')
+    rig.far.control_unit.press(key)
+    rig.pass_time(2.0)
+    assert not rig.drive.armed
+    assert rig.said(Cause.STOPPED_BECAUSE, Severity.WARNING)
+    assert not bits(rig) & DIRECTIONS
+    assert rig.far.memory.number(SETPOINT) == 0
+    rig.far.control_unit.press('automatic')
+    rig.pass_time(2.0)
+    assert_only_enable_helps(rig)
+
+
 # --- set-points -----------------------------------------------------------------------------------
 
 
@@ -371,6 +489,57 @@ def test_a_reversal_goes_through_zero(make_virtual: MakeVirtual) -> None:
         assert rig.far.motor.frequency == pytest.approx(value, abs=0.1)
         assert rig.drive.snapshot.frequency == pytest.approx(value, abs=0.1)
     assert not wrong
+
+
+# --- what an enable asks --------------------------------------------------------------------------
+
+#: P600 to P609 of terminals that only an option card has, P760 and P880 likewise.
+CARDS = {153, 154, 155, 156, 321, 322, 323, 249, 212}
+
+
+def asked_by_enable(rig: VirtualRig) -> list[int]:
+    """Enable; return the indices that were asked for or written meanwhile."""
+    before = len(rig.link.frames)
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    asked = [index for index, _ in requests_since(rig, before)]
+    assert succeeded(rig, rig.drive.stop())
+    return asked
+
+
+@pytest.mark.parametrize(('settings', 'most'), [({}, 34), (REMOTE, 28)], ids=['P841', 'mine'])
+def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
+    make_virtual: MakeVirtual, settings: dict[str, Any], most: int
+) -> None:
+    rig = make_virtual(settings, model=MODEL, telemetry_rate=0.0, poll_rate=0.1)
+    rig.connect()
+    rig.answer(rig.drive.parameters.read())
+    asked = asked_by_enable(rig)
+    assert len(asked) <= most, asked
+    assert not CARDS & set(asked)
+
+
+def test_a_card_that_was_fitted_meanwhile_is_asked_for_again(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual({'terminal.input_48': 'CW/Stop'}, model=MODEL)
+    rig.connect()
+    rig.answer(rig.drive.parameters.read())
+    assert not CARDS & set(asked_by_enable(rig))
+    unit = rig.far.control_unit
+    unit.variant = dataclasses.replace(unit.variant, option_card='fio')
+    unit.terminals.inputs += (48, 49, 50, 51, 52, 53, 54)
+    # a card is fitted while the drive has no power
+    rig.far.power_cycle(5.0)
+    rig.pass_time(10.0)
+    assert rig.drive.snapshot.connected
+    unit.switch(48, True)
+    assert 'terminal 48 (CW/Stop) is closed' in rig.answer(rig.drive.enable())
+
+
+def test_one_refusal_is_not_believed_of_a_card(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    rig.connect()
+    assert set(asked_by_enable(rig)) >= CARDS
+    assert set(asked_by_enable(rig)) >= CARDS
+    assert not CARDS & set(asked_by_enable(rig))
 
 
 # --- the PC time-out ------------------------------------------------------------------------------
@@ -414,6 +583,78 @@ def test_a_pc_time_out_that_is_found_is_acknowledged_by_a_person_alone(
     assert rig.far.faults.codes == [PC_TIMEOUT]
     assert 'acknowledged 145 PC time out' in rig.answer(rig.drive.acknowledge())
     assert_only_enable_helps(rig)
+
+
+@pytest.mark.parametrize('found', [0.0, 5.0])
+@pytest.mark.parametrize('end', [['clean up'], ['exit', 'clean up']], ids=['clean up', 'exit'])
+def test_a_clean_end_leaves_the_pc_time_out_as_it_was_found(
+    make_virtual: MakeVirtual, found: float, end: list[str]
+) -> None:
+    rig = make_virtual({'serial.pc_timeout': found}, model=MODEL, drive_timeout=1.5)
+    rig.ride()
+    assert rig.far.memory.number('serial.pc_timeout') == 1.5
+    # set again and changed: what was found stays what it was
+    rig.answer(rig.drive.set_drive_timeout(2.0))
+    for name in end:
+        assert succeeded(rig, WAYS[name](rig.drive)), name
+    assert rig.far.memory.number('serial.pc_timeout') == found
+    assert bool(rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)) == bool(found)
+    rig.send(None)
+    rig.kill()
+    rig.elapse(20.0)
+    assert bool(rig.far.faults) == bool(found)
+
+
+def test_a_clean_end_turns_the_pc_time_out_off_when_the_motor_has_stopped(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    frequencies: list[float] = []
+
+    def meet(index: int, words: Words | None) -> None:
+        if index == PC_TIMEOUT_INDEX and words is not None:
+            frequencies.append(rig.far.motor.frequency)
+
+    rig.before = meet
+    assert succeeded(rig, rig.drive.disconnect(5.0))
+    assert frequencies == [0.0]
+
+
+def test_a_clean_end_during_a_long_ramp_leaves_no_fault(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual({'ramp.t11_down': 60.0}, model=MODEL, drive_timeout=1.5)
+    rig.ride()
+    assert succeeded(rig, rig.drive.disconnect(0.5))
+    rig.send(None)
+    rig.kill()
+    rig.elapse(1.0)
+    assert rig.far.motor.frequency > 10
+    rig.elapse(60.0)
+    assert not rig.far.faults and not rig.far.motor.turning
+
+
+@pytest.mark.parametrize('seconds', [0.0, 4.0])
+def test_a_pc_time_out_of_somebody_else_is_left_alone(
+    make_virtual: MakeVirtual, seconds: float
+) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    rig.far.set_from_keypad('serial.pc_timeout', seconds)
+    rig.pass_time(1.0)
+    written = len(rig.written(PC_TIMEOUT_INDEX))
+    assert succeeded(rig, rig.drive.disconnect(1.0))
+    assert len(rig.written(PC_TIMEOUT_INDEX)) == written
+    assert rig.far.memory.number('serial.pc_timeout') == seconds
+
+
+def test_a_pc_time_out_that_cannot_be_ended_is_told(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual, drive_timeout=1.5)
+    rig.ride()
+    rig.far.set_from_keypad('special.parameter_lock', True)
+    # the motor stands all the same
+    assert succeeded(rig, rig.drive.disconnect(1.0))
+    assert rig.far.motor.frequency == 0
+    assert rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)
 
 
 def test_a_drive_that_answers_late_is_followed_all_the_same(make_virtual: MakeVirtual) -> None:

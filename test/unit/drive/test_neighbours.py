@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Drives that are unplugged leave the line to their neighbours."""
+"""Drives that are unplugged, or only stand, leave the line to their neighbours."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ import pytest
 _KEPT = 0.9
 #: From when on a drive that is unplugged is asked seldom, s.
 _SETTLED = 5.0
+#: How much longer than its reads alone the start of many drives may take.
+_START = 1.2
 
 
 def _ride(rig: LineRig) -> None:
@@ -117,3 +119,109 @@ def test_a_drive_alone_on_its_line_is_asked_as_often_as_before(make_line: MakeLi
     rig.pass_time(20.0)
     # every four seconds, and the time without a response
     assert len(rig.line.frames) - sent >= 4
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'baud'),
+    [('modbus_rtu', 57600), ('modbus_rtu', 19200), ('classic', 57600), ('movitrac', 9600)],
+)
+def test_32_drives_start_in_the_time_of_their_reads(
+    make_line: MakeLine, protocol: str, baud: int
+) -> None:
+    alone = make_line(1, protocol=protocol, baud=baud).start()
+    rig = make_line(32, protocol=protocol, baud=baud)
+    # nodes are made one after the other
+    assert rig.start(apart=0.03) <= _START * 32 * alone
+
+
+def test_drives_that_stand_are_polled_seldom_while_another_is_read_for_the_first_time(
+    make_line: MakeLine,
+) -> None:
+    rig = make_line(5)
+    rig.start(1, 2, 3, 4)
+    rig.pass_time(_SETTLED)
+    measured = rig.measured()
+    reading = rig.drives[5].connect(parameters=True)
+    polls = rig.polls(0.8)
+    assert not reading.done()
+    # what had begun already comes to its end
+    assert all(polls[address] <= 2 for address in range(1, 5))
+    assert all(rig.measured()[address] - measured[address] <= 1 for address in range(1, 5))
+    rig.answer(reading)
+    # and then as often as before
+    rig.pass_time(2.0)
+    measured = rig.measured()
+    polls = rig.polls(5.0)
+    assert all(polls[address] > 50 for address in range(1, 5))
+    assert all(rig.measured()[address] - measured[address] > 1 for address in range(1, 5))
+
+
+def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_read(
+    make_line: MakeLine,
+) -> None:
+    rig = make_line(3, baud=19200)
+    rig.start(1, 2)
+    rig.enable(1)
+    rig.keep(lambda: rig.drives[1].set_setpoint(20.0))
+    rig.pass_time(_SETTLED)
+    measured = rig.measured()
+    reading = rig.drives[3].connect(parameters=True)
+    polls = rig.polls(1.5)
+    assert not reading.done()
+    assert polls[1] > 10
+    assert rig.measured()[1] - measured[1] >= 2
+    assert polls[2] <= 2
+    # a stop is confirmed and told as always
+    asked_at = rig.clock.now
+    stop = rig.drives[1].stop()
+    rig.polls(0.5)
+    assert not reading.done()
+    assert 'stop' in rig.answer(stop, 2.0)
+    assert rig.clock.now - asked_at < 1.5
+
+
+def test_a_drive_is_enabled_as_always_while_another_is_read_for_the_first_time(
+    make_line: MakeLine,
+) -> None:
+    rig = make_line(2, baud=1200)
+    rig.start(1)
+    reading = rig.drives[2].connect(parameters=True)
+    rig.pass_time(3.0)
+    rig.enable(1)
+    rig.keep(lambda: rig.drives[1].set_setpoint(20.0))
+    polls = rig.polls(5.0)
+    assert not reading.done()
+    # a poll takes three transactions, and a set-point goes between
+    assert polls[1] >= 5
+    assert rig.drives[1].snapshot.frequency > 0
+
+
+def test_settings_that_are_read_again_slow_nobody(make_line: MakeLine) -> None:
+    rig = make_line(2, baud=19200)
+    rig.start()
+    rig.answer(rig.drives[2].disconnect(1.0))
+    rig.pass_time(_SETTLED)
+    reading = rig.drives[2].connect(parameters=True)
+    polls = rig.polls(1.0)
+    assert not reading.done()
+    assert polls[1] > 4
+
+
+def test_a_drive_that_goes_silent_while_it_is_read_slows_nobody(make_line: MakeLine) -> None:
+    rig = make_line(2)
+    rig.start(1)
+    reading = rig.drives[2].connect(parameters=True)
+    rig.pass_time(0.5)
+    rig.line.unplugged.add(2)
+    rig.answer(reading)
+    rig.pass_time(_SETTLED)
+    assert rig.polls(5.0)[1] > 100
+
+
+def test_a_drive_that_nobody_finds_slows_nobody(make_line: MakeLine) -> None:
+    rig = make_line(2)
+    rig.start(1)
+    rig.line.unplugged.add(2)
+    rig.answer(rig.drives[2].connect(patient=False, parameters=True))
+    rig.pass_time(_SETTLED)
+    assert rig.polls(5.0)[1] > 100

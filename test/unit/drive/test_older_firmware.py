@@ -142,7 +142,7 @@ def test_a_take_over_behind_a_current_limit_is_noticed(
     with far.lock:
         far.drives[1].control_unit.press(press)
     wait_until(lambda: not drive.armed)
-    assert notes.told('keypad or terminals have control now and run the motor (27 Cur Limt)')
+    notes.wait_for('keypad or terminals have control now and run the motor (27 Cur Limt)')
 
 
 def test_a_motor_that_starts_against_its_current_limit(

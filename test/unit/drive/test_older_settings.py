@@ -27,6 +27,7 @@ from typing import Any
 
 from drive_rig import PATIENCE
 from drive_rig import Notes
+from drive_rig import patient
 from drive_rig import wait_until
 import pytest
 from support.said import raises
@@ -99,8 +100,9 @@ class Rig:
 
     def driver(self, **settings: Any) -> Drive:
         """Begin a driver."""
-        settings = {'classic_dialect': 'v5.0', **settings}
-        line = line_settings('classic', response_timeout=0.4)
+        lost_after = patient(settings.get('drive_timeout', 0.0))
+        settings = {'classic_dialect': 'v5.0', 'lost_after': lost_after, **settings}
+        line = line_settings('classic', response_timeout=2.0)
         self.bus = Bus(open_link('classic', self.simulator.port, line))
         self.drive = Drive(self.bus, DriveSettings(**settings), self.notes)
         self.bus.start()
@@ -254,10 +256,18 @@ def test_a_value_that_is_refused_puts_all_back(rig: Rig, monkeypatch: pytest.Mon
 
 def test_an_enable_waits_until_settings_are_written(rig: Rig) -> None:
     rig.connect()
+    write, enables = rig.far.write_raw, []
+
+    def enable_meanwhile(key: str, raw: int) -> None:
+        write(key, raw)
+        if key == 'control.accel':
+            enables.append(rig.drive.enable())
+
+    rig.far.write_raw = enable_meanwhile  # type: ignore[method-assign]
     rig.drive.parameters.change({'control.accel': 6.0, 'control.retard': 7.0})
-    wait_until(lambda: rig.modes == [BUS])
+    wait_until(lambda: enables)
     with raises(Cause.PROCEDURE_GOES_ON):
-        rig.drive.enable().result(PATIENCE)
+        enables[0].result(PATIENCE)
     wait_until(lambda: rig.modes == [BUS, STOP])
     assert not rig.energised
     rig.turn()
@@ -299,7 +309,7 @@ def test_the_drives_time_out_is_set_when_the_bus_gets_control(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.control_unit.press('ext')
     rig.connect(drive_timeout=4.0)
-    assert rig.notes.told(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
+    rig.notes.wait_for(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
     assert rig.far.peek('serial.sio_tot') == 0
     assert rig.far.control_unit.mode == EXT
     with rig.simulator.lock:
@@ -315,7 +325,7 @@ def test_the_drives_time_out_is_set_when_the_bus_gets_control(rig: Rig) -> None:
 
 
 def test_two_lost_answers_do_not_trip_it(rig: Rig) -> None:
-    rig.connect(setpoint_timeout=0.0, retries=4)
+    rig.connect(setpoint_timeout=0.0, retries=4, lost_after=30.0)
     rig.turn()
     read, lost = rig.far.read_raw, [2]
 
@@ -342,10 +352,10 @@ def test_a_driver_that_is_begun_while_the_motor_turns(rig: Rig, control_method: 
     rig.connect(classic_dialect='', control_method=control_method)
     assert rig.flags == 0
     assert rig.far.control_unit.status_code != SIO_FAIL
-    assert rig.notes.told('the bus has control', Severity.WARNING)
+    rig.notes.wait_for('the bus has control', Severity.WARNING)
     if control_method == 'mode_scmd':
         wait_until(lambda: not rig.far.motor.driven)
-        assert rig.far.control_unit.status_code == 37
+        wait_until(lambda: rig.far.control_unit.status_code == 37)
     else:
         assert rig.far.motor.driven
 
@@ -369,9 +379,10 @@ def test_a_drive_that_was_asked_once_is_known_when_it_comes_back_under_control(
     rig = Rig(stack, '2.03')
     drive = rig.connect(classic_dialect='')
     rig.turn()
-    rig.simulator.inject('line-dead', 3.0)
-    wait_until(lambda: rig.notes.told('lost'))
+    rig.simulator.inject('line-dead', 3600.0)
+    rig.notes.wait_for('lost')
     told = len([1 for _, text in rig.notes.events if text.startswith('connected')])
+    rig.simulator.inject('heal')
     wait_until(
         lambda: len([1 for _, text in rig.notes.events if text.startswith('connected')]) > told
     )

@@ -57,7 +57,7 @@ def test_change_is_written_once_and_read_back(rig: Rig) -> None:
     assert far(rig, 'control.accel') == [7.5]
     assert parameters.values['control.accel'] == 7.5
     assert rig.notes.news[-1] == 'control.accel'
-    assert rig.notes.told('control.accel: 0.2 -> 7.5 s', Severity.INFO)
+    rig.notes.wait_for('control.accel: 0.2 -> 7.5 s', Severity.INFO)
     assert not news(rig)
     own = f'{register(rig, "control.accel"):04x}'
     frames = [frame['hex'].lower() for frame in rig.trace()[before:]]

@@ -89,14 +89,13 @@ def test_settings_of_the_line_when_allowed(make_rig: MakeRig) -> None:
     assert changes[0].key == 'control.accel'
     assert far(rig, *wanted) == list(wanted.values())
     hint = 'then start this driver with the address (9) and char_format (8b Op 1s) and baud_rate'
-    assert rig.notes.told(hint, Severity.WARNING)
+    rig.notes.wait_for(hint, Severity.WARNING)
 
 
 def test_new_address_that_counts_at_once(make_rig: MakeRig) -> None:
     rig = make_rig(
         parameters={'serial.auto_reset': True},
         allow_communication_changes=True,
-        response_timeout=0.3,
         retries=1,
     )
     parameters = connect(rig)

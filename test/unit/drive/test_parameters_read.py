@@ -65,7 +65,7 @@ def test_all_are_read_and_nothing_is_written(rig: Rig) -> None:
     assert list(parameters.values.values()) == far(rig, *parameters.values)
     assert parameters.progress == '119 read'
     assert set(rig.notes.news) == set(parameters.values)
-    assert rig.notes.told('parameters: 119 read in ', Severity.INFO)
+    rig.notes.wait_for('parameters: 119 read in ', Severity.INFO)
     assert not news(rig)
     parameters.refresh().result(PATIENCE)
     rig.next_snapshots()
@@ -79,7 +79,7 @@ def test_progress(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     on_read(rig, monkeypatch, lambda key: seen.append(rig.drive.parameters.progress))
     connect(rig)
     assert '60 of 119 read' in seen
-    assert rig.notes.told('parameters: 60 of 119 read', Severity.INFO)
+    rig.notes.wait_for('parameters: 60 of 119 read', Severity.INFO)
 
 
 def test_older_firmware_lacks_what_came_later(make_rig: MakeRig) -> None:
@@ -132,7 +132,7 @@ def test_what_needs_option_cards_is_told_in_one(rig: Rig, monkeypatch: pytest.Mo
     on_read(rig, monkeypatch, refuse)
     assert len(connect(rig).values) == 116
     assert not rig.notes.told(Cause.SETTING_UNREADABLE)
-    assert rig.notes.told(
+    rig.notes.wait_for(
         'parameters: 3 are left out, for the drive has none of the option cards that they need '
         '(Y or Z, X1)',
         Severity.INFO,
@@ -162,7 +162,7 @@ def test_switch_that_is_neither_on_nor_off(
     put_raw(rig, 'serial.auto_stop', 2)
     parameters = connect(rig)
     assert 'serial.auto_stop' not in parameters.values
-    assert rig.notes.told('serial.auto_stop: the drive has code 2', Severity.WARNING)
+    rig.notes.wait_for('serial.auto_stop: the drive has code 2', Severity.WARNING)
     at_keypad(rig, 'serial.auto_stop', True)
     wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
     wait_until(lambda: rig.drive.inverter.auto_stop)
@@ -186,7 +186,7 @@ def test_switch_that_is_neither_can_be_set(rig: Rig) -> None:
 def test_drive_that_disappears_while_it_is_read(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig = make_rig(response_timeout=0.3, retries=1)
+    rig = make_rig(retries=1)
     asked: list[str] = []
 
     def vanish(key: str) -> None:
@@ -267,11 +267,11 @@ def test_refresh_of_a_drive_that_refuses_one(rig: Rig, monkeypatch: pytest.Monke
 def test_watch_goes_on_when_the_drive_is_back(
     make_rig: MakeRig, busy_watch: None, hasty: None
 ) -> None:
-    rig = make_rig(response_timeout=0.3, retries=1)
+    rig = make_rig(retries=1)
     parameters = connect(rig)
     with rig.simulator.lock:
         rig.far.silence(SILENCE)
-    wait_until(lambda: rig.notes.told('lost: ', Severity.ERROR))
+    rig.notes.wait_for('lost: ', Severity.ERROR)
     with rig.simulator.lock:
         rig.far.silence(0)
     at_keypad(rig, 'control.accel', 9)

@@ -38,11 +38,14 @@ from support.said import said
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 
+#: For what will not be answered, s.
+SHORT = 0.3
+
 
 @pytest.fixture
 def quick(make_rig: MakeRig) -> Rig:
-    """A rig on which nobody waits long for what will not be answered."""
-    return make_rig(response_timeout=0.3, retries=1)
+    """A rig on which nobody asks often for what will not be answered."""
+    return make_rig(retries=1)
 
 
 def test_answer_to_the_write_is_lost(quick: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,6 +119,7 @@ def test_silence_from_the_beginning(quick: Rig) -> None:
     parameters = connect(quick)
     with quick.simulator.lock:
         quick.far.silence(SILENCE)
+    quick.set_response_timeout(SHORT)
     for key, value in (('control.accel', 7), ('motor.i_magn', 2)):
         error = error_of(parameters.change({key: value}))
         assert said(error).startswith(f'{key}: unit 1 did not answer')
@@ -129,7 +133,7 @@ def test_silence_from_the_beginning(quick: Rig) -> None:
 def test_port_that_is_lost_in_the_middle(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch, tmp_path: Any, hasty: None
 ) -> None:
-    rig = make_rig(link=str(tmp_path / 'port'), response_timeout=0.3, retries=1)
+    rig = make_rig(link=str(tmp_path / 'port'), retries=1)
     parameters = connect(rig)
 
     def unplug(write: Store, key: str, raw: int) -> None:
@@ -165,7 +169,7 @@ def test_end_of_the_driver_in_the_middle(rig: Rig, monkeypatch: pytest.MonkeyPat
     assert rig.refused(second) == 'this driver is ending'
     rig.bus.close()
     text = 'ended half-way, NOT put back: control.accel: 0.2 -> 7 s'
-    assert rig.notes.told(text, Severity.WARNING)
+    rig.notes.wait_for(text, Severity.WARNING)
     assert far(rig, *THREE) == [7, 7, 10]
 
 

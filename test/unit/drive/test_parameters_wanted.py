@@ -45,7 +45,7 @@ def test_wanted_state_is_written_where_it_differs(rig: Rig) -> None:
     assert far(rig, *wanted) == [7, 0.2, 'Release']
     assert parameters.drift == ()
     text = 'control.accel: 0.2 -> 7 s, as the parameter file says'
-    assert rig.notes.told(text, Severity.INFO)
+    rig.notes.wait_for(text, Severity.INFO)
     assert not rig.notes.told('control.retard')
     parameters.apply(wanted, write=True).result(PATIENCE)
     assert sum(written(rig).values()) == 2
@@ -69,7 +69,7 @@ def test_monitor_writes_nothing(make_rig: MakeRig, monkeypatch: pytest.MonkeyPat
     for key, value in (('control.accel', 7), ('serial.sio_tot', 7)):
         assert 'this driver only reads' in rig.refused(parameters.change({key: value}))
     parameters.apply({'control.accel': 7}, write=True).result(PATIENCE)
-    assert rig.notes.told('not applied from the parameter file: control.accel', Severity.ERROR)
+    rig.notes.wait_for('not applied from the parameter file: control.accel', Severity.ERROR)
     assert parameters.drift
     # what it has already is no change
     assert parameters.change({'control.accel': 0.2}).result(PATIENCE) == ()
@@ -124,7 +124,7 @@ def test_wanted_state_with_what_this_drive_lacks(make_rig: MakeRig) -> None:
     wanted = {'error.short_c_err_cnt': 1, 'control.any_bus': 1, 'control.accel': 7}
     parameters.apply(wanted, write=True).result(PATIENCE)
     text = 'this drive has no error.short_c_err_cnt, control.any_bus: not applied'
-    assert rig.notes.told(text, Severity.WARNING)
+    rig.notes.wait_for(text, Severity.WARNING)
     assert written(rig) == {'control.accel': 1}
 
 

@@ -40,6 +40,7 @@ class Quantity:
     :ivar key: where its set-point goes; on the Optimal where it has another place.
     :ivar steps: of the drive in one unit.
     :ivar most: its limit [M2 table 2].
+    :ivar nominal: what the simulated motor is made for; 0: nothing says it.
     :ivar value: a set-point that is soon reached.
     """
 
@@ -49,16 +50,29 @@ class Quantity:
     steps: int
     most: float
     value: float
+    nominal: float = 0.0
 
 
 MODES = {
     'Freque': Quantity(
-        'Hz', 'status.frq_set', 'fieldbus.input_freq_setpoint', steps=10, most=150, value=20
+        'Hz',
+        'status.frq_set',
+        'fieldbus.input_freq_setpoint',
+        steps=10,
+        most=150,
+        value=20,
+        nominal=50,
     ),
     'Speed': Quantity(
-        'rpm', 'status.spd_set', 'fieldbus.input_speed_setpoint', steps=1, most=9000, value=600
+        'rpm',
+        'status.spd_set',
+        'fieldbus.input_speed_setpoint',
+        steps=1,
+        most=9000,
+        value=600,
+        nominal=1440,
     ),
-    'Torque': Quantity('%', 'status.trq_set', '', steps=1, most=200, value=10),
+    'Torque': Quantity('%', 'status.trq_set', '', steps=1, most=200, value=10, nominal=100),
     'PI-Reg': Quantity('bar', 'status.reg_set', '', steps=10, most=150, value=40),
 }
 WAYS = [
@@ -131,13 +145,15 @@ def follow(rig: Rig, mode: str, value: float) -> None:
 
 
 @every_way
-@pytest.mark.parametrize('most', [0.0, 0.5], ids=['limit_of_the_drive', 'setpoint_max'])
-def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: float) -> None:
+@pytest.mark.parametrize('most', ['nominal', 'less', 'the_drive'])
+def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: str) -> None:
     quantity = MODES[mode]
-    limit = quantity.most
-    if most:
-        limit = quantity.value * most
-    rig = enabled(make_rig, model, method, mode, setpoint_max=limit if most else 0.0)
+    # an Optimal tells no nominal value, and no process has any
+    nominal = quantity.nominal if model == 'sinus_g2' and quantity.nominal else quantity.most
+    limits = {'nominal': nominal, 'less': quantity.value / 2, 'the_drive': quantity.most}
+    limit = limits[most]
+    given = {'nominal': 0.0, 'less': limit, 'the_drive': 2 * limit}[most]
+    rig = enabled(make_rig, model, method, mode, setpoint_max=given)
     for sign in (1.0, -1.0):
         rig.publish(sign * 1e6)
         wait_until(lambda given=sign * limit: rig.drive.snapshot.setpoint == given)

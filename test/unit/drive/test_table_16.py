@@ -128,7 +128,7 @@ def assert_it_can_be_enabled(rig: Rig) -> None:
 def assert_disarmed(rig: Rig, cause: str) -> None:
     """The driver has noticed, says why, and takes the run command back."""
     wait_until(lambda: not rig.drive.armed)
-    wait_until(lambda: rig.notes.told(cause))
+    rig.notes.wait_for(cause)
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     with rig.simulator.lock:
         rig.far.memory.set('control.retard', 0.2)
@@ -410,7 +410,7 @@ def test_table_16_idle(make_rig: MakeRig, exits: Exits, words, wanted, cause: st
         command(rig, *words)
         assert exits[-len(wanted) :] == wanted
     if cause:
-        wait_until(lambda: rig.notes.told(cause))
+        rig.notes.wait_for(cause)
         rig.wait_until_still()
     # whatever another master left behind, the first word of an enable ends
     wait_until(lambda: not rig.drive.stop_unconfirmed)

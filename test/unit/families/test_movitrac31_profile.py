@@ -53,7 +53,7 @@ method = MOVITRAC.profile.methods['function_bits']('fieldbus', MOVITRAC.__contai
 target = MOVITRAC.profile.setpoints['Freque']
 #: What a drive without option cards has assigned to its terminals in the factory.
 FACTORY: Mapping[int, Any] = {42: 'CCW/Stop', 43: 'Enable/Stop', 47: 'n11 (n21)'}
-SIZE_0 = ((Write(SIZE, 0.0), None), (Read(SIZE), 0.0), (Read(BITS), 0))
+SIZE_0 = ((Write(SIZE, 0.0), None), (Read(SIZE), 0.0))
 NOTHING_ELSE = (
     (Read('control.operating_mode'), 'V/f mode'),
     (Read('control.synchronous_operation'), REFUSED),
@@ -210,7 +210,7 @@ def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) ->
     play(
         method.take_control(),
         *begun,
-        *((Write(SIZE, 0.0), None), (Read(SIZE), 0.0), (Read(BITS), FORWARD)),
+        *SIZE_0,
         (Write(MODE, REMOTE, stored=True), None),
         (Write(BITS, 0, head=True), None),
         *SIZE_0,
@@ -220,7 +220,7 @@ def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) ->
         play(
             method.take_control(),
             *begun,
-            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0), (Read(BITS), FORWARD)),
+            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0)),
         )
 
 
@@ -474,6 +474,21 @@ def test_a_set_point_is_rounded_to_the_steps_of_the_drive() -> None:
     for value, data in ((12.34, '00001235'), (0.02, '00000000'), (400.0, '00040000')):
         assert MOVITRAC[SIZE].quantise(value, 'movitrac') == bytes.fromhex(data)
     assert target.most == 400
+
+
+@pytest.mark.parametrize(
+    ('word', 'setting', 'pattern', 'base', 'nominal'),
+    [
+        (0x00010010, 'frequency.vf_pattern_1', 'V/f pattern 1', ('frequency.f_base_1', '50'), 50.0),
+        (0x00010018, 'frequency.vf_pattern_2', 'V/f pattern 3', ('frequency.f_base_3', 87.0), 87.0),
+    ],
+)
+def test_nominal_is_the_base_frequency_of_the_pattern_in_use(
+    word: int, setting: str, pattern: str, base: tuple[str, Any], nominal: float
+) -> None:
+    key, value = base
+    steps = ((Read(WORD), word), (Read(setting), pattern), (Read(key), value))
+    assert play(target.read_nominal(MOVITRAC.__contains__), *steps) == nominal
 
 
 # --- what the tables have of it -------------------------------------------------------------------

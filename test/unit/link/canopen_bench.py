@@ -28,6 +28,7 @@ from unittest import mock
 from canopen_far_end import Server
 
 from nfo_sinus_driver.link import canopen_link
+from nfo_sinus_driver.link import canopen_supervision
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address
@@ -81,6 +82,7 @@ class Bus:
     :ivar other: whatever else was sent, and when.
     :ivar begun: of the messages with which a transfer begins: node, index, sub-index, whether it
         writes, and its fate.
+    :ivar kept: the objects that hold what was written, and not what the test makes up.
     """
 
     def __init__(self, fates: Sequence[Fate]) -> None:
@@ -95,6 +97,7 @@ class Bus:
         self.sent: list[tuple[int, bytes]] = []
         self.other: list[tuple[float, Frame]] = []
         self.begun: list[tuple[int, int, int, bool, str]] = []
+        self.kept: set[tuple[int, int]] = set()
         self._free: dict[int, float] = {}
         self._arrivals: list[tuple[float, int, Frame]] = []
         self._order = itertools.count()
@@ -140,7 +143,8 @@ class Bus:
         command = frame.data[0] >> 5
         if command in (1, 2):
             index, sub_index = int.from_bytes(frame.data[1:3], 'little'), frame.data[3]
-            if command == 2 and (index, sub_index) in server.objects:
+            known = (index, sub_index) in server.objects
+            if command == 2 and known and (index, sub_index) not in self.kept:
                 server.objects[index, sub_index] = self.value(index, len(self.begun))
             self.begun.append((unit, index, sub_index, command == 1, fate.what))
         answer = server.answer(frame.data)
@@ -175,7 +179,10 @@ class Bench:
 
     def do(self, action: Callable[[], _T]) -> _T:
         clock = SimpleNamespace(monotonic=self.bus.monotonic)
-        with mock.patch.object(canopen_link, 'time', clock):
+        with (
+            mock.patch.object(canopen_link, 'time', clock),
+            mock.patch.object(canopen_supervision, 'time', clock),
+        ):
             return action()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:

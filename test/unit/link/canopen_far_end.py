@@ -34,6 +34,7 @@ class Server:
     :ivar expedites: whether short values go in one answer.
     :ivar cut: how many bytes it puts into a segment, the last one aside.
     :ivar refuses: with which abort code it refuses what is asked of an object.
+    :ivar constant: what it takes and does not keep.
     """
 
     objects: dict[tuple[int, int], bytes]
@@ -41,6 +42,7 @@ class Server:
     expedites: bool = True
     cut: int = 7
     refuses: dict[tuple[int, int], int] = field(default_factory=dict)
+    constant: set[tuple[int, int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self._name = bytes(3)
@@ -122,7 +124,8 @@ class Server:
 
     def _store(self, value: bytes) -> bytes:
         place = int.from_bytes(self._name[:2], 'little'), self._name[2]
-        self.objects[place] = value
+        if place not in self.constant:
+            self.objects[place] = value
         return b'\x60' + self._name + bytes(4)
 
 

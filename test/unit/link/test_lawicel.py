@@ -27,7 +27,7 @@ from nfo_sinus_driver.link.lawicel import Reader
 from nfo_sinus_driver.link.lawicel import bit_rate
 from nfo_sinus_driver.link.lawicel import encode
 
-FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8))
+FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))
 #: What else an adapter says.
 OTHERS = st.sampled_from(
     [b'\r', b'z\r', b'Z\r', b'\a', b'F00\r', b'V1013\r', b'r1000\r', b'T000001002AABB\r']
@@ -76,6 +76,10 @@ def test_every_frame_is_found_in_any_pieces(
     assert found.frames == [one for one in said if isinstance(one, Frame)]
     assert found.done == sum(one in (b'\r', b'z\r', b'Z\r') for one in said)
     assert found.refused == said.count(b'\a')
+
+
+def test_a_remote_frame_asks_for_a_length() -> None:
+    assert encode(Frame(0x705, b'\0', remote=True)) == b'r7051\r'
 
 
 @given(st.data(), st.binary(max_size=80), FRAMES)

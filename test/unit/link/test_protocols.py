@@ -81,7 +81,8 @@ def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol
 
 @given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
 def test_addresses(protocol: LineProtocol, address: int) -> None:
-    lowest, highest = {'classic': (0, 94), 'movitrac': (0, 63)}.get(protocol.name, (1, 247))
+    ends = {'classic': (0, 94), 'movitrac': (0, 63), 'canopen': (1, 127)}
+    lowest, highest = ends.get(protocol.name, (1, 247))
     if lowest <= address <= highest:
         protocol.require_unit(address)
     else:
@@ -113,14 +114,22 @@ def test_classic_has_the_formats_of_its_firmwares(format_: str) -> None:
             open_with('classic', format_)
 
 
-@given(st.sampled_from(list(PROTOCOLS)), st.sampled_from(BAUD_RATES))
+@given(st.sampled_from(list(PROTOCOLS)), st.sampled_from((*BAUD_RATES, 125_000)))
 def test_baud_rates(protocol: str, baud_rate: int) -> None:
     line = line_settings(protocol, baud_rate=baud_rate)
-    if protocol != 'movitrac' or baud_rate == 9600:
+    if baud_rate in PROTOCOLS[protocol].baud_rates:
         open_link(protocol, PORTS.get(protocol, '/dev/x'), line)
     else:
-        with pytest.raises(ValueError, match=f'^baud_rate {baud_rate}: movitrac has 9600$'):
+        has = ', '.join(map(str, PROTOCOLS[protocol].baud_rates))
+        with pytest.raises(ValueError, match=f'^baud_rate {baud_rate}: {protocol} has {has}$'):
             open_link(protocol, '/dev/x', line)
+
+
+@pytest.mark.parametrize('port', ['/dev/ttyACM0', 'can0', 'socket://adapter:4001'])
+def test_canopen_has_the_bit_rates_of_its_adapters(port: str) -> None:
+    for bit_rate in (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 1_000_000):
+        open_link('canopen', port, line_settings('canopen', baud_rate=bit_rate))
+    assert line_settings('canopen').baud_rate == 125_000
 
 
 @given(FORMATS)

@@ -1,0 +1,82 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the launch files check of their arguments before anything is started.
+
+Without ROS: the launch files give what they have been given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from pathlib import Path
+
+
+def number(name: str, given: str, *, whole: bool = False) -> float:
+    """
+    Return the number that an argument is.
+
+    :raises ValueError: it is none, or negative; the message names it.
+    """
+    try:
+        value = int(given, 10) if whole else float(given)
+    except ValueError:
+        value = -1
+    if not 0 <= value < float('inf'):
+        example = '19200' if whole else '15'
+        kind = 'a whole number' if whole else 'a number'
+        raise ValueError(f'{name}:={given}: write {kind}, such as {example}')
+    return value
+
+
+def parameter_file(given: str, config: Path) -> str:
+    """
+    Return the path of a parameter file; a bare name may be one of the package's own.
+
+    :param config: the folder of those.
+    :raises ValueError: there is no such file; the message says where it was looked for.
+    """
+    path = Path(given).expanduser()
+    if path.is_file():
+        return str(path)
+    own = config / given
+    if path.name == given and own.is_file():
+        return str(own)
+    looked = [str(path.absolute())]
+    if path.name == given:
+        names = ', '.join(sorted(one.name for one in config.glob('*.yaml')))
+        looked.append(f'{config}, which has {names}')
+    raise ValueError(f'params_file:={given}: there is no such file; looked in {"; ".join(looked)}')
+
+
+def require_packages(needed: Mapping[str, str], find: Callable[[str], object]) -> None:
+    """
+    See to it that all packages are installed before any of them is started.
+
+    :param needed: what each is for, by its name.
+    :param find: raises a LookupError where there is no package of a name.
+    :raises ValueError: some are missing; the message says how to install them.
+    """
+    missing = []
+    for name in needed:
+        try:
+            find(name)
+        except LookupError:
+            missing.append(name)
+    if missing:
+        told = ', '.join(f'{name} ({needed[name]})' for name in missing)
+        debs = ' '.join(f'ros-jazzy-{name.replace("_", "-")}' for name in missing)
+        raise ValueError(f'packages are missing: {told}; sudo apt install {debs}')

@@ -1,0 +1,257 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A CAN bus with nodes on it, and the adapter through which a master is there.
+
+Knows no clock of its own: it is told the time, so that tests can make it up. Of the frames that
+wait for the bus the one with the least identifier goes first; the adapter sends its own in order. A
+frame that nobody takes (no node has power, a line that carries nothing, another bit rate) is not
+sent again later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
+import itertools
+from typing import Protocol
+
+from nfo_sinus_driver.simulator import can_frames
+from nfo_sinus_driver.simulator.can_frames import Frame
+from nfo_sinus_driver.simulator.canopen import ANSWERS
+from nfo_sinus_driver.simulator.canopen import Server
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.line import Trace
+from nfo_sinus_driver.simulator.line_faults import LineFaults
+from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.ports import Port
+from nfo_sinus_driver.simulator.timing import Timing
+from nfo_sinus_driver.simulator.wire import Wire
+
+_NAME = 'canopen'
+
+
+class Adapter(Protocol):
+    """What stands between a port and the bus."""
+
+    #: Bytes that nobody has sent can come out of its port.
+    is_serial: bool
+
+    def restart(self) -> None:
+        """Be as after it was plugged in."""
+
+    def take(self, data: bytes) -> Iterator[bytes | Frame]:
+        """Take bytes from the port; give what it answers, and the frames that it sends."""
+
+    def tried(self, frame: Frame, *, sent: bool) -> bytes:
+        """Take note that a frame could be sent, or could not; return what it answers."""
+
+    def on_bus(self, rate: int) -> bool:
+        """Tell whether it takes part in a bus with this bit rate."""
+
+    def told(self, frame: Frame, now: float) -> bytes:
+        """Return what it says on the port of a frame from the bus."""
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    """A frame that waits for the bus: since when, whose, and what is wrong with it."""
+
+    since: float
+    order: int
+    frame: Frame
+    sender: Server | None
+    note: str
+
+    @property
+    def precedence(self) -> tuple[int, int]:
+        """The least is sent first."""
+        # of a standard identifier the bits are compared first
+        identifier = self.frame.identifier << (0 if self.frame.extended else 18)
+        return identifier << 1 | self.frame.extended, self.order
+
+
+class CanFaults(LineFaults):
+    """
+    What goes wrong between a node and the master.
+
+    Frames have a check sum, and a damaged one is sent again at once, so damage only takes time.
+    Noise is what comes out of a serial adapter beside its lines. The line sees to both.
+    """
+
+    def damaged(self, reply: Reply) -> Reply:
+        """Return an answer that was damaged."""
+        return reply
+
+    def noisy(self, reply: Reply) -> Reply:
+        """Return an answer with noise before it."""
+        return reply
+
+
+class CanLine(Wire):
+    """
+    One bus with several drives on it.
+
+    :param adapter: what a master is there by.
+    :param paced: frames take the time that they take on a real bus.
+    :param turnaround: time a drive takes before it answers (s).
+    :param always_heard: the drives hear it whatever they are set to.
+    """
+
+    name = _NAME
+
+    def __init__(
+        self,
+        port: Port,
+        adapter: Adapter,
+        drives: Sequence[SimulatedDrive],
+        timing: Timing,
+        *,
+        paced: bool = False,
+        turnaround: float = 0.0,
+        always_heard: bool = False,
+        trace: Trace | None = None,
+    ) -> None:
+        self._bit = 1 / timing.baud if paced else 0.0
+        super().__init__(port, timing, CanFaults())
+        self.speed = f'{timing.baud} bit/s'
+        self._adapter = adapter
+        self._drives = drives
+        self._turnaround = turnaround
+        self._always_heard = always_heard
+        self._trace = trace
+        self._waiting: list[_Waiting] = []
+        self._order = itertools.count()
+        #: Until when a frame is on the bus.
+        self._busy_until = float('-inf')
+        #: When the last answer of each node was ready: it answers in order.
+        self._answered: dict[int, float] = {}
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that were read at ``now``."""
+        for said in self._adapter.take(data):
+            if isinstance(said, Frame):
+                # it is acknowledged by whoever has power, also a node that is not meant
+                sent = self._carries(now) and any(drive.listening for drive in self._drives)
+                if sent:
+                    self._put(said, now)
+                elif self._trace is not None:
+                    self._trace.record('request', _raw(said), now, now, 'lost')
+                self.port.send(self._adapter.tried(said, sent=sent))
+            else:
+                self.port.send(said)
+        self._act(now)
+
+    def _act(self, now: float) -> None:
+        for node in self._nodes():
+            for frame in node.act(now):
+                self._put(frame, now, node)
+        while (next_ := self._next()) is not None:
+            waiting, end = next_
+            if end > now:
+                return
+            self._waiting.remove(waiting)
+            self._busy_until = end
+            self._carry(waiting, end)
+
+    @property
+    def _due(self) -> float:
+        next_ = self._next()
+        times = [node.due for node in self._nodes()]
+        return min([*times, *([next_[1]] if next_ else [])], default=float('inf'))
+
+    def _unplugged(self) -> None:
+        self._adapter.restart()
+        self._waiting = [one for one in self._waiting if one.sender is not None]
+
+    # ---- inside ----
+
+    def _nodes(self) -> Iterator[Server]:
+        """Give the nodes that take part in the bus."""
+        for drive in self._drives:
+            if self._always_heard or drive.control_unit.hears(_NAME, self.timing):
+                server = drive.servers[_NAME]
+                assert isinstance(server, Server)
+                yield server
+
+    def _carries(self, now: float) -> bool:
+        """Tell whether frames come from the adapter to the nodes, and the other way."""
+        return self._adapter.on_bus(self.timing.baud) and not self.faults.dead(now)
+
+    def _put(
+        self, frame: Frame, since: float, sender: Server | None = None, note: str = ''
+    ) -> None:
+        self._waiting.append(_Waiting(since, next(self._order), frame, sender, note))
+
+    def _next(self) -> tuple[_Waiting, float] | None:
+        """Return which frame gets the bus next, and when its end is there."""
+        if not self._waiting:
+            return None
+        begin = max(self._busy_until, min(one.since for one in self._waiting))
+        # the adapter sends in order: of its frames only the first takes part
+        masters = next((one for one in self._waiting if one.sender is None), None)
+        ready = (
+            one
+            for one in self._waiting
+            if one.since <= begin and (one.sender is not None or one is masters)
+        )
+        first = min(ready, key=lambda one: one.precedence)
+        bits = can_frames.bits(first.frame)
+        # each time that it is damaged, an error frame is in its place, and it comes again
+        again = first.note.count('damaged') * (bits + can_frames.ERROR_BITS)
+        return first, begin + (bits + again) * self._bit
+
+    def _carry(self, waiting: _Waiting, end: float) -> None:
+        """Let a frame arrive everywhere."""
+        frame, sender = waiting.frame, waiting.sender
+        dead = self.faults.dead(end)
+        if self._trace is not None:
+            direction = 'request' if sender is None else 'answer'
+            note = 'lost' if dead else waiting.note
+            begin = end - can_frames.bits(frame) * self._bit
+            self._trace.record(direction, _raw(frame), begin, end, note)
+        if dead:
+            return
+        if sender is not None and self._carries(end):
+            noise = self._adapter.is_serial and 'noise' in waiting.note
+            told = self._adapter.told(frame, end)
+            self.port.send((self.faults.noise() if noise else b'') + told)
+        for node in self._nodes():
+            if node is not sender:
+                self._arrive(node, frame, end)
+
+    def _arrive(self, node: Server, frame: Frame, end: float) -> None:
+        """Let a frame arrive at a node, and what it sends for it wait for the bus."""
+        drive = node.drive
+        drive.advance_to(end)
+        if not drive.listening:
+            return
+        # carrying it out may change it
+        address, wait = node.node, drive.control_unit.response_time
+        ready = end + max(self._turnaround, wait)
+        for answer in node.receive(frame, end):
+            if answer.identifier != ANSWERS + address:
+                self._put(answer, ready, node)
+                continue
+            for reply in self.faults.alter(address, answer.data):
+                since = max(ready + reply.delay, self._answered.get(address, ready))
+                self._answered[address] = since
+                self._put(answer._replace(data=reply.data), since, node, reply.note)
+
+
+def _raw(frame: Frame) -> bytes:
+    """Return what is written down of a frame: its identifier in two or four bytes, its data."""
+    identifier = frame.identifier.to_bytes(4 if frame.extended else 2, 'big')
+    return identifier + (b'' if frame.remote else frame.data)
