@@ -158,7 +158,6 @@ def usual_family() -> str:
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 
-<<<<<<< HEAD
 def _place(name: str, method: str) -> tuple[str, Path]:
     """Return package and folder of the tables that a control method has, if some of its own."""
     folder = _folders()[name]
@@ -166,12 +165,12 @@ def _place(name: str, method: str) -> tuple[str, Path]:
     if method and (folder / method / 'parameters.csv').exists():
         return f'{package}.{method}', folder / method
     return package, folder
-=======
+
+
 def example_setting() -> tuple[str, float]:
     """Return the key of a setting of that family, and a value, for help and documentation."""
     key, value = importlib.import_module(_FAMILIES).EXAMPLE
     return str(key), float(value)
->>>>>>> main
 
 
 @functools.cache

@@ -234,9 +234,9 @@ class Commands:
         shown = self._registers.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
-        return await carry_out(steps, self._registers, Priority.SERVICE, held=self._held)
+        return await carry_out(steps, self._registers, Priority.SERVICE, held=self._hold)
 
-    async def _held(self, condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
+    async def _hold(self, condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
         try:
             await self._wait_until(condition, Priority.SERVICE, seconds)
         except DriveError:

@@ -170,15 +170,11 @@ class CommunicationWatchdog:
         inverter, model = self._inverter, self._inverter.model
         timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
-<<<<<<< HEAD
         method = inverter.settings.method_class
         if method.watched_for:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
-        if not inverter.can_time_out:
-=======
         if not inverter.can_time_out and not inverter.watched_by:
->>>>>>> main
             return Report(Cause.NO_OWN_TIMEOUT)
         name = inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:

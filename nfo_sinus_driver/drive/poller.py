@@ -260,17 +260,12 @@ class Poller:
         period = 1 / rate if rate else 0.0
         if not self.active:
             period = _INACTIVE_PERIOD
-<<<<<<< HEAD
+        if self.yields:
+            period = max(period, _YIELDING_PERIOD)
         inverter = self._inverter
         for patience in (inverter.sio_tot, inverter.watched_for):
             if patience:
                 period = min(period, patience * _KEEP_ALIVE_SHARE)
-=======
-        if self.yields:
-            period = max(period, _YIELDING_PERIOD)
-        if self._inverter.sio_tot:
-            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
->>>>>>> main
         return period
 
     @property

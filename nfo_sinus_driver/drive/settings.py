@@ -87,13 +87,9 @@ CONTROL_MODES = _control_modes(AUTO)
 #: The longest of the time-outs that drives have themselves, s.
 LONGEST_DRIVE_TIMEOUT = float(max(longest for longest, _ in _own_timeouts(AUTO)))
 
-<<<<<<< HEAD
 #: How many registers a PLC shows for one drive, and where the last of them can begin.
 BLOCK_SIZE = 11
 LAST_BLOCK = 0x10000 - BLOCK_SIZE
-_LONGEST_DRIVE_TIMEOUT = 25.0
-=======
->>>>>>> main
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5

@@ -177,12 +177,9 @@ class LineProtocol:
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
-<<<<<<< HEAD
     :ivar carries: what else it reaches parameters by, that stand at who is between: a PLC.
-=======
     :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
         is tried.
->>>>>>> main
     :ivar check: what to look at, in this order, where no drive answers.
     """
 
@@ -197,11 +194,8 @@ class LineProtocol:
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
-<<<<<<< HEAD
     carries: frozenset[str] = frozenset()
-=======
     rates_disturb: bool = False
->>>>>>> main
     check: str = _CHECK
 
     def require_unit(self, address: int) -> None:

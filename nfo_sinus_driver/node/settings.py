@@ -29,11 +29,8 @@ from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
-<<<<<<< HEAD
 from nfo_sinus_driver.drive.settings import LAST_BLOCK
-=======
 from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
->>>>>>> main
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS

@@ -32,12 +32,9 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
-<<<<<<< HEAD
 from nfo_sinus_driver.simulator.plc import Channel
 from nfo_sinus_driver.simulator.plc import Plc
-=======
 from nfo_sinus_driver.simulator.wire import Wire
->>>>>>> main
 
 #: Stands for an argument that must be given.
 _REQUIRED: Any = object()

@@ -67,11 +67,7 @@ class _Delivery:
 
 class Line(Wire):
     """
-<<<<<<< HEAD
     One line with several stations on it: drives, or what stands before them.
-=======
-    One serial line with several drives on it.
->>>>>>> main
 
     :param paced: bytes take the time that they take on a real line, never less.
     :param turnaround: time a drive takes before it answers (s).
@@ -96,15 +92,9 @@ class Line(Wire):
     ) -> None:
         super().__init__(port, timing, LineFaults(int(timing.char_format[0])))
         self.protocol = protocol
-<<<<<<< HEAD
         self.stations = stations
-        self.timing = timing
-        self.faults = LineFaults(int(timing.char_format[0]))
-=======
-        self.drives = drives
         self.name = protocol.name
         self.speed = f'{timing.baud} {timing.char_format}'
->>>>>>> main
         self._clock = clock
         self._trace = trace
         self._echo = echo

@@ -173,13 +173,8 @@ class Simulator:
                     stream = stack.enter_context(open(name, 'w', encoding='utf-8'))
                 line = one.wire(
                     port,
-<<<<<<< HEAD
-                    one.make(gateway_timeout),
-                    stations,
-                    one.timing,
-=======
                     list(self.drives.values()),
->>>>>>> main
+                    stations,
                     time.monotonic,
                     gateway_timeout=gateway_timeout,
                     paced=paced,

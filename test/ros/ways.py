@@ -216,8 +216,8 @@ WAYS = {
         ),
     )
 }
-#: Through a PLC, by telegram 1, which tells less than any line of the drives themselves: their tests
-#: are their own.
+#: Through a PLC, by telegram 1, which tells less than any line of the drives themselves: their
+#: tests are their own.
 TELEGRAM1 = {
     model: Way(f'telegram1_{model}', 'modbus_tcp', frozenset(), model, method='telegram1', block=7)
     for model in ('sinus_optimal', 'sinus_h', 'sinus_g2')

@@ -89,11 +89,12 @@ def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
     factory=FACTORY,
-<<<<<<< HEAD
-    servers={'modbus': ModbusServer, 'classic': classic.Server, 'telegram1': telegram1.Server},
-=======
-    servers={'modbus': ModbusServer, 'classic': classic.Server, 'canopen': canopen.Server},
->>>>>>> main
+    servers={
+        'modbus': ModbusServer,
+        'classic': classic.Server,
+        'canopen': canopen.Server,
+        'telegram1': telegram1.Server,
+    },
     options=(
         Option(
             'dialect',

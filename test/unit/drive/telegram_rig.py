@@ -83,7 +83,8 @@ class TelegramRig:
         self.send(None)
         self.bus.close()
         self.simulator.stop()
-        assert not telegram_laws.violations(self.frames, self.model)
+        found = telegram_laws.violations(self.frames, self.model)
+        assert not found, found
 
     def connect(self) -> None:
         """Connect, activate, and wait until nothing is being stopped."""

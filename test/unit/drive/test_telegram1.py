@@ -110,13 +110,13 @@ def test_every_way_out_stops_the_motor(make: Make, model: str) -> None:
 
 @pytest.mark.parametrize('part', ['drive', 'program'])
 def test_old_or_invalid_data_stop_it_and_are_told(make: Make, model: str, part: str) -> None:
-    rig = make(lost_after=0.8, plc=PlcSetting(ros_time=10.0, drive_time=0.3))
+    rig = make(lost_after=2.0, plc=PlcSetting(ros_time=10.0, drive_time=1.0))
     rig.ride()
     if part == 'drive':
-        rig.simulator.inject('fieldbus-cut', seconds=3.0)
+        rig.simulator.inject('fieldbus-cut', seconds=5.0)
         wait_until(lambda: rig.notes.told('the PLC has no valid data from the drive'))
     else:
-        rig.simulator.inject('plc-stop', seconds=3.0)
+        rig.simulator.inject('plc-stop', seconds=5.0)
         wait_until(lambda: rig.notes.told('the data from the drive stand still in the PLC'))
     assert not rig.drive.armed
     wait_until(lambda: rig.words[-1] == STOPPED[model])
@@ -144,6 +144,8 @@ def test_a_release_is_needed(make: Make) -> None:
     rig.connect()
     assert 'has not released the drive to ROS' in rig.answer(rig.drive.enable())
     rig.simulator.inject('release', state='on')
+    wait_until(lambda: rig.drive.snapshot.text != 'Not released')
+    wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.ride()
     rig.simulator.inject('release', state='off')
     wait_until(lambda: not rig.drive.armed)
