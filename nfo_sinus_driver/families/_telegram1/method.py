@@ -156,9 +156,9 @@ class Telegram1(ControlMethod):
         return self.ready
 
     def release(self) -> Steps[None]:
-        """Leave the drive ready, under control of the bus; it stands."""
+        """Leave the drive ready, under control of the bus; it stands, or its ramp ends first."""
         if (yield from self.in_control()):
-            yield begin(self.ready)
+            yield begin(self.standing(int((yield Read(STATUS)))))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run bits and set-point."""

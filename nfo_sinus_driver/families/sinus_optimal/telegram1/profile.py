@@ -23,6 +23,7 @@ Switch on away, and the motor ramps; Enable taken away would release it [C109].
 from __future__ import annotations
 
 from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.status import Role
@@ -36,8 +37,8 @@ from nfo_sinus_driver.families.sinus_optimal.words import state_of
 _PLC_CONTROL = 1 << 10
 _ENABLE = 1 << 3
 _SWITCH_ON = 1 << 0
-#: The state machine is enabled, or still drives the motor.
-_ENABLED = Status.ENABLED | Status.SWITCHED_ON | Status.STOPPING
+#: The motor is driven, be it to a stop.
+_DRIVEN = Status.SWITCHED_ON | Status.STOPPING
 
 
 class OptimalTelegram1(Telegram1):
@@ -47,8 +48,8 @@ class OptimalTelegram1(Telegram1):
     runs = _SWITCH_ON
 
     def take_control(self) -> Steps[None]:
-        """Have PLC control, with neither Enable nor Switch on."""
-        yield method.begin(self.ready)
+        """Have PLC control, without Switch on; a motor that still ramps keeps Enable."""
+        yield method.begin(self.standing(int((yield Read(method.STATUS)))))
         yield Until(lambda status: bool((status.word or 0) & self.control))
 
     def run(self) -> Steps[None]:
@@ -58,8 +59,8 @@ class OptimalTelegram1(Telegram1):
         yield method.following(self.ready | _ENABLE | _SWITCH_ON, once=True)
 
     def standing(self, word: int) -> int:
-        """Return the word that keeps Enable where the drive has it, so that a motor ramps."""
-        return self.ready | _ENABLE if word & _ENABLED else self.ready
+        """Return the word that keeps Enable where the motor is driven, so that it ramps."""
+        return self.ready | _ENABLE if word & _DRIVEN else self.ready
 
 
 PROFILE = Profile(
