@@ -293,7 +293,7 @@ class ControlMethod(abc.ABC):
     :cvar procedures: what begins each procedure that it has.
     :cvar addressing: how it reaches the parameters of its tables, where that is another way than
         that of the line; ``''``: that of the line.
-    :cvar watched_for: who is between stops the drive after so long without a word of ours, s; 0:
+    :cvar plc_time: who is between stops the drive after so long without a word of ours, s; 0:
         there is nobody between.
     :cvar caution: what of the drive itself decides whether it stops when nobody reaches it, and
         cannot be read; ``''``: nothing.
@@ -308,7 +308,7 @@ class ControlMethod(abc.ABC):
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     keeps_control: ClassVar[str] = ''
     addressing: ClassVar[str] = ''
-    watched_for: ClassVar[float] = 0.0
+    plc_time: ClassVar[float] = 0.0
     caution: ClassVar[str] = ''
 
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:

@@ -171,7 +171,7 @@ class CommunicationWatchdog:
         timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
         method = inverter.settings.method_class
-        if method.watched_for:
+        if method.plc_time:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if not inverter.can_time_out and not inverter.watched_by:

@@ -109,7 +109,7 @@ class DriveState:
         self.model = load_family(settings.model, settings.method)
         method = settings.method_class
         #: Who is between stops the drive after so long without a word of ours, s; 0: nobody is.
-        self.watched_for = method.watched_for
+        self.plc_time = method.plc_time
         #: Its parameters.
         self.registers = ParameterAccess(
             bus,
@@ -222,9 +222,9 @@ class DriveState:
 
         :raises DriveError: it is.
         """
-        age = time.monotonic() - seen.at
-        if self.watched_for and age >= self.settings.lost_after:
-            raise DriveError(Cause.OLD_DATA, age=age)
+        longest = self.settings.lost_after
+        if self.plc_time and time.monotonic() - seen.at >= longest:
+            raise DriveError(Cause.OLD_DATA, seconds=longest)
 
     async def wait_until(
         self,

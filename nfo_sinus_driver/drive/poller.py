@@ -263,7 +263,7 @@ class Poller:
         if self.yields:
             period = max(period, _YIELDING_PERIOD)
         inverter = self._inverter
-        for patience in (inverter.sio_tot, inverter.watched_for):
+        for patience in (inverter.sio_tot, inverter.plc_time):
             if patience:
                 period = min(period, patience * _KEEP_ALIVE_SHARE)
         return period

@@ -104,7 +104,7 @@ class Telegram1(ControlMethod):
     means = 'telegram 1'
     references = ('fieldbus',)
     addressing = 'telegram1'
-    watched_for = 1.0
+    plc_time = 1.0
     keeps_control = (
         'without STW1 keypad or terminals would have it, by which the motor could start'
     )
