@@ -24,7 +24,6 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from itertools import pairwise
-import os
 import signal
 import sys
 import threading
@@ -34,6 +33,7 @@ from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
 import page
 from rig import PATIENCE
+from rig import use_domain
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
@@ -147,9 +147,7 @@ def main() -> None:
     """Measure and print the table."""
     options = _parser().parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    # nobody else's drives may hear what is published here
-    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    use_domain(options.domain)
     cases = _QUICK if options.quick else CASES
     rows = []
     for baud_rate in options.baud or _BAUD_RATES:
@@ -206,7 +204,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--baud', type=int, nargs='+', help='bit rates (default: both)')
     add('--quick', action='store_true', help='few cases for a moment, to see that it works')
     add('--write', action='store_true', help=f'put the table into docs/{page.PAGE.name}')
-    add('--domain', type=int, default=90, metavar='ID', help='ROS domain (default: 90)')
+    add('--domain', type=int, metavar='ID', help='ROS domain (default: one of its own)')
     return parser
 
 

@@ -22,7 +22,6 @@ figures; the aims are in docs/performance.md.
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import time
 
@@ -31,6 +30,7 @@ from driver_rig import DriverRig
 from rcl_interfaces.srv import GetParameters
 from rcl_interfaces.srv import ListParameters
 from rig import PATIENCE
+from rig import use_domain
 import trace_file
 from trace_file import Frame
 
@@ -70,10 +70,11 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--changes', type=int, default=10, help='changes at the keypad')
-    parser.add_argument('--domain', type=int, default=91, metavar='ID', help='ROS domain')
+    parser.add_argument(
+        '--domain', type=int, metavar='ID', help='ROS domain (default: one of its own)'
+    )
     options = parser.parse_args()
-    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    use_domain(options.domain)
     with _Rig(_BAUD_RATE, 1) as rig:
         reading = _reading(rig.frames())
         took = reading[-1].last - reading[0].first

@@ -32,6 +32,8 @@ import trace_file
 from trace_file import Frame
 from trace_file import Line
 
+from nfo_sinus_driver.demo.bench import own_domain
+
 #: A process that has not done by then what it should never will, s.
 PATIENCE = 60.0
 #: The same for each drive on the line, s.
@@ -40,6 +42,15 @@ _PATIENCE_DRIVE = 15.0
 _TOLD = 2000
 #: Where these programs are.
 FOLDER = Path(__file__).parent
+#: What this process keeps until it ends.
+_KEPT = contextlib.ExitStack()
+
+
+def use_domain(chosen: int | None) -> None:
+    """Use a ROS domain that was chosen, or one of its own: nobody else's drives may hear this."""
+    number = _KEPT.enter_context(own_domain()) if chosen is None else chosen
+    os.environ['ROS_DOMAIN_ID'] = str(number)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from measurements import Measurement
 from measurements import all_measurements
 import page
 import resources
+from rig import use_domain
 from row import Effort
 from row import Row
 from row import blamed
@@ -52,9 +53,7 @@ def main() -> None:
         parser.error('--write replaces whole tables: not with --baud')
     # end what was started, however this ends
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    # nobody else's drives may hear what is published here
-    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    use_domain(options.domain)
     chosen = [
         one
         for one in all_measurements()
@@ -152,7 +151,7 @@ def _parser() -> argparse.ArgumentParser:
         'at most with each measurement',
     )
     add('--write', action='store_true', help=f'put the tables into docs/{page.PAGE.name}')
-    add('--domain', type=int, default=90, metavar='ID', help='ROS domain (default: 90)')
+    add('--domain', type=int, metavar='ID', help='ROS domain (default: one of its own)')
     return parser
 
 

@@ -30,6 +30,7 @@ import time
 
 from driver_rig import DriverRig
 import resources
+from rig import use_domain
 
 _BAUD_RATE = 57600
 #: Caches and pools fill up in this time, s; of a short run, half of it.
@@ -48,12 +49,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, default=60.0)
     parser.add_argument('--drives', type=int, default=1)
-    parser.add_argument('--domain', type=int, default=92, metavar='ID', help='ROS domain')
+    parser.add_argument(
+        '--domain', type=int, metavar='ID', help='ROS domain (default: one of its own)'
+    )
     options = parser.parse_args()
     # end what was started, however this ends
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    use_domain(options.domain)
     # a set-point that is late on a busy machine is none of the driver's business
     with DriverRig(_BAUD_RATE, options.drives, setpoint_timeout=60.0) as rig:
         rig.listener.enable_all()

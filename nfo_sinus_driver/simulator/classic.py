@@ -26,7 +26,7 @@ from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
 from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
@@ -62,12 +62,11 @@ class Server(abc.ABC):
         """Take note of a message that is not carried out; return whether it is answered by NAK."""
 
 
-class Classic:
+class Classic(OnSerialLine):
     """Classic messages: whom they are for, and what the drive says to them."""
 
     name = 'classic'
     spoken = 'classic'
-    serial = True
 
     @staticmethod
     def gap(timing: Timing) -> float:
@@ -122,8 +121,3 @@ class Classic:
             if server.refused(wrong.flag):
                 answer = classic_frames.acknowledge(sender, False)
         return b'' if to_all else answer
-
-    @staticmethod
-    def instead(request: Request, there: bool) -> Reply | None:
-        """Nothing: on a wire, silence is silence."""
-        return None

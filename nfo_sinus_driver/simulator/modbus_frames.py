@@ -25,6 +25,7 @@ from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.memory import GatewayReason
 from nfo_sinus_driver.simulator.modbus import is_write
 from nfo_sinus_driver.simulator.modbus import server
+from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
@@ -51,10 +52,8 @@ _MBAP = 6
 _MOST_IN_TCP = 254
 
 
-class _OnSerialLine(abc.ABC):
+class _InFrames(OnSerialLine, abc.ABC):
     """What RTU and ASCII have in common: an address, a PDU, and silence where nobody answers."""
-
-    serial = True
 
     @staticmethod
     def concerns(station: Station, request: Request) -> bool:
@@ -73,13 +72,8 @@ class _OnSerialLine(abc.ABC):
             return b''
         return self.wrap(request.address, pdu)
 
-    @staticmethod
-    def instead(request: Request, there: bool) -> Reply | None:
-        """Nothing: on a wire, silence is silence."""
-        return None
 
-
-class ModbusRtu(_OnSerialLine):
+class ModbusRtu(_InFrames):
     """RTU frames: cut by their length, and by silence where their CRC is not right."""
 
     name = 'modbus_rtu'
@@ -115,7 +109,7 @@ class ModbusRtu(_OnSerialLine):
         return body + pymodbus_compat.crc(body)
 
 
-class ModbusAscii(_OnSerialLine):
+class ModbusAscii(_InFrames):
     """ASCII frames: a colon, upper-case digits, LRC, CR LF; as slow as anybody likes."""
 
     name = 'modbus_ascii'

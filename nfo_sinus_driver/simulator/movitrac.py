@@ -24,10 +24,10 @@ from __future__ import annotations
 import abc
 
 from nfo_sinus_driver.simulator import movitrac_frames
-from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
+from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
 from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
@@ -67,12 +67,11 @@ class Server(abc.ABC):
         """
 
 
-class Movitrac:
+class Movitrac(OnSerialLine):
     """Frames between a master and the drives at its line."""
 
     name = 'movitrac'
     spoken = 'movitrac'
-    serial = True
 
     @staticmethod
     def gap(timing: Timing) -> float:
@@ -113,11 +112,6 @@ class Movitrac:
         except Nack as nack:
             return movitrac_frames.refuse(nack.code)
         return movitrac_frames.acknowledge()
-
-    @staticmethod
-    def instead(request: Request, there: bool) -> Reply | None:
-        """Nothing: on a wire, silence is silence."""
-        return None
 
 
 def _server(station: Station) -> Server:

@@ -101,3 +101,14 @@ class Protocol(Interface):
 
         :param there: there is such a station, though it keeps silent.
         """
+
+
+class OnSerialLine:
+    """What all protocols on a wire have in common: silence where nobody answers."""
+
+    serial = True
+
+    @staticmethod
+    def instead(request: Request, there: bool) -> Reply | None:
+        """Nothing: on a wire, silence is silence."""
+        return None

@@ -49,9 +49,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.TOO_LATE: 'no answer within {timeout:g} s',
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
-    Cause.OLD_DATA: 'the data from the drive stand still in the PLC for {seconds:g} s or more '
-    '(its life counter does not change): check the fieldbus between them and that the program of the PLC '
-    'runs',
+    Cause.OLD_DATA: 'the data from the drive stand still in the PLC for {seconds:g} s or more (its '
+    'life counter does not change): check the fieldbus between them and that the program of the '
+    'PLC runs',
     Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
     Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',

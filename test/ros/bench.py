@@ -327,11 +327,21 @@ class Client(contextlib.ExitStack):
     def wait_for(
         self, key: str, condition: Callable[[Any], Any], what: str, timeout: float = PATIENCE
     ) -> Any:
-        """Wait until the newest message of a topic fulfils a condition; return the message."""
+        """
+        Wait until the newest message of a topic, or one after it, fulfils a condition; return it.
+
+        Every message counts that comes meanwhile: what lasts for a moment is not missed.
+        """
+        messages = self.messages[key]
+        looked = max(0, len(messages) - 1)
 
         def seen() -> Any:
-            message = self.latest(key)
-            return message if message is not None and condition(message) else None
+            nonlocal looked
+            while looked < len(messages):
+                looked += 1
+                if condition(messages[looked - 1]):
+                    return messages[looked - 1]
+            return None
 
         return wait_until(seen, what, timeout)
 

@@ -37,7 +37,7 @@ from ways import needs
 import yaml
 
 _DEMO = (sys.executable, '-m', 'nfo_sinus_driver.demo')
-_DEMO_TIME = 110.0
+_DEMO_TIME = 300.0
 #: A busy machine may leave out every other message of what comes at a steady rate.
 _SHARE = 0.5
 #: What the ramps (10 Hz/s) and the pauses of the ride add up to at the least, s.

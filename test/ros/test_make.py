@@ -28,7 +28,7 @@ from bench import Process
 from bench import wait_until
 from ways import needs
 
-_DEMO_TIME = 100.0
+_DEMO_TIME = 300.0
 #: As a shell starts its background jobs.
 _BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 

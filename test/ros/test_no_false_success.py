@@ -68,7 +68,7 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
     bench: Bench, out: str
 ) -> None:
     drive = bench.simulator(*_REFUSING)
-    driver = bench.driver('-p', 'shutdown_timeout:=1.0')
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     client.call_async('tune_full', Trigger)
     drive.wait_for(lambda state: state['inv_st'] == 28, timeout=PATIENCE)

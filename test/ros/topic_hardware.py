@@ -96,10 +96,13 @@ class Hardware:
     Some components at work at a rate (Hz), while it is open.
 
     Between two cycles each keeps the newest message alone, as the real one does.
+
+    :ivar longest_gap: between two cycles, s: on a busy machine they do not come at their rate.
     """
 
     def __init__(self, client: Client, parts: list[Component], rate: float) -> None:
         self._period = 1 / rate
+        self.longest_gap = 0.0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._newest: dict[str, JointState] = {}
@@ -125,9 +128,11 @@ class Hardware:
         self._thread.join()
 
     def _work(self) -> None:
-        due = time.monotonic()
+        due = last = time.monotonic()
         while not self._ended.wait(max(0.0, due - time.monotonic())):
             due += self._period
+            self.longest_gap = max(self.longest_gap, time.monotonic() - last)
+            last = time.monotonic()
             for part, publisher in self._parts:
                 part.read(self._newest.get(part.name))
                 message = part.write()

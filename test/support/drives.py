@@ -238,6 +238,7 @@ DRIVES = {
     ),
     'sinus_g2 canopen': OnCanopen(
         **{**_SINUS, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'},
+        nominal=50.0,
         overvoltage=Fault(8, 'DC High', ('control.retard',)),
         hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
         no_timeout=('--set', 'serial.auto_stop=OFF'),

@@ -64,6 +64,7 @@ def turn(rig: Rig) -> None:
     if rig.drive.settings.follows_setpoints:
         rig.publish(20.0)
     wait_until(lambda: abs(rig.far.motor.frequency) > 10.0)
+    rig.wait_until_it_shows()
 
 
 def test_it_turns_and_stops(rig: Rig) -> None:

@@ -92,7 +92,7 @@ def test_nobody_at_this_address(make_rig: MakeRig) -> None:
 def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
     silent = NoAnswer('unit 3 did not answer')
     first = explain(silent, 3, check=protocol.check)
-    assert first == Report(Cause.NO_RESPONSE, address=3, check=protocol.check)
+    assert first == Report(Cause.NO_RESPONSE, address=3, behind='', check=protocol.check)
     # what has answered once is set right
     assert explain(silent, 3).cause is Cause.NOT_REACHED
 
@@ -115,12 +115,14 @@ def test_commands_before_anybody_answers(make_rig: MakeRig) -> None:
 def test_snapshot_is_what_the_drive_says(rig: Rig) -> None:
     rig.turn(20.0)
     wait_until(lambda: rig.drive.snapshot.text == 'Bus Run')
+    # what is measured is asked for one after the other
+    wait_until(lambda: abs(rig.drive.snapshot.frequency - 20.0) < 0.11)
+    wait_until(lambda: 500 < rig.drive.snapshot.speed < 620)
     snapshot = rig.drive.snapshot
     assert snapshot.connected and snapshot.enabled
     assert (snapshot.control_method, snapshot.control_mode) == ('mode_scmd', 'Freque')
     assert (snapshot.unit, snapshot.setpoint) == ('Hz', 20.0)
     assert snapshot.actual == snapshot.frequency
-    assert 500 < snapshot.speed < 620
     assert 0 <= snapshot.setpoint_age < PATIENCE
     assert not snapshot.setpoint_clamped
     assert snapshot.frequency == pytest.approx(20.0, abs=0.11)

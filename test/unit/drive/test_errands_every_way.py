@@ -43,7 +43,7 @@ from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
-#: A MOVITRAC has other faults, and none of the procedures: test_movitrac_laws.py.
+#: A MOVITRAC has other faults, and none of the procedures: test_movitrac_commands.py.
 _WAYS = {name: way for name, way in WAYS.items() if way.model != 'movitrac31'}
 _TUNING = 28
 #: InvSt when it is finished.

@@ -109,6 +109,7 @@ def test_every_alarm_of_the_optimal(make_rig: MakeRig, method: str) -> None:
     rig.connect()
     rig.enable()
     rig.wait_for_frequency(25.0)
+    rig.wait_until_it_shows()
     known = load_family('sinus_optimal')
     (limit,) = known.codes(Meaning.CURRENT_LIMIT)
     for code in codes(known, Kind.ALARM):

@@ -19,89 +19,37 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from concurrent.futures import Future
-import dataclasses
 import itertools
 from typing import Any
 
-from line_rig import MakeLine
+from movitrac_rig import BITS
+from movitrac_rig import DIRECTIONS
+from movitrac_rig import MODEL
+from movitrac_rig import OVERCURRENT
+from movitrac_rig import SIZE
+from movitrac_rig import SWITCHES
+from movitrac_rig import WAYS
+from movitrac_rig import assert_only_enable_helps
+from movitrac_rig import bits
+from movitrac_rig import each_switch
+from movitrac_rig import each_way
+from movitrac_rig import make
+from movitrac_rig import requests_since
+from movitrac_rig import succeeded
+from movitrac_rig import turns
 import pytest
 from support.addresses import Words
-from support.wire import understand
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.simulator.family import load
 from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT
 from nfo_sinus_driver.simulator.movitrac31.codes import Bit
 from nfo_sinus_driver.simulator.movitrac31.codes import Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
 from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
-
-MODEL = 'movitrac31'
-OVERCURRENT = 101
-#: Indices [M4 §4].
-BITS, SIZE, P841, STATUS, FREQUENCY, PC_TIMEOUT_INDEX = 281, 223, 205, 284, 0, 285
-DIRECTIONS = Bit.CW | Bit.CCW
-REMOTE = {CONTROL_MODE: 'Remote control'}
-
-#: Each switch of the simulated drive, turned alone.
-SWITCHES: Mapping[str, Mapping[str, str]] = {
-    'as the manual says': {},
-    **{
-        f'{option.name} {choice}': {option.name: choice}
-        for option in load(MODEL).options
-        if option.name != 'option_card'
-        for choice in option.choices[1:]
-    },
-}
-each_switch = pytest.mark.parametrize('switch', SWITCHES.values(), ids=SWITCHES)
-
-WAYS: dict[str, Callable[[Drive], Future[Any]]] = {
-    'stop': lambda drive: drive.stop(),
-    'quick stop': lambda drive: drive.quick_stop(),
-    'deactivate': lambda drive: drive.deactivate(),
-    'clean up': lambda drive: drive.disconnect(1.0),
-    'exit': lambda drive: drive.stop_for_good(1.0),
-}
-each_way = pytest.mark.parametrize('way', WAYS.values(), ids=WAYS)
-
-
-def make(
-    make_virtual: MakeVirtual, switch: Mapping[str, str] | None = None, **settings: Any
-) -> VirtualRig:
-    """Make a rig; P841 is Remote control already where nothing could set it."""
-    needs = switch is not None and 'settings_need' in switch
-    return make_virtual(REMOTE if needs else {}, variant=switch, model=MODEL, **settings)
-
-
-def bits(rig: VirtualRig) -> int:
-    return rig.far.memory.raw(FUNCTION_BITS)
-
-
-def turns(rig: VirtualRig) -> bool:
-    """Tell whether the drive turns the motor, or is about to; it may coast."""
-    return rig.far.motor.driven and rig.far.motor.demand != 0
-
-
-def succeeded(rig: VirtualRig, future: Future[Any]) -> bool:
-    """Wait for an answer; tell whether it is a success."""
-    rig.answer(future)
-    error = future.exception()
-    assert error is None or isinstance(error, DriveError), repr(error)
-    return error is None
-
-
-def requests_since(rig: VirtualRig, frames: int) -> list[tuple[int, Words | None]]:
-    """Return index and value of what was asked since so many frames."""
-    asked = [understand(bytes.fromhex(one['hex']), 'movitrac') for one in rig.link.frames[frames:]]
-    return [(one.place, one.words) for one in asked if one is not None]
-
 
 # --- ways out -------------------------------------------------------------------------------------
 
@@ -217,19 +165,6 @@ def stopped_in_enable(
 
 
 # --- no restart -----------------------------------------------------------------------------------
-
-
-def assert_only_enable_helps(rig: VirtualRig) -> None:
-    """It stays still although set-points keep arriving, until somebody calls enable."""
-    rig.send(20.0)
-    rig.pass_time(1.5)
-    assert not rig.drive.armed
-    assert not turns(rig)
-    assert not bits(rig) & DIRECTIONS
-    assert 'enabled' in rig.answer(rig.drive.enable())
-    rig.send(20.0)
-    rig.pass_time(1.5)
-    assert rig.far.motor.frequency > 19
 
 
 @each_switch
@@ -489,283 +424,3 @@ def test_a_reversal_goes_through_zero(make_virtual: MakeVirtual) -> None:
         assert rig.far.motor.frequency == pytest.approx(value, abs=0.1)
         assert rig.drive.snapshot.frequency == pytest.approx(value, abs=0.1)
     assert not wrong
-
-
-# --- what an enable asks --------------------------------------------------------------------------
-
-#: P600 to P609 of terminals that only an option card has, P760 and P880 likewise.
-CARDS = {153, 154, 155, 156, 321, 322, 323, 249, 212}
-
-
-def asked_by_enable(rig: VirtualRig) -> list[int]:
-    """Enable; return the indices that were asked for or written meanwhile."""
-    before = len(rig.link.frames)
-    assert 'enabled' in rig.answer(rig.drive.enable())
-    asked = [index for index, _ in requests_since(rig, before)]
-    assert succeeded(rig, rig.drive.stop())
-    return asked
-
-
-@pytest.mark.parametrize(('settings', 'most'), [({}, 34), (REMOTE, 28)], ids=['P841', 'mine'])
-def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
-    make_virtual: MakeVirtual, settings: dict[str, Any], most: int
-) -> None:
-    rig = make_virtual(settings, model=MODEL, telemetry_rate=0.0, poll_rate=0.1)
-    rig.connect()
-    rig.answer(rig.drive.parameters.read())
-    asked = asked_by_enable(rig)
-    assert len(asked) <= most, asked
-    assert not CARDS & set(asked)
-
-
-def test_a_card_that_was_fitted_meanwhile_is_asked_for_again(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual({'terminal.input_48': 'CW/Stop'}, model=MODEL)
-    rig.connect()
-    rig.answer(rig.drive.parameters.read())
-    assert not CARDS & set(asked_by_enable(rig))
-    unit = rig.far.control_unit
-    unit.variant = dataclasses.replace(unit.variant, option_card='fio')
-    unit.terminals.inputs += (48, 49, 50, 51, 52, 53, 54)
-    # a card is fitted while the drive has no power
-    rig.far.power_cycle(5.0)
-    rig.pass_time(10.0)
-    assert rig.drive.snapshot.connected
-    unit.switch(48, True)
-    assert 'terminal 48 (CW/Stop) is closed' in rig.answer(rig.drive.enable())
-
-
-def test_one_refusal_is_not_believed_of_a_card(make_virtual: MakeVirtual) -> None:
-    rig = make(make_virtual)
-    rig.connect()
-    assert set(asked_by_enable(rig)) >= CARDS
-    assert set(asked_by_enable(rig)) >= CARDS
-    assert not CARDS & set(asked_by_enable(rig))
-
-
-# --- the PC time-out ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize('timeout_stop', ['coasts', 'ramps'])
-def test_the_pc_time_out_strikes_when_the_driver_dies(
-    make_virtual: MakeVirtual, timeout_stop: str
-) -> None:
-    rig = make(make_virtual, {'timeout_stop': timeout_stop}, drive_timeout=1.5)
-    rig.ride()
-    rig.pass_time(20.0)
-    rig.send(None)
-    rig.pass_time(5.0)
-    # nobody sends set-points any more, and it is still enabled
-    assert rig.drive.armed and not rig.far.faults
-    rig.send(20.0)
-    rig.pass_time(1.0)
-    rig.kill()
-    rig.elapse(1.0)
-    assert not rig.far.faults
-    rig.elapse(1.0)
-    assert rig.far.faults.codes == [PC_TIMEOUT]
-    rig.elapse(2.0)
-    assert not rig.far.motor.driven
-
-
-def test_a_pc_time_out_that_is_found_is_acknowledged_by_a_person_alone(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make(make_virtual, {'bits_in_fault': 'kept'}, drive_timeout=1.5)
-    rig.ride()
-    rig.kill()
-    rig.elapse(5.0)
-    rig.begin()
-    rig.connect()
-    rig.pass_time(3.0)
-    assert any('145 PC time out' in text or 'fault 145' in text for _, _, text in rig.notes.events)
-    assert rig.far.faults.codes == [PC_TIMEOUT]
-    assert '145 PC time out' in rig.answer(rig.drive.enable())
-    assert rig.far.faults.codes == [PC_TIMEOUT]
-    assert 'acknowledged 145 PC time out' in rig.answer(rig.drive.acknowledge())
-    assert_only_enable_helps(rig)
-
-
-@pytest.mark.parametrize('found', [0.0, 5.0])
-@pytest.mark.parametrize('end', [['clean up'], ['exit', 'clean up']], ids=['clean up', 'exit'])
-def test_a_clean_end_leaves_the_pc_time_out_as_it_was_found(
-    make_virtual: MakeVirtual, found: float, end: list[str]
-) -> None:
-    rig = make_virtual({'serial.pc_timeout': found}, model=MODEL, drive_timeout=1.5)
-    rig.ride()
-    assert rig.far.memory.number('serial.pc_timeout') == 1.5
-    # set again and changed: what was found stays what it was
-    rig.answer(rig.drive.set_drive_timeout(2.0))
-    for name in end:
-        assert succeeded(rig, WAYS[name](rig.drive)), name
-    assert rig.far.memory.number('serial.pc_timeout') == found
-    assert bool(rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)) == bool(found)
-    rig.send(None)
-    rig.kill()
-    rig.elapse(20.0)
-    assert bool(rig.far.faults) == bool(found)
-
-
-def test_a_clean_end_turns_the_pc_time_out_off_when_the_motor_has_stopped(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make(make_virtual, drive_timeout=1.5)
-    rig.ride()
-    frequencies: list[float] = []
-
-    def meet(index: int, words: Words | None) -> None:
-        if index == PC_TIMEOUT_INDEX and words is not None:
-            frequencies.append(rig.far.motor.frequency)
-
-    rig.before = meet
-    assert succeeded(rig, rig.drive.disconnect(5.0))
-    assert frequencies == [0.0]
-
-
-def test_a_clean_end_during_a_long_ramp_leaves_no_fault(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual({'ramp.t11_down': 60.0}, model=MODEL, drive_timeout=1.5)
-    rig.ride()
-    assert succeeded(rig, rig.drive.disconnect(0.5))
-    rig.send(None)
-    rig.kill()
-    rig.elapse(1.0)
-    assert rig.far.motor.frequency > 10
-    rig.elapse(60.0)
-    assert not rig.far.faults and not rig.far.motor.turning
-
-
-@pytest.mark.parametrize('seconds', [0.0, 4.0])
-def test_a_pc_time_out_of_somebody_else_is_left_alone(
-    make_virtual: MakeVirtual, seconds: float
-) -> None:
-    rig = make(make_virtual, drive_timeout=1.5)
-    rig.ride()
-    rig.far.set_from_keypad('serial.pc_timeout', seconds)
-    rig.pass_time(1.0)
-    written = len(rig.written(PC_TIMEOUT_INDEX))
-    assert succeeded(rig, rig.drive.disconnect(1.0))
-    assert len(rig.written(PC_TIMEOUT_INDEX)) == written
-    assert rig.far.memory.number('serial.pc_timeout') == seconds
-
-
-def test_a_pc_time_out_that_cannot_be_ended_is_told(make_virtual: MakeVirtual) -> None:
-    rig = make(make_virtual, drive_timeout=1.5)
-    rig.ride()
-    rig.far.set_from_keypad('special.parameter_lock', True)
-    # the motor stands all the same
-    assert succeeded(rig, rig.drive.disconnect(1.0))
-    assert rig.far.motor.frequency == 0
-    assert rig.said(Cause.OWN_TIMEOUT_LEFT, Severity.WARNING)
-
-
-def test_a_drive_that_answers_late_is_followed_all_the_same(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual({'serial.response_time': 200.0}, model=MODEL, drive_timeout=3.0)
-    rig.ride()
-    rig.pass_time(30.0)
-    assert rig.drive.armed and not rig.far.faults
-    assert succeeded(rig, rig.drive.stop())
-
-
-@pytest.mark.parametrize('count', [4, 8])
-def test_several_at_one_line_are_kept_alive_while_others_are_enabled(
-    make_line: MakeLine, count: int
-) -> None:
-    # an enable asks some forty times, and nobody sends set-points yet
-    rig = make_line(count, protocol='movitrac', drive_timeout=1.5)
-    rig.connect()
-    rig.enable()
-    assert not any(far.faults for far in rig.fars.values())
-    rig.keep(lambda: rig.give_all(20.0))
-    rig.pass_time(20.0)
-    assert not any(far.faults for far in rig.fars.values())
-    assert all(drive.armed for drive in rig.drives.values())
-    assert all(far.motor.frequency > 19 for far in rig.fars.values())
-    stops = [drive.stop() for drive in rig.drives.values()]
-    for stop in stops:
-        rig.answer(stop)
-        assert stop.exception() is None
-    rig.pass_time(3.0)
-    assert not any(far.motor.turning for far in rig.fars.values())
-
-
-# --- what it does not do, and says so -------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ('settings', 'closed', 'opened', 'reason'),
-    [
-        ({}, 41, 0, 'terminal 41 (CW/Stop) is closed'),
-        ({}, 42, 0, 'terminal 42 (CCW/Stop) is closed'),
-        ({}, 0, 43, 'terminal 43 (Enable/Stop) is open'),
-        ({'serial.manual_operation': True}, 0, 0, 'P870'),
-        ({'special.parameter_lock': True}, 0, 0, 'P800'),
-        ({'frequency.f_min_1': 5.0}, 0, 0, 'set frequency.f_min_1 to 0'),
-    ],
-)
-def test_an_enable_is_refused_with_the_reason(
-    make_virtual: MakeVirtual, settings: dict[str, Any], closed: int, opened: int, reason: str
-) -> None:
-    rig = make_virtual(settings, model=MODEL)
-    rig.connect()
-    for terminal, state in ((closed, True), (opened, False)):
-        if terminal:
-            rig.far.control_unit.switch(terminal, state)
-    assert reason in rig.answer(rig.drive.enable())
-    rig.send(20.0)
-    rig.pass_time(1.0)
-    assert not rig.drive.armed
-    assert not bits(rig) & DIRECTIONS
-    assert not rig.written(P841) or 'P800' in reason
-    assert round(rig.far.memory.number(CONTROL_MODE)) == Mode.STANDARD
-
-
-@pytest.mark.parametrize(
-    ('card', 'settings', 'reason'),
-    [
-        ('fen', {'control.operating_mode': 'Positioning control'}, 'P770'),
-        ('fea', {'serial.master_slave': True}, 'no response'),
-    ],
-)
-def test_an_enable_is_refused_in_another_operating_mode(
-    make_virtual: MakeVirtual, card: str, settings: dict[str, Any], reason: str
-) -> None:
-    rig = make_virtual(settings, variant={'option_card': card}, model=MODEL)
-    if reason == 'no response':
-        # on RS-485 it hears nobody then; what the simulated line does is tested elsewhere
-        rig.far.control_unit.hears = lambda *line: True  # type: ignore[method-assign]
-        reason = 'P880'
-    rig.connect()
-    assert reason in rig.answer(rig.drive.enable())
-    assert not rig.drive.armed
-
-
-@pytest.mark.parametrize(
-    'ask',
-    [
-        lambda drive: drive.tune(Procedure.FULL),
-        lambda drive: drive.erase_error_log(),
-        lambda drive: drive.reset_energy(),
-    ],
-    ids=['tune', 'erase', 'energy'],
-)
-def test_what_it_has_not_is_answered_so(
-    make_virtual: MakeVirtual, ask: Callable[[Drive], Future[Any]]
-) -> None:
-    rig = make(make_virtual)
-    rig.connect()
-    frames = len(rig.link.frames)
-    future = ask(rig.drive)
-    assert not succeeded(rig, future)
-    assert MODEL in rig.answer(future) or 'MOVITRAC' in rig.answer(future)
-    assert all(words is None for _, words in requests_since(rig, frames))
-
-
-def test_the_last_five_faults_are_told_newest_first(make_virtual: MakeVirtual) -> None:
-    rig = make(make_virtual)
-    rig.connect()
-    for fault in (101, 107, 106, 145, 103, 101):
-        rig.far.trip(fault)
-        rig.far.control_unit.reset()
-    log = rig.drive.error_log()
-    rig.answer(log)
-    assert [entry.code for entry in log.result()] == [101, 103, 145, 106, 107]
-    assert [entry.text for entry in log.result()[:2]] == ['Overcurrent', 'Brake chopper']

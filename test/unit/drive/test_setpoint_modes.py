@@ -254,5 +254,5 @@ def test_newest_set_point_counts(make_rig: MakeRig) -> None:
     with pytest.raises(ValueError, match='is no number'):
         rig.drive.set_setpoint(math.nan)
     rig.wait_for_frequency(20.0)
-    assert rig.drive.snapshot.setpoint == 20.0
+    wait_until(lambda: rig.drive.snapshot.setpoint == 20.0)
     assert not rig.notes.told(Cause.SETPOINT_LIMITED, Severity.WARNING)

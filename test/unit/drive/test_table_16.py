@@ -144,6 +144,7 @@ def enables(rig: Rig) -> None:
     assert rig.enable().startswith('enabled')
     rig.publish(20.0)
     rig.wait_for_frequency(20.0)
+    rig.wait_until_it_shows()
 
 
 def stops(rig: Rig) -> None:

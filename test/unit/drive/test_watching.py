@@ -158,6 +158,7 @@ def turning(make_rig: MakeRig, model: str, method: str, reference: str, **settin
     if reference == 'fieldbus':
         rig.publish(25.0)
     rig.wait_for_frequency(25.0)
+    rig.wait_until_it_shows()
     rig.notes.events.clear()
     return rig
 
