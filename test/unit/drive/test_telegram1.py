@@ -144,7 +144,7 @@ def test_a_release_is_needed(make: Make) -> None:
     rig.connect()
     assert 'has not released the drive to ROS' in rig.answer(rig.drive.enable())
     rig.simulator.inject('release', state='on')
-    wait_until(lambda: rig.drive.snapshot.text != 'Not released')
+    wait_until(lambda: rig.drive.snapshot.text not in ('', 'Not released'))
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.ride()
     rig.simulator.inject('release', state='off')
