@@ -18,6 +18,7 @@ Start the driver: one serial line, one node for each drive on it.
     ros2 launch nfo_sinus_driver driver.launch.py port:=/dev/ttyUSB0
     ros2 launch nfo_sinus_driver driver.launch.py port:=/dev/ttyUSB0 \
         protocol:=movitrac model:=movitrac31
+    ros2 launch nfo_sinus_driver driver.launch.py port:=can0 protocol:=canopen address:=1
     ros2 launch nfo_sinus_driver driver.launch.py params_file:=conveyor.yaml namespace:=line1
 
 The node action has no ``name=``: it would rename every node of the process, and the process has
@@ -48,7 +49,7 @@ from nfo_sinus_driver.launch_arguments import parameter_file
 #: Launch arguments that overrule a parameter of the same name in the parameter file: for which
 #: nodes, and what it is.
 OVERRIDES = {
-    'port': ('/**/nfo_sinus_bus', str, 'serial port'),
+    'port': ('/**/nfo_sinus_bus', str, 'serial port, or a CAN interface'),
     'protocol': ('/**/nfo_sinus_bus', str, 'protocol of the line, such as movitrac'),
     'baud_rate': ('/**/nfo_sinus_bus', int, 'bit rate, bit/s'),
     'char_format': ('/**/nfo_sinus_bus', str, 'character format, such as 8E1'),

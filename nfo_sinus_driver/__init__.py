@@ -13,6 +13,3 @@
 # limitations under the License.
 
 """ROS 2 driver for NFO Sinus variable-frequency drives."""
-
-#: As in package.xml.
-__version__ = '0.1.0'

@@ -260,6 +260,8 @@ class Role(enum.Enum):
     NOMINAL_VOLTAGE = 'nominal_voltage'
     NOMINAL_FREQUENCY = 'nominal_frequency'
     NOMINAL_SPEED = 'nominal_speed'
+    #: Of the motor; where it is missing, nominal frequency and speed tell it.
+    POLE_PAIRS = 'pole_pairs'
     NOMINAL_CURRENT = 'nominal_current'
     NOMINAL_POWER_FACTOR = 'nominal_power_factor'
 

@@ -26,6 +26,7 @@ import signal
 import sys
 import threading
 
+from nfo_sinus_driver.cli.completion import completion
 from nfo_sinus_driver.cli.console import CliError
 from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import remark
@@ -62,6 +63,7 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     'run': run,
     'stop': stop,
     'tune': tune,
+    'completion': completion,
 }
 
 _FAILED = 1

@@ -31,6 +31,7 @@ from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.version import VERSION
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.
 DEFAULTS = {
@@ -75,6 +76,36 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     except ValueError as error:
         parser.error(str(error))
     return options
+
+
+def words() -> dict[str, list[str]]:
+    """Return what may be typed: options and choices after each verb, the verbs after ``''``."""
+    parser = _parser()
+    (verbs,) = (one for one in parser._actions if isinstance(one, argparse._SubParsersAction))
+    found = {'': [*_words(parser), *verbs.choices]}
+    return found | {name: _words(verb) for name, verb in verbs.choices.items()}
+
+
+def _words(parser: argparse.ArgumentParser) -> list[str]:
+    found: list[str] = []
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            continue
+        found += [option for option in action.option_strings if option.startswith('--')]
+        if not action.option_strings and action.choices:
+            found += [str(choice) for choice in action.choices]
+    return found
+
+
+def values_of(option: str) -> list[str]:
+    """Return the values that an option takes, where it takes some that can be listed."""
+    parser = _parser()
+    (verbs,) = (one for one in parser._actions if isinstance(one, argparse._SubParsersAction))
+    for one in (parser, *verbs.choices.values()):
+        for action in one._actions:
+            if option in action.option_strings and action.choices:
+                return [str(choice) for choice in action.choices]
+    return []
 
 
 def command_line(options: argparse.Namespace, *words: str) -> str:
@@ -150,6 +181,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         parents=[common],
     )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')
 
     def verb(name: str, help_text: str, *, json: bool = False) -> argparse.ArgumentParser:
@@ -236,6 +268,14 @@ def _parser() -> argparse.ArgumentParser:
         default=(),
         metavar='LIST',
         help='several drives of the line, such as 1-10,20 (default: that of --address)',
+    )
+    completion = verb('completion', 'print what makes a shell complete what is typed')
+    completion.add_argument(
+        'shell',
+        nargs='?',
+        choices=('bash', 'zsh'),
+        default='bash',
+        help='type: source <(nfo-sinus completion bash), or put it into ~/.bashrc (default: bash)',
     )
     verb('ack', 'acknowledge a fault; nothing starts by it', json=True)
     _add_run(verb('run', 'run the motor, until Ctrl-C or --for is over; then stop it', json=True))

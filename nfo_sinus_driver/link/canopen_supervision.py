@@ -292,14 +292,13 @@ class CanopenWatch:
         values = {
             time_place: period.to_bytes(2, 'little'), factor_place: bytes((_LIFE_FACTOR,)),
         }
-        # it watches from the first time on that it is asked
-        supervision.guard(unit, period / 1000)
         for place, value in values.items():
             if (yield _Request(place, value)) is None or (yield _Request(place)) != value:
                 # half of it is nothing
                 yield _Request(time_place, bytes(2))
-                supervision.end(unit)
                 return
+        # it watches from the first time on that it is asked, which is now
+        supervision.guard(unit, period / 1000)
         self.means = GUARDING_MEANS
 
     def _end(self) -> _Plan:

@@ -50,6 +50,11 @@ class Autostart:
         return threading.current_thread() is self._thread
 
     @property
+    def going_on(self) -> bool:
+        """It has begun, and has not started the drive yet."""
+        return self._thread.is_alive() and not self.over
+
+    @property
     def over(self) -> bool:
         """It does not try any more."""
         return self._over.is_set()

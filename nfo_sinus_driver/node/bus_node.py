@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
@@ -36,6 +37,9 @@ from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.settings import declare
 
 _PERIOD = 1.0
+#: How long it is waited for at the start that the port opens, and how often it is looked, s.
+_LONGEST_OPENING = 0.5
+_LOOK_PERIOD = 0.005
 
 NAME = 'nfo_sinus_bus'
 
@@ -67,8 +71,17 @@ class BusNode(Node):
 
     def start(self) -> None:
         """Open the port and begin to report."""
+        bus = self.bus_context.bus
         self.bus_context.publish_queue.start()
-        self.bus_context.bus.start()
+        bus.start()
+        # what the port does is said before what the drives do
+        deadline = time.monotonic() + _LONGEST_OPENING
+        while bus.port_error is not None and time.monotonic() < deadline:
+            time.sleep(_LOOK_PERIOD)
+        error = bus.port_error
+        self.bus_context.publish_queue.put(
+            lambda: self._log_port(None if error is None else str(error))
+        )
 
     def _report(self) -> None:
         if not self.bus_context.bus.alive:
@@ -79,8 +92,14 @@ class BusNode(Node):
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.bus_context.bus.port_error
+        nobody = not any(drive.drive.heard for drive in self.bus_context.drives)
         status = diagnostics.bus_status(
-            self.get_fully_qualified_name().lstrip('/'), self._port, statistics, error, silent
+            self.get_fully_qualified_name().lstrip('/'),
+            self._port,
+            statistics,
+            error,
+            silent,
+            self.bus_context.bus.protocol.check if nobody else '',
         )
         self._diagnostics.publish(diagnostics.array(status, stamp))
         self._log_port(None if error is None else str(error))

@@ -32,6 +32,7 @@ from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.srv import GetErrorLog
 from rclpy.action import ActionServer
 from rclpy.action import CancelResponse
+from rclpy.action import GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -189,13 +190,14 @@ class ErrorLogServices:
 
     def _summary(self, entries: Sequence[LogEntry]) -> str:
         undated = sum(math.isnan(entry.at) for entry in entries)
+        count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
         if not undated:
-            return f'{len(entries)} entries'
+            return count
         if all(math.isnan(entry.operating_time) for entry in entries):
-            return f'{len(entries)} entries; the drive does not tell when they came'
+            return f'{count}; the drive does not tell when they came'
         since = self._managed.drive.powered_since
         return (
-            f'{len(entries)} entries, {undated} of them without the wall time: it is only known '
+            f'{count}, {undated} of them without the wall time: it is only known '
             f'since the driver has seen the drive with power, from operating hour {since:.1f} on'
         )
 
@@ -234,6 +236,7 @@ class TuningServices:
             '~/tune',
             self._execute,
             callback_group=group,
+            goal_callback=self._on_goal,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
@@ -260,6 +263,16 @@ class TuningServices:
             self._node.get_logger().error(f'error in a tuning: {error!r}')
             return Tuned(False, Report(Cause.DRIVER_ERROR, error=str(error)), ())
 
+    def _on_goal(self, request: Tune.Goal) -> GoalResponse:
+        if request.procedure in _PROCEDURES:
+            return GoalResponse.ACCEPT
+        # who asks is only told that it is rejected
+        self._node.get_logger().error(
+            f'goal of {self._node.resolve_service_name("~/tune")} rejected: there is no procedure '
+            f'{request.procedure}, only 0 to 3'
+        )
+        return GoalResponse.REJECT
+
     def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
         tuned = self._result(lambda: self._followed(goal))
         if tuned.success:
@@ -275,9 +288,7 @@ class TuningServices:
         )
 
     def _followed(self, goal: ServerGoalHandle) -> Tuned:
-        procedure = _PROCEDURES.get(goal.request.procedure)
-        if procedure is None:
-            raise NodeError(f'there is no procedure {goal.request.procedure}: 0 to 3')
+        procedure = _PROCEDURES[goal.request.procedure]
         drive = self._managed.require_active()
         # the bus reports how far it is, and nobody may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()

@@ -49,10 +49,11 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
         message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
         return DiagnosticStatus.ERROR, message
     if not snapshot.connected:
-        # a node that nobody configured has nothing to complain about
-        waiting = managed.state == 'unconfigured'
-        level = DiagnosticStatus.STALE if waiting else DiagnosticStatus.ERROR
-        return level, 'not connected: the log of the node says what to check'
+        if not managed.is_silent:
+            # a node that nobody configured has nothing to complain about
+            return DiagnosticStatus.STALE, 'not connected: the node is not configured'
+        why = managed.why_silent or 'the log of the node says what to check'
+        return DiagnosticStatus.ERROR, f'not connected: {why}'
     level = _LEVELS[snapshot.kind]
     if snapshot.kind is not Kind.STATUS:
         return level, f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
@@ -108,12 +109,19 @@ def bus_status(
     statistics: Statistics,
     port_error: PortError | None,
     silent_drives: list[str],
+    check: str,
 ) -> DiagnosticStatus:
-    """Return how the line is doing."""
+    """
+    Return how the line is doing.
+
+    :param check: what to look at where no drive answers; ``''`` where one has.
+    """
     if port_error is not None:
         level, message = DiagnosticStatus.ERROR, str(port_error)
     elif silent_drives:
-        level, message = DiagnosticStatus.WARN, f'silent: {", ".join(silent_drives)}'
+        level, message = DiagnosticStatus.ERROR, f'no response from {", ".join(silent_drives)}'
+        if check:
+            message += f': check in this order: {check}'
     else:
         level, message = DiagnosticStatus.OK, 'all drives answer'
     values = {'port': port, **_figures(statistics)}

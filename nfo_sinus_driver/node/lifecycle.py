@@ -57,6 +57,16 @@ class Lifecycle:
         return f'the node is {self.state}: activate it first'
 
     @property
+    def wanted(self) -> bool:
+        """Somebody has configured the node, or autostart goes on trying to."""
+        return self.state != 'unconfigured' or self._autostart.going_on
+
+    @property
+    def complaint(self) -> str:
+        """Why autostart could not configure the node so far; ``''`` if it could or never tried."""
+        return self._complaint
+
+    @property
     def by_operator(self) -> bool:
         """The transition that runs on this thread was not asked for by autostart."""
         return not self._autostart.trying

@@ -100,8 +100,13 @@ class ManagedDrive:
 
     @property
     def is_silent(self) -> bool:
-        """It does not respond, although somebody has configured its node."""
-        return self.state != 'unconfigured' and not self._drive.snapshot.connected
+        """It does not respond, although its node is configured, or is to be."""
+        return self._lifecycle.wanted and not self._drive.snapshot.connected
+
+    @property
+    def why_silent(self) -> str:
+        """Why it has not been connected to since its node began, and what to check."""
+        return self._lifecycle.complaint
 
     def require_active(self) -> Drive:
         """Return the drive for a command that may turn the motor, or a NodeError why not."""

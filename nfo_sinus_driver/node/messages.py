@@ -195,11 +195,21 @@ class Joint:
             return rpm
         if mode != 'Freque':
             raise ValueError(f'the control mode is {mode or "not known"}, not Speed or Freque')
-        nominal, key = drive.parameters.values, drive.model.key
-        frequency = nominal.get(key(Role.NOMINAL_FREQUENCY), 0)
-        speed = nominal.get(key(Role.NOMINAL_SPEED), 0)
-        if not frequency or not speed:
-            raise ValueError('f-Nom and N-nom of the motor are not known, so Hz are no speed')
         # slip is left out: how much there is depends on the load
-        pole_pairs = max(1, round(60 * float(frequency) / float(speed)))
-        return rpm * pole_pairs / 60
+        return rpm * _pole_pairs(drive) / 60
+
+
+def _pole_pairs(drive: Drive) -> float:
+    """Return how many the motor has, told or from its nominal speed, or a ValueError."""
+    values, key = drive.parameters.values, drive.model.key
+    told = float(values.get(key(Role.POLE_PAIRS), 0))
+    if told:
+        return told
+    frequency = float(values.get(key(Role.NOMINAL_FREQUENCY), 0))
+    speed = float(values.get(key(Role.NOMINAL_SPEED), 0))
+    if not frequency or not speed:
+        raise ValueError(
+            'the drive tells neither pole pairs of the motor nor f-Nom and N-nom, so Hz are no '
+            'speed'
+        )
+    return max(1, round(60 * frequency / speed))

@@ -29,8 +29,8 @@ from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
 import yaml
 
-from nfo_sinus_driver import __version__
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
+from nfo_sinus_driver.version import VERSION
 
 _PARAMS_FILE = '--params-file'
 _PARAMETERS = 'ros__parameters'
@@ -158,7 +158,7 @@ def refuse_other_arguments(arguments: list[str]) -> None:
         print(_HELP)
         raise SystemExit(0)
     if '--version' in others:
-        print(f'nfo_sinus_driver {__version__}')
+        print(f'nfo_sinus_driver {VERSION}')
         raise SystemExit(0)
     if others:
         raise ValueError(

@@ -62,6 +62,8 @@ class Setpoints:
         self._managed = managed
         self._joint = joint
         self._logged_idle = False
+        self._told_other_joint = False
+        self._joint_command = node.resolve_topic_name('~/joint_command')
         subscribe = context.setpoint_subscriber.subscribe
         subscribe(node, Float32, '~/setpoint', self._on_setpoint)
         subscribe(node, Setpoint, '~/setpoint_stamped', self._on_stamped)
@@ -90,7 +92,15 @@ class Setpoints:
         self._take(message.value)
 
     def _on_joint_command(self, message: JointState) -> None:
-        if not self._managed.active or self._joint.name not in message.name:
+        if not self._managed.active:
+            return
+        if self._joint.name not in message.name:
+            if not self._told_other_joint:
+                self._told_other_joint = True
+                self._log.warning(
+                    f'{self._joint_command} has no joint {self._joint.name}, only '
+                    f'{", ".join(message.name) or "none"}: ignored; joint_name says what ours is'
+                )
             return
         index = message.name.index(self._joint.name)
         if index >= len(message.velocity):

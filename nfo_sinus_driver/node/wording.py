@@ -32,16 +32,17 @@ class Wording:
     """Makes sentences for the node of one drive, which says how it is enabled."""
 
     def __init__(self, node: Node) -> None:
+        name = node.get_fully_qualified_name()
         self.enable = f'call {node.resolve_service_name("~/enable")}'
         self._calls = Calls(
             acknowledge=f'call {node.resolve_service_name("~/fault_ack")}',
             enable=self.enable,
             program='driver',
             drive_timeout='drive_timeout',
-            set_drive_timeout='set drive_timeout',
-            set_setpoint_max=f'set setpoint_max of {node.get_fully_qualified_name()}',
-            set_control_mode='expected_control_mode in the driver',
-            set_model='set model to auto or to what it is',
+            set_drive_timeout=f'set drive_timeout of {name}',
+            set_setpoint_max=f'set setpoint_max of {name}',
+            set_control_mode=f'expected_control_mode of {name}',
+            set_model=f'set model of {name} to auto or to what it is',
         )
 
     def say(self, what: Report | Exception | None) -> str:

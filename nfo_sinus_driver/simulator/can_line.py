@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
+import enum
 import itertools
 from typing import Protocol
 
@@ -65,6 +66,24 @@ class Adapter(Protocol):
         """Return what it says on the port of a frame from the bus."""
 
 
+class _Else(enum.Enum):
+    """Who sends frames beside the nodes."""
+
+    MASTER = enum.auto()
+    FOREIGN = enum.auto()
+
+
+#: What others tell each other: process data, a heartbeat, an answer to another master.
+_FOREIGN = (
+    Frame(0x1FA, bytes.fromhex('37060000F4010000')),
+    Frame(0x2FB, bytes.fromhex('1F00E803')),
+    Frame(0x77A, b'\x05'),
+    Frame(0x5FB, bytes.fromhex('4B26200225000000')),
+)
+#: Those that a busy machine was late for are made up for, but not for longer than this (s).
+_MOST_LATE = 0.1
+
+
 @dataclass(frozen=True)
 class _Waiting:
     """A frame that waits for the bus: since when, whose, and what is wrong with it."""
@@ -72,7 +91,7 @@ class _Waiting:
     since: float
     order: int
     frame: Frame
-    sender: Server | None
+    sender: Server | _Else
     note: str
 
     @property
@@ -138,6 +157,16 @@ class CanLine(Wire):
         self._busy_until = float('-inf')
         #: When the last answer of each node was ready: it answers in order.
         self._answered: dict[int, float] = {}
+        self._foreign = itertools.cycle(_FOREIGN)
+        self._foreign_gap = 0.0
+        self._foreign_at = float('inf')
+
+    def set_traffic(self, rate: float, now: float) -> None:
+        """Let others send frames that are for nobody here; 0 ends it."""
+        if not 0 <= rate <= self.timing.baud:
+            raise ValueError(f'{rate:g} frames a second are not possible at {self.speed}')
+        self._foreign_gap = 1 / rate if rate else 0.0
+        self._foreign_at = now if rate else float('inf')
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""
@@ -146,7 +175,7 @@ class CanLine(Wire):
                 # it is acknowledged by whoever has power, also a node that is not meant
                 sent = self._carries(now) and any(drive.listening for drive in self._drives)
                 if sent:
-                    self._put(said, now)
+                    self._put(said, now, _Else.MASTER)
                 elif self._trace is not None:
                     self._trace.record('request', _raw(said), now, now, 'lost')
                 self.port.send(self._adapter.tried(said, sent=sent))
@@ -158,6 +187,10 @@ class CanLine(Wire):
         for node in self._nodes():
             for frame in node.act(now):
                 self._put(frame, now, node)
+        self._foreign_at = max(self._foreign_at, now - _MOST_LATE)
+        while self._foreign_at <= now:
+            self._put(next(self._foreign), self._foreign_at, _Else.FOREIGN)
+            self._foreign_at += self._foreign_gap
         while (next_ := self._next()) is not None:
             waiting, end = next_
             if end > now:
@@ -169,12 +202,12 @@ class CanLine(Wire):
     @property
     def _due(self) -> float:
         next_ = self._next()
-        times = [node.due for node in self._nodes()]
-        return min([*times, *([next_[1]] if next_ else [])], default=float('inf'))
+        times = [self._foreign_at, *(node.due for node in self._nodes())]
+        return min([*times, *([next_[1]] if next_ else [])])
 
     def _unplugged(self) -> None:
         self._adapter.restart()
-        self._waiting = [one for one in self._waiting if one.sender is not None]
+        self._waiting = [one for one in self._waiting if one.sender is not _Else.MASTER]
 
     # ---- inside ----
 
@@ -191,7 +224,7 @@ class CanLine(Wire):
         return self._adapter.on_bus(self.timing.baud) and not self.faults.dead(now)
 
     def _put(
-        self, frame: Frame, since: float, sender: Server | None = None, note: str = ''
+        self, frame: Frame, since: float, sender: Server | _Else, note: str = ''
     ) -> None:
         self._waiting.append(_Waiting(since, next(self._order), frame, sender, note))
 
@@ -201,11 +234,11 @@ class CanLine(Wire):
             return None
         begin = max(self._busy_until, min(one.since for one in self._waiting))
         # the adapter sends in order: of its frames only the first takes part
-        masters = next((one for one in self._waiting if one.sender is None), None)
+        masters = next((one for one in self._waiting if one.sender is _Else.MASTER), None)
         ready = (
             one
             for one in self._waiting
-            if one.since <= begin and (one.sender is not None or one is masters)
+            if one.since <= begin and (one.sender is not _Else.MASTER or one is masters)
         )
         first = min(ready, key=lambda one: one.precedence)
         bits = can_frames.bits(first.frame)
@@ -217,14 +250,14 @@ class CanLine(Wire):
         """Let a frame arrive everywhere."""
         frame, sender = waiting.frame, waiting.sender
         dead = self.faults.dead(end)
-        if self._trace is not None:
-            direction = 'request' if sender is None else 'answer'
+        if self._trace is not None and sender is not _Else.FOREIGN:
+            direction = 'request' if sender is _Else.MASTER else 'answer'
             note = 'lost' if dead else waiting.note
             begin = end - can_frames.bits(frame) * self._bit
             self._trace.record(direction, _raw(frame), begin, end, note)
         if dead:
             return
-        if sender is not None and self._carries(end):
+        if sender is not _Else.MASTER and self._carries(end):
             noise = self._adapter.is_serial and 'noise' in waiting.note
             told = self._adapter.told(frame, end)
             self.port.send((self.faults.noise() if noise else b'') + told)

@@ -314,6 +314,12 @@ VERBS: Mapping[str, Verb] = {
         _release,
         (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
     ),
+    'traffic': Verb(
+        'on a CAN bus: let others send frames that are for nobody here',
+        lambda target, given: target.line.set_traffic(given['rate'], target.now),
+        (Argument('rate', float, 'how many a second, such as 1000; 0 ends it'),),
+        to_drive=False,
+    ),
     'heal': Verb(
         'end all faults of the line', lambda target, _: target.line.faults.heal(), to_drive=False
     ),

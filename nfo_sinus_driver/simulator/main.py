@@ -41,6 +41,7 @@ from nfo_sinus_driver.simulator.injections import parse_setting
 from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.version import VERSION
 
 #: Lets the line's thread go on soon after another one was busy (s).
 _SWITCH_INTERVAL = 0.0002
@@ -199,6 +200,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
     )
     add = parser.add_argument
+    add('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(

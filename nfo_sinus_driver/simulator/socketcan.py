@@ -64,10 +64,12 @@ class CanPort:
             if self._socket is None:
                 break
             try:
-                found += self._socket.recv(_STRUCT.size)
+                data = self._socket.recv(_STRUCT.size)
             except OSError:
                 # nothing more, or the interface is down
                 break
+            # what is no structure would put those behind it out of step
+            found += data if len(data) == _STRUCT.size else b''
         return found
 
     def send(self, data: bytes) -> None:

@@ -50,6 +50,15 @@ class Wire(abc.ABC):
         self._going = True
         self._gone_until = until
 
+    def set_traffic(self, rate: float, now: float) -> None:
+        """
+        Let others send frames that are for nobody here.
+
+        :param rate: how many a second; 0: none.
+        :raises ValueError: there are no others on such a line.
+        """
+        raise ValueError(f'{self.name} has no frames of others: only a CAN bus has')
+
     @abc.abstractmethod
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""

@@ -31,11 +31,12 @@ from typing import NamedTuple
 
 from fuzz.can_decoders import CAN_CASES
 from fuzz.decoders import LINK_CASES
+from fuzz.node_decoders import NODE_CASES
 from fuzz.other_decoders import OTHER_CASES
 
 #: Frames of one case.
 CASE = 100
-CASES = {**LINK_CASES, **CAN_CASES, **OTHER_CASES}
+CASES = {**LINK_CASES, **CAN_CASES, **NODE_CASES, **OTHER_CASES}
 #: Cases after which all that is made once is there, and blocks of memory that may come later.
 _WARM = 4 * len(CASES)
 _MORE_BLOCKS = 500
@@ -97,5 +98,7 @@ def _allocated() -> int:
     for one in gc.get_objects():
         if isinstance(one, functools._lru_cache_wrapper):
             one.cache_clear()
+    # the newest object may be of a case: it would keep all that it knows
+    del one
     gc.collect()
     return sys.getallocatedblocks()

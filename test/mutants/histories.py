@@ -172,8 +172,8 @@ HISTORIES = (
         3,
         'in any order: a clean-up does not stop the motor',
         DRIVE,
-        '            return await self._controller.release(timeout)\n',
-        '            return Report(Cause.ONLY_WATCHED)\n',
+        '            answer = await self._controller.release(timeout)\n',
+        '            answer = Report(Cause.ONLY_WATCHED)\n',
         OPTIMAL_SCMD,
     ),
     Mutant(

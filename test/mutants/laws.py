@@ -38,6 +38,9 @@ from mutant import WAYS_OUT
 from mutant import WRITER
 from mutant import Mutant
 
+#: The laws one by one over a MOVITRAC.
+MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
+
 LAWS = (
     Mutant(
         1,
@@ -434,5 +437,37 @@ LAWS = (
         'safety function',
         'function',
         ('test/unit/test_docs.py',),
+    ),
+    Mutant(
+        9,
+        'a time-out goes on where control is kept',
+        'nfo_sinus_driver/drive/drive.py',
+        '            if self._controller.method.keeps_control:',
+        '            if False:',
+        (MOVITRAC_LAWS, '-k', 'clean_end'),
+    ),
+    Mutant(
+        2,
+        'a keypad that takes control is not asked for',
+        'nfo_sinus_driver/drive/drive_state.py',
+        'holder is Holder.BUS and not await self._operated_locally(priority, once)',
+        'holder is Holder.BUS',
+        (MOVITRAC_LAWS, '-k', 'keypad_that_takes and status'),
+    ),
+    Mutant(
+        2,
+        'a motor that starts anew after a silence goes on',
+        CONTROLLER,
+        'self._why_stopped(seen) or self._why_slower(seen, before)',
+        'self._why_stopped(seen)',
+        (MOVITRAC_LAWS, '-k', 'short_power_cycle'),
+    ),
+    Mutant(
+        2,
+        'a card that was fitted is never asked for again',
+        'nfo_sinus_driver/drive/parameter_access.py',
+        '        self._denials.clear()',
+        '        pass',
+        (MOVITRAC_LAWS, '-k', 'fitted_meanwhile'),
     ),
 )

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 import contextlib
+import dataclasses
 from dataclasses import dataclass
 import functools
 import itertools
@@ -104,7 +105,9 @@ class Wire:
         self._trace = bench.trace
         self._written = _WRITTEN[bench.way.protocol]
         #: Older firmware takes settings under bus control alone: MODE and a stop go along [C100].
-        self._aside = _HARMLESS if bench.way.dialect == '5.0' else frozenset()
+        #: One that is in bus mode when it is found is told to stop.
+        told = bench.way.dialect == '5.0' or 'local' not in bench.way.features
+        self._aside = _HARMLESS if told else frozenset()
         self._read = 0
 
     def writes(self) -> list[Write]:
@@ -167,12 +170,20 @@ def _movitrac(data: bytes) -> Write | None:
     return None if request.words is None else Write(request.unit, request.place, request.words)
 
 
+def _canopen(data: bytes) -> Write | None:
+    request = understand(data, 'canopen')
+    if request is None or request.words is None:
+        return None
+    return Write(request.unit, request.place, request.words)
+
+
 _WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
     'modbus_rtu': lambda frame: _modbus(UNFRAMED['modbus_rtu'](frame)),
     'modbus_ascii': lambda frame: _modbus(UNFRAMED['modbus_ascii'](frame)),
     'modbus_tcp': lambda frame: _modbus(UNFRAMED['modbus_tcp'](frame)),
     'classic': _classic,
     'movitrac': _movitrac,
+    'canopen': _canopen,
 }
 
 
@@ -181,11 +192,18 @@ def settings(way: Way) -> dict[str, Ends]:
     """Return every setting that a way reaches, by its ROS parameter, with the ends it has there."""
     if 'parameters' not in way.features:
         return {}
-    return {
+    found = {
         name: on_classic(ends, way.dialect) if way.protocol == 'classic' else ends
         for name, ends in _ENDS.items()
         if name not in way.beyond
     }
+    if way.protocol == 'canopen':
+        # a greater one could not be asked again [C10]
+        address = found['serial.address']
+        found['serial.address'] = dataclasses.replace(
+            address, high=127, high_words=(127,), above=128
+        )
+    return found
 
 
 def register(name: str) -> int:

@@ -162,6 +162,36 @@ def _diagnosis(client: Client, name: str) -> DiagnosticStatus | None:
     return None
 
 
+def test_diagnostics_of_an_address_where_nobody_is_are_steady(bench: Bench) -> None:
+    bench.simulator('--address', '7')
+    driver = bench.driver(*FULL_RATE)
+    client = bench.client()
+    first, *others = bench.way.nobody
+
+    def shown() -> bool:
+        status = _diagnosis(client, 'nfo_sinus: drive')
+        return status is not None and first in status.message
+
+    wait_until(shown, 'what to check')
+    client.wait_for('statistics', lambda message: message.transactions > 0, 'it was asked')
+    seen = len(client.messages['diagnostics'])
+    before = client.latest('statistics').transactions
+    # over several tries of autostart, each with a rest
+    client.wait_for('statistics', lambda message: message.transactions >= before + 3, 'more tries')
+    told = {
+        (status.name, status.level, status.message)
+        for message in client.messages['diagnostics'][seen:]
+        for status in message.status
+    }
+    assert {name for name, *_ in told} == {'nfo_sinus: drive', 'nfo_sinus_bus: line'}
+    assert len(told) == 2, told
+    for _, level, message in told:
+        assert level == DiagnosticStatus.ERROR
+        assert all(word in message for word in others)
+    assert driver.text.count(first) == 1
+    assert client.latest('statistics').silent_drives == ['nfo_sinus']
+
+
 def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
     drive = bench.simulator()
     bench.driver(*FULL_RATE)

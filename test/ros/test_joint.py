@@ -94,6 +94,19 @@ def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio
         )
 
 
+def test_a_joint_command_without_our_joint_is_told_once(bench: Bench) -> None:
+    simulator, client = start(bench)
+    assert client.enable().success
+    other = JointState(name=['left', 'right'], velocity=[9.0, 9.0])
+    with Publisher(client, '/nfo_sinus/joint_command', other):
+        said = '/nfo_sinus/joint_command has no joint nfo_sinus, only left, right'
+        wait_until(lambda: said in bench.log, 'it says so')
+        before = len(client.messages['status'])
+        wait_until(lambda: len(client.messages['status']) > before + 20, 'more commands')
+    assert bench.log.count(said) == 1
+    assert not simulator.state()['frequency']
+
+
 def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
     simulator, client = start(bench)
     assert client.enable().success

@@ -40,15 +40,19 @@ class Tuner:
 
     def begin(self, procedure: int):
         """Send a goal, and return its handle when it is accepted."""
-        handle = self._answer(
+        handle = self.ask(procedure)
+        assert handle.accepted
+        return handle
+
+    def ask(self, procedure: int):
+        """Send a goal, and return its handle, accepted or not."""
+        return self._answer(
             lambda: self._action.send_goal_async(
                 Tune.Goal(procedure=procedure),
                 feedback_callback=lambda message: self.feedback.append(message.feedback),
             ),
             'the goal is answered',
         )
-        assert handle.accepted
-        return handle
 
     def cancel(self, handle) -> None:
         """Cancel a goal."""

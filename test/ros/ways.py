@@ -45,13 +45,14 @@ WITHOUT = {
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
     'movitrac': 'it is about a MOVITRAC',
-    'nominal': 'this model does not tell the nominal speed of its motor',
+    'nominal': 'this model does not tell how many pole pairs its motor has',
     'delay': 'this model has no start delay',
     'format': 'the character format of this model is fixed',
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
     'canopen': 'it is about CANopen',
-    'local': 'the module holds the drive in bus mode: keypad and terminals never get control',
+    'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
+    'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
 }
 
 #: How unit and PDU are got out of a frame of Modbus.
@@ -154,12 +155,14 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('delay', 'format', 'nominal', 'parameters', 'timeout'))
+_OLD_G2 = frozenset(('characters', 'local', 'delay', 'format', 'nominal', 'parameters', 'timeout'))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
-    'bare', 'delay', 'fast', 'fine', 'format', 'later', 'modbus', 'newer', 'nominal',
+    'bare', 'characters', 'delay', 'fast', 'fine', 'format', 'later', 'local', 'modbus', 'newer',
+    'nominal',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
+_ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {'characters', 'fast', 'format', 'local'}
 _CLASSIC = frozenset(('classic', 'serial'))
 _RTU = frozenset(('eight', 'serial'))
 _ASCII = frozenset(('seven', 'serial'))
@@ -207,11 +210,14 @@ WAYS = {
             for kind, features in (('rtu', _RTU), ('ascii', _ASCII))
         ),
         Way(
-            'movitrac', 'movitrac', frozenset(('movitrac', 'serial', 'states', 'timeout')),
+            'movitrac', 'movitrac',
+            frozenset(
+                ('characters', 'local', 'movitrac', 'nominal', 'serial', 'states', 'timeout')
+            ),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
         ),
         Way(
-            'canopen', 'canopen', (_G2 | {'canopen', 'fine', 'identity'}) - {'local', 'fast'},
+            'canopen', 'canopen', _ON_CANOPEN,
             baud_rate=125_000, beyond=_NOT_ON_MODBUS,
         ),
     )

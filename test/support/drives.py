@@ -228,21 +228,17 @@ _SINUS = {
     'most': 150.0,
     'without_run_input': 'RUN input is not active',
 }
+_G2 = {
+    **_SINUS,
+    'overvoltage': Fault(8, 'DC High', ('control.retard',)),
+    'hot_motor': Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
+    'no_timeout': ('--set', 'serial.auto_stop=OFF'),
+    'nominal': 50.0,
+}
 DRIVES = {
-    'sinus_g2': Sinus(
-        **_SINUS,
-        nominal=50.0,
-        overvoltage=Fault(8, 'DC High', ('control.retard',)),
-        hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
-        no_timeout=('--set', 'serial.auto_stop=OFF'),
-    ),
-    'sinus_g2 canopen': OnCanopen(
-        **{**_SINUS, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'},
-        nominal=50.0,
-        overvoltage=Fault(8, 'DC High', ('control.retard',)),
-        hot_motor=Fault(4, 'PTC Temp', ('thermistor', 'Let the motor cool')),
-        no_timeout=('--set', 'serial.auto_stop=OFF'),
-    ),
+    'sinus_g2': Sinus(**_G2),
+    # the module holds it in bus mode, and watches over the driver
+    'sinus_g2 canopen': OnCanopen(**{**_G2, 'silence': 'Bus Fail', 'stopped': 'Bus Stby'}),
     'sinus_optimal': Sinus(
         **_SINUS,
         nominal=150.0,

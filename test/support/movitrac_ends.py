@@ -21,7 +21,7 @@ The raw numbers are the four bytes of the frame: eight decimal digits, two of th
 [M4 §3.1]. An enumeration has its code times 100 [C106].
 
 Without an option card a drive has 149 settings. The others are those of the cards that the
-simulated drive can have; FRS is none of them.
+simulated drive can have.
 """
 
 from __future__ import annotations
@@ -208,6 +208,14 @@ _NUMBERS = (
      0.0, 9.1, 0.15, (0.1, 0.2)),
     ('P523', 'monitoring.regenerative_response_time_2', 148, '', 0.1, '00000010', 9.0, '00000900',
      0.0, 9.1, 0.15, (0.1, 0.2)),
+    ('P552', 'monitoring.frs_hold_time', 260, 'frs', 1.0, '00000100', 99.0, '00009900', 0.0,
+     100.0, 1.5, (1.0, 2.0)),
+    ('P554', 'monitoring.frs_positional_tolerance', 247, 'frs', 10.0, '00001000', 32768.0,
+     '03276800', 9.0, 32769.0, 10.5, (10.0, 11.0)),
+    ('P555', 'monitoring.frs_led_counter', 248, 'frs', 10.0, '00001000', 32768.0,
+     '03276800', 9.0, 32769.0, 10.5, (10.0, 11.0)),
+    ('P556', 'monitoring.frs_position_time_constant', 251, 'frs', 1.0, '00000100', 2000.0,
+     '00200000', 0.0, 2001.0, 1.5, (1.0, 2.0)),
     ('P571', 'monitoring.fieldbus_timeout', 608, 'ffi', 0.01, '00000001', 650.0, '00065000', 0.0,
      650.01, 0.015, (0.01, 0.02)),
     ('P631', 'terminal.analog_output_1_factor', 163, 'fea', 0.1, '00000010', 3.0, '00000300', 0.09,
@@ -236,6 +244,8 @@ _NUMBERS = (
      51.0, 0.5, (0.0, 1.0)),
     ('P743', 'control.dc_heating_current_2', 189, '', 0.0, '00000000', 50.0, '00005000', -1.0,
      51.0, 0.5, (0.0, 1.0)),
+    ('P769', 'control.frs_kp', 259, 'frs', 1.0, '00000100', 200.0, '00020000', 0.0, 201.0, 1.5,
+     (1.0, 2.0)),
     ('P771', 'control.speed_p_gain', 210, 'fen', 0.1, '00000010', 60.0, '00006000', 0.0, 60.1,
      0.15, (0.1, 0.2)),
     ('P772', 'control.speed_time_constant', 211, 'fen', 0.0, '00000000', 500.0, '00050000', -1.0,
@@ -304,6 +314,7 @@ _SWITCHES = (
     ('P520', 'monitoring.regenerative_speed_1', 145, ''),
     ('P522', 'monitoring.regenerative_speed_2', 147, ''),
     ('P530', 'monitoring.mains_voltage', 149, ''),
+    ('P557', 'monitoring.frs_cable_brake', 268, 'frs'),
     ('P570', 'monitoring.enable_fieldbus_setpoints', 607, 'ffi'),
     ('P710', 'control.hoist_1', 170, ''),
     ('P712', 'control.hoist_2', 172, ''),
@@ -313,6 +324,7 @@ _SWITCHES = (
     ('P733', 'control.dc_braking_2', 183, ''),
     ('P740', 'control.dc_heating_1', 186, ''),
     ('P742', 'control.dc_heating_2', 188, ''),
+    ('P760', 'control.synchronous_operation', 249, 'frs'),
     ('P774', 'control.sxr_preselection', 235, 'fen'),
     ('P800', 'special.parameter_lock', 202, ''),
     ('P860', 'special.auto_reset', 168, ''),
@@ -366,6 +378,8 @@ _ANALOG_OUTPUT = ('Actual frequency', 'Actual speed', 'No function', 'Ramp', 'Mo
 _ANALOG_32_33 = ('No function', 'Setpoint n1')
 _ANALOG_36_37 = ('No function', 'External current limit')
 _OPERATING_MODE = ('V/f mode', 'Speed control', 'Positioning control')
+_FRS_RESPONSE = ('0/1 signal', 'coast', 'stop', 'rapid stop')
+_FRS_MODE = tuple(f'Mode {number}' for number in range(1, 8))
 _PULSES = (128, 256, 512, 1024, 2048)
 _SAVE = ('On', 'Off')
 _USER_MENU = ('On only with FBG 31', 'Off')
@@ -399,6 +413,7 @@ _LISTS = (
     ('P542', 'monitoring.cooling_type_1', 314, '', _COOLING),
     ('P543', 'monitoring.motor_protection_2', 313, '', _PROTECTION),
     ('P544', 'monitoring.cooling_type_2', 315, '', _COOLING),
+    ('P553', 'monitoring.frs_fault_response', 246, 'frs', _FRS_RESPONSE),
     ('P560', 'monitoring.po1_description', 601, 'ffi', _PO),
     ('P561', 'monitoring.pi1_description', 604, 'ffi', _PI),
     ('P562', 'monitoring.po2_description', 602, 'ffi', _PO),
@@ -428,6 +443,8 @@ _LISTS = (
     ('P634', 'terminal.measurement_output', 274, '', _ANALOG_OUTPUT),
     ('P640', 'terminal.analog_input_32_33', 110, '', _ANALOG_32_33),
     ('P641', 'terminal.analog_input_36_37', 252, 'fea', _ANALOG_36_37),
+    ('P761', 'control.frs_role', 250, 'frs', _ROLE),
+    ('P764', 'control.frs_mode', 253, 'frs', _FRS_MODE),
     ('P770', 'control.operating_mode', 209, 'fen', _OPERATING_MODE),
     ('P773', 'control.pulses_per_revolution', 225, 'fen', _PULSES),
     ('P801', 'special.save_to_eeprom', 236, '', _SAVE),
@@ -466,4 +483,4 @@ ENDS = (
     *(_list(*row) for row in _LISTS),
 )
 #: How many settings there are with a card, and without one.
-COUNTS = {'': 149, 'fio': 16, 'fea': 5, 'fen': 8, 'fpi': 19, 'ffi': 9}
+COUNTS = {'': 149, 'frs': 10, 'fio': 16, 'fea': 5, 'fen': 8, 'fpi': 19, 'ffi': 9}

@@ -40,15 +40,17 @@ MAY_IMPORT = {
     'families': {'catalog'},
     'link': set(),
     'bus': {'link'},
+    'launch_arguments': set(),
     'signals': set(),
+    'version': set(),
     'drive': {'bus', 'catalog', 'link'},
     # of drive/ only events.py, which has no code
     'wording': {'catalog', 'drive'},
     # its folder of a family, the words of that one, and no profile: a mistake in that must not hide
-    'simulator': {'catalog', 'families'},
-    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'wording'},
+    'simulator': {'catalog', 'families', 'version'},
+    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'wording'},
     'demo': {'node'},
-    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'wording'},
+    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'wording'},
 }
 #: Rooms that may import ROS, and anything else.
 WITH_ROS = {'demo', 'node'}

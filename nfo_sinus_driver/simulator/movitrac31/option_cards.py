@@ -29,6 +29,8 @@ _PLACES: Mapping[str, tuple[int, int]] = {
     'ffp': (2, _NONE),
     'fen': (_NONE, 1),
     'fpi': (_NONE, 3),
+    # the manual has parameters for it, and lists no number in either place
+    'frs': (_NONE, _NONE),
 }
 CARDS = tuple(_PLACES)
 

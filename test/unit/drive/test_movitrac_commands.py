@@ -53,7 +53,7 @@ def asked_by_enable(rig: VirtualRig) -> list[int]:
     return asked
 
 
-@pytest.mark.parametrize(('settings', 'most'), [({}, 34), (REMOTE, 28)], ids=['P841', 'mine'])
+@pytest.mark.parametrize(('settings', 'most'), [({}, 38), (REMOTE, 31)], ids=['P841', 'mine'])
 def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
     make_virtual: MakeVirtual, settings: dict[str, Any], most: int
 ) -> None:
@@ -124,6 +124,7 @@ def test_an_enable_is_refused_with_the_reason(
     ('card', 'settings', 'reason'),
     [
         ('fen', {'control.operating_mode': 'Positioning control'}, 'P770'),
+        ('frs', {'control.synchronous_operation': True}, 'P760'),
         ('fea', {'serial.master_slave': True}, 'no response'),
     ],
 )

@@ -262,3 +262,8 @@ def test_noise_by_chance_and_bursts_belong_to_the_line_and_heal(served):
         client.inject('noise-rate', 'drop', 2)
     with pytest.raises(ControlError, match='choose one of'):
         client.inject('noise-rate', 'nonsense', 0.1)
+
+
+def test_a_serial_line_has_no_frames_of_others():
+    with Simulator() as simulator, pytest.raises(ValueError, match='only a CAN bus'):
+        simulator.inject('traffic', 1000)

@@ -411,3 +411,31 @@ def test_another_node_id_counts_from_power_on() -> None:
     bus.drive.power_cycle(0.1)
     assert bus.wait(1.0) == [heartbeat(7, 0)]
     assert bus.sdo(READ_VENDOR) == '' and bus.sdo(READ_VENDOR, 7) == VENDOR
+
+
+def test_frames_of_others() -> None:
+    bus = Bus()
+    bus.line.set_traffic(1000, bus.now)
+    heard = bus.wait(1.0)
+    assert 990 <= len(heard) <= 1001
+    assert {frame.identifier for frame in heard}.isdisjoint({0x081, 0x581, 0x701})
+    assert bus.sdo(READ_VENDOR) == VENDOR
+    bus.line.set_traffic(0, bus.now)
+    bus.wait(0.1)
+    assert bus.wait(1.0) == []
+    with pytest.raises(ValueError, match='are not possible'):
+        bus.line.set_traffic(1e6, bus.now)
+
+
+def test_frames_of_others_keep_the_bus_busy() -> None:
+    bus = Bus(paced=True)
+    bus.line.set_traffic(500, bus.now)
+    bus.wait(1.0)
+    answers = []
+    for _ in range(20):
+        began = bus.now
+        bus.send(0x601, bytes.fromhex(READ_VENDOR))
+        bus.wait(0.05)
+        answers += [at - began for at, frame in bus.frames if frame.identifier == 0x581]
+        bus.frames.clear()
+    assert len(answers) == 20 and max(answers) > min(answers) + 0.0005

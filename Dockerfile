@@ -1,0 +1,24 @@
+# ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of the README.
+#
+#   docker build -t nfo_sinus_driver .
+#   docker run -it --rm nfo_sinus_driver ros2 launch nfo_sinus_driver simulation.launch.py
+FROM ros:jazzy
+
+# rosdep installs the packages that package.xml names
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends python3-colcon-common-extensions \
+    && rm -rf /var/lib/apt/lists/*
+
+WORKDIR /workspace
+COPY . src/nfo_sinus_driver
+
+RUN apt-get update \
+    && rosdep update --rosdistro jazzy \
+    && rosdep install --from-paths src src/nfo_sinus_driver/msg_defs -i --rosdistro jazzy --default-yes \
+    && rm -rf /var/lib/apt/lists/*
+RUN . /opt/ros/jazzy/setup.sh \
+    && colcon build --base-paths src src/nfo_sinus_driver/msg_defs
+
+# the entry point of the base image knows its own packages alone
+RUN sed --in-place '/^exec/i source /workspace/install/setup.bash' /ros_entrypoint.sh
+CMD ["bash"]

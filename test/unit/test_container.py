@@ -1,0 +1,66 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The container is built by the commands of the README."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import re
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / 'README.md').read_text(encoding='utf-8')
+DOCKERFILE = (ROOT / 'Dockerfile').read_text(encoding='utf-8')
+#: Lines of a command that goes on, joined.
+RUN = re.sub(r'\\\n\s*', '', DOCKERFILE)
+
+
+def commands(beginning: str) -> list[str]:
+    """The commands of the README that begin so."""
+    return [line.strip() for line in README.splitlines() if line.strip().startswith(beginning)]
+
+
+@pytest.mark.parametrize('beginning', ['rosdep install', 'colcon build'])
+def test_it_is_built_as_the_readme_says(beginning: str) -> None:
+    (command,) = commands(beginning)
+    assert command in RUN
+
+
+def test_it_is_used_as_the_readme_says() -> None:
+    build, run = commands('docker')
+    assert f'#   {build}\n' in DOCKERFILE and f'#   {run}\n' in DOCKERFILE
+    *_, launch = run.partition('ros2 launch nfo_sinus_driver ')
+    assert (ROOT / 'launch' / launch).is_file()
+
+
+def test_what_it_copies_is_where_it_is_built() -> None:
+    assert 'FROM ros:jazzy\n' in DOCKERFILE
+    assert 'WORKDIR /workspace\nCOPY . src/nfo_sinus_driver\n' in DOCKERFILE
+    ignored = (ROOT / '.dockerignore').read_text(encoding='utf-8').split()
+    # what was built outside is for another place
+    assert {'.venv', 'build', 'install'} <= set(ignored)
+
+
+def test_the_development_container_is_the_same() -> None:
+    path = ROOT / '.devcontainer' / 'devcontainer.json'
+    wanted = json.loads(path.read_text(encoding='utf-8'))
+    build = wanted['build']
+    assert (path.parent / build['dockerfile']).resolve() == ROOT / 'Dockerfile'
+    assert (path.parent / build['context']).resolve() == ROOT
+    target = wanted['workspaceFolder']
+    assert f'target={target},' in wanted['workspaceMount']
+    assert target == '/workspace/src/nfo_sinus_driver'
