@@ -383,7 +383,8 @@ class Poller:
     async def _read_measured(self, role: Role) -> float:
         try:
             return await self._insist(lambda: self._inverter.measure(role, Priority.POLL))
-        except PortError:
+        except (PortError, Interrupted):
+            # told once only: the status that is read next would find a drive that somebody stopped
             raise
         except Refused:
             return NAN
