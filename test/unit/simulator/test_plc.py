@@ -19,6 +19,7 @@ import json
 import struct
 import subprocess
 import sys
+import time
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,6 +34,8 @@ from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.timing import Timing
 
 TIMEOUT = 10.0
+#: For what comes by the clock of the PLC, s.
+PATIENCE = 60.0
 #: What starts each drive, word after word, its set-point for 20 Hz, and what its ZSW1 says then.
 STARTS = {
     'sinus_optimal': ((0x0400, 0x0408, 0x0409), 3277),
@@ -408,11 +411,10 @@ class Master:
         return answer.registers
 
     def until(self, condition, word, setpoint):
-        for _ in range(2000):
-            registers = self.exchange(word, setpoint)
-            if condition(registers):
-                return registers
-        raise AssertionError(registers)
+        deadline = time.monotonic() + PATIENCE
+        while not condition(registers := self.exchange(word, setpoint)):
+            assert time.monotonic() < deadline, registers
+        return registers
 
 
 @contextlib.contextmanager
