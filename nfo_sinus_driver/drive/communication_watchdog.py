@@ -85,6 +85,8 @@ class CommunicationWatchdog:
         if not seconds:
             return ()
         inverter = self._inverter
+        if inverter.plc_time:
+            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=inverter.plc_time))
         inverter.watched_by = await inverter.registers.watch(seconds, Priority.SERVICE)
         inverter.watched_for = seconds if inverter.watched_by else 0.0
         key = inverter.model.key

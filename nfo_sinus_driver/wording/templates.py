@@ -213,6 +213,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_OF_PLC: '{call.drive_timeout}: through a PLC nothing is set at the drive; '
+    'the PLC watches this {call.program}, and stops the motor {seconds:g} s after its last word, '
+    'so it must be 0',
     Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
         why='{why}', remedy='use the RUN input'
     ),

@@ -243,6 +243,40 @@ def test_what_the_telegram_does_not_tell(make: Make, model: str) -> None:
     assert 'not documented' in rig.answer(rig.drive.error_log())
 
 
+def test_its_own_time_out_is_that_of_the_plc(make: Make) -> None:
+    rig = make(lost_after=2.0, drive_timeout=3.0)
+    said = rig.answer(rig.drive.connect())
+    assert 'the PLC watches this driver, and stops the motor 1 s after its last word' in said
+    assert not list(telegram_laws.exchanges(rig.frames, 1))
+
+
+def test_a_drive_that_tells_nothing_nominal_has_its_own_limit(make: Make, model: str) -> None:
+    rig = make()
+    rig.connect()
+    rig.enable()
+    rig.drive.set_setpoint(1000.0)
+    most = {'sinus_h': 327.67}.get(model, 150)
+    wait_until(lambda: rig.notes.told(f'set-point 1000 is limited to {most:g} (setpoint_max, or'))
+    wait_until(lambda: rig.far.motor.driven)
+    assert 'stop' in rig.answer(rig.drive.stop())
+    rig.stays()
+
+
+def test_nothing_turns_by_an_enable_or_a_set_point_alone(make: Make) -> None:
+    rig = make()
+    rig.connect()
+    rig.send(20.0)
+    rig.stays()
+    rig.send(None)
+    rig.enable()
+    count = len(rig.notes.snapshots)
+    wait_until(lambda: len(rig.notes.snapshots) > count + 40)
+    # what came before the enable is none: it holds at 0
+    assert rig.far.motor.frequency == 0
+    rig.send(20.0)
+    wait_until(lambda: rig.far.motor.frequency > 19.0)
+
+
 def test_a_line_that_has_no_plc() -> None:
     settings = DriveSettings(model='sinus_h')
     link = open_link('modbus_rtu', '/dev/x', LineSettings())
