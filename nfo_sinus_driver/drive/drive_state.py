@@ -223,7 +223,9 @@ class DriveState:
         :raises DriveError: it is.
         """
         longest = self.settings.lost_after
-        if self.plc_time and time.monotonic() - seen.at >= longest:
+        # who looks at low priority waits for its turn, while others see newer ones
+        newest = seen.at if self.seen is None else max(seen.at, self.seen.at)
+        if self.plc_time and time.monotonic() - newest >= longest:
             raise DriveError(Cause.OLD_DATA, seconds=longest)
 
     async def wait_until(

@@ -155,7 +155,7 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
     f'switched off and on, or somebody used its keypad: check its mains; {_GO_ON}',
     Cause.CONTROL_WITHHELD: 'the PLC has taken the release to ROS back ({status}): give it in the '
-    f'PLC, {_GO_ON}',
+    'PLC',
     Cause.RUNS_UNASKED: 'it runs under bus control although nobody enabled it: find out whether '
     'another master commands it',
     Cause.FOUND_RUNNING: 'the motor runs under bus control, started by an earlier session '
