@@ -32,6 +32,7 @@ from nfo_sinus_driver.catalog.parameter import Access
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
 from nfo_sinus_driver.catalog.profile import NotPossible
 from nfo_sinus_driver.catalog.profile import OlderDialect
@@ -54,6 +55,7 @@ __all__ = [
     'Access',
     'Address',
     'CatalogError',
+    'ControlMethod',
     'ErrorLogArea',
     'Fact',
     'Family',

@@ -158,6 +158,15 @@ def usual_family() -> str:
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 
+def _place(name: str, method: str) -> tuple[str, Path]:
+    """Return package and folder of the tables that a control method has, if some of its own."""
+    folder = _folders()[name]
+    package = f'{_FAMILIES}.{name}'
+    if method and (folder / method / 'parameters.csv').exists():
+        return f'{package}.{method}', folder / method
+    return package, folder
+
+
 def example_setting() -> tuple[str, float]:
     """Return the key of a setting of that family, and a value, for help and documentation."""
     key, value = importlib.import_module(_FAMILIES).EXAMPLE
@@ -165,9 +174,12 @@ def example_setting() -> tuple[str, float]:
 
 
 @functools.cache
-def load_profile(name: str) -> Profile:
+def load_profile(name: str, method: str = '') -> Profile:
     """
     Load the profile of one drive family, without its tables.
+
+    :param method: a control method; one that speaks to the drive in another way than all others
+        has tables and a profile of its own, in a folder of its name.
 
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: its folder is no package.
@@ -175,23 +187,25 @@ def load_profile(name: str) -> Profile:
     folders = _folders()
     if name not in folders:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
-    if not (folders[name] / '__init__.py').exists():
+    package, folder = _place(name, method)
+    if not (folder / '__init__.py').exists():
         raise table.CatalogError(f'{name}: no __init__.py, without which it would not be installed')
-    profile = importlib.import_module(f'{_FAMILIES}.{name}.profile').PROFILE
+    profile = importlib.import_module(f'{package}.profile').PROFILE
     assert isinstance(profile, Profile)
     return profile
 
 
 @functools.cache
-def load_family(name: str) -> Family:
+def load_family(name: str, method: str = '') -> Family:
     """
     Read and check the tables of one drive family.
 
+    :param method: as for :func:`load_profile`.
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
-    profile = load_profile(name)
-    folder = _folders()[name]
+    profile = load_profile(name, method)
+    _, folder = _place(name, method)
     keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
     addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
 

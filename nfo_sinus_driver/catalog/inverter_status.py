@@ -179,7 +179,8 @@ class InverterStatus:
         if not self.by_frequency:
             return self.keeps_running
         stands = self.at > told and self.frequency == 0
-        return self.runs_by_bus and not stands and not self.fell[0] > told
+        turns = self.runs_by_bus or (self._only_frequency and self.from_bus)
+        return turns and not stands and not self.fell[0] > told
 
     @property
     def by_frequency(self) -> bool:
@@ -223,7 +224,12 @@ class InverterStatus:
         if self.state is State.UNKNOWN or self.tuning:
             return self.tuning or self._driven_by_code
         stands = self.by_frequency and self.frequency == 0
-        return self.state in _DRIVEN and not stands
+        turns = self._only_frequency and abs(self.frequency) > 0
+        return turns or (self.state in _DRIVEN and not stands)
+
+    @property
+    def _only_frequency(self) -> bool:
+        return self.model.profile.status_word.only_frequency
 
     @property
     def _from_bus_by_code(self) -> bool:

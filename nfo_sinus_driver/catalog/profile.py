@@ -134,7 +134,21 @@ class Until:
     condition: Callable[[Status], bool]
 
 
-Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until
+@dataclass(frozen=True)
+class Hold:
+    """
+    Wait until the drive's status fulfils a condition, and go on even if it does not.
+
+    Only when a fault is acknowledged. Brings whether it does.
+
+    :ivar seconds: how long at most.
+    """
+
+    condition: Callable[[Status], bool]
+    seconds: float
+
+
+Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold
 Steps = Generator[Step, Any, _T]
 
 
@@ -277,6 +291,12 @@ class ControlMethod(abc.ABC):
     :cvar coasts: it can release the motor at once.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar procedures: what begins each procedure that it has.
+    :cvar addressing: how it reaches the parameters of its tables, where that is another way than
+        that of the line; ``''``: that of the line.
+    :cvar plc_time: who is between stops the drive after so long without a word of ours, s; 0:
+        there is nobody between.
+    :cvar caution: what of the drive itself decides whether it stops when nobody reaches it, and
+        cannot be read; ``''``: nothing.
     :cvar keeps_control: why :meth:`release` leaves control to the bus, and how a person gets it
         back; ``''`` where it does not.
     """
@@ -287,6 +307,9 @@ class ControlMethod(abc.ABC):
     older: ClassVar[bool] = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     keeps_control: ClassVar[str] = ''
+    addressing: ClassVar[str] = ''
+    plc_time: ClassVar[float] = 0.0
+    caution: ClassVar[str] = ''
 
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
         self._reference = reference

@@ -47,6 +47,8 @@ class Meaning(enum.Enum):
     BUS_RUNNING = 'bus_running'
     #: The speed may decrease under bus control, be it to a stop.
     SLOWING = 'slowing'
+    #: Who is between, a PLC, does not let the bus have control.
+    WITHHELD = 'withheld'
     #: Standing by or running under terminal control.
     TERMINALS = 'terminals'
     #: Running where neither the bus nor the terminals have control.
@@ -148,6 +150,8 @@ class StatusWord:
     :ivar shown: which bits of it are published.
     :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
         the frequency has to tell; it is read with every status.
+    :ivar only_frequency: it may say that the motor runs, or that it does not, while it does the
+        other: whether it turns is for the frequency alone to tell.
     :ivar tells_sign: frequency and speed are measured without a sign; REVERSE tells it.
     """
 
@@ -159,6 +163,7 @@ class StatusWord:
     code: Callable[[int], int] | None = None
     shown: int = 0xFFFFFFFF
     by_frequency: bool = False
+    only_frequency: bool = False
     tells_sign: bool = False
 
     def may_say(self, word: int) -> bool:

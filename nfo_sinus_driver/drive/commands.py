@@ -51,8 +51,16 @@ _T = TypeVar('_T')
 Reached = Callable[[Callable[[InverterStatus], bool]], Awaitable[None]]
 
 
+#: Waits so long for that at most, s; tells whether it does.
+Held = Callable[[Callable[[InverterStatus], bool], float], Awaitable[bool]]
+
+
 async def _not_reached(condition: Callable[[InverterStatus], bool]) -> None:
     raise AssertionError('nothing is awaited here')
+
+
+async def _not_held(condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
+    raise AssertionError('nothing is held here')
 
 
 def _not_told(severity: Severity, report: Report) -> None:
@@ -65,12 +73,14 @@ async def carry_out(
     priority: Priority,
     reached: Reached = _not_reached,
     tell: Callable[[Severity, Report], None] = _not_told,
+    held: Held = _not_held,
 ) -> _T:
     """
     Carry out a sequence of a profile on the bus.
 
     :param reached: for a sequence that waits for the drive's status between two steps.
     :param tell: for one that writes to a memory that wears out: told what it has written.
+    :param held: for one that waits for the status for a while.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer; or it refuses, and the sequence ends by that.
     """
@@ -100,6 +110,8 @@ async def carry_out(
                 brought = await registers.acknowledge(step.key, priority)
             elif isinstance(step, profile.AcknowledgeThenWrite):
                 await registers.acknowledge_and_write(step.key, step.write)
+            elif isinstance(step, profile.Hold):
+                brought = await held(step.condition, step.seconds)
             else:
                 await reached(step.condition)
         except Refused as error:
@@ -154,6 +166,7 @@ class Commands:
         #: Why the line has the bus keep control.
         self._held = inverter.model.profile.holds_control.get(inverter.registers.protocol, '')
         self._tell = inverter.tell
+        self._wait_until = inverter.wait_until
 
     @property
     def coasts(self) -> bool:
@@ -221,7 +234,14 @@ class Commands:
         shown = self._registers.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
-        return await carry_out(steps, self._registers, Priority.SERVICE)
+        return await carry_out(steps, self._registers, Priority.SERVICE, held=self._hold)
+
+    async def _hold(self, condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
+        try:
+            await self._wait_until(condition, Priority.SERVICE, seconds)
+        except DriveError:
+            return False
+        return True
 
     async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """

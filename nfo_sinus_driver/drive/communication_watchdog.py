@@ -85,6 +85,8 @@ class CommunicationWatchdog:
         if not seconds:
             return ()
         inverter = self._inverter
+        if inverter.plc_time:
+            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=inverter.plc_time))
         inverter.watched_by = await inverter.registers.watch(seconds, Priority.SERVICE)
         inverter.watched_for = seconds if inverter.watched_by else 0.0
         key = inverter.model.key
@@ -170,6 +172,10 @@ class CommunicationWatchdog:
         inverter, model = self._inverter, self._inverter.model
         timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
+        method = inverter.settings.method_class
+        if method.plc_time:
+            caution = method.caution
+            return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if not inverter.can_time_out and not inverter.watched_by:
             return Report(Cause.NO_OWN_TIMEOUT)
         name = inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name

@@ -30,8 +30,10 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.link import GatewaySilent
+from nfo_sinus_driver.link import Interrupted
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import NoData
 from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -44,7 +46,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     :param check: what to look at while the drive has never answered; ``None``: it has, so that its
         settings are right [C93].
     """
-    if isinstance(error, (PortError, Refused, GatewaySilent, NoPath)):
+    if isinstance(error, (PortError, Refused, GatewaySilent, NoPath, NoData, Interrupted)):
         return Report(Cause.LINE_FAILED, error=str(error))
     if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))
@@ -101,6 +103,8 @@ def explain_stop(inverter: DriveState, seen: InverterStatus, control_mode: str) 
 
 
 def _why_control_is_lost(inverter: DriveState, seen: InverterStatus) -> Cause:
+    if seen.means(Meaning.WITHHELD):
+        return Cause.CONTROL_WITHHELD
     if seen.means(Meaning.TERMINALS):
         return Cause.TERMINALS_IN_CONTROL
     if seen.means(Meaning.KEYPAD):

@@ -91,6 +91,7 @@ class Drive:
     """
 
     def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
+        settings.require_line(bus.protocol)
         self._bus = bus
         self._unit = settings.address
         self.inverter = DriveState(bus, settings, listener)
@@ -128,7 +129,7 @@ class Drive:
 
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
-        for name in ('address', 'model', 'control_method', 'reference'):
+        for name in ('address', 'block_address', 'model', 'control_method', 'reference'):
             if getattr(settings, name) != getattr(self.settings, name):
                 raise ValueError(f'{name} cannot change within a session: make another Drive')
         self.inverter.settings = settings
@@ -411,7 +412,7 @@ class Drive:
             ) from error
         await inverter.read_control_mode()
         await inverter.read_timeout()
-        await inverter.look(Priority.SERVICE)
+        inverter.require_fresh(await inverter.look(Priority.SERVICE))
         if self._controller is not None:
             await self._controller.secure_found()
             await self._watchdog.prepare()

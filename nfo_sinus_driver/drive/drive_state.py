@@ -106,9 +106,19 @@ class DriveState:
         self.bus = bus
         self.settings = settings
         #: What the catalog knows of its family.
-        self.model = load_family(settings.model)
+        self.model = load_family(settings.model, settings.method)
+        method = settings.method_class
+        #: Who is between stops the drive after so long without a word of ours, s; 0: nobody is.
+        self.plc_time = method.plc_time
         #: Its parameters.
-        self.registers = ParameterAccess(bus, settings.address, self.model, settings.retries)
+        self.registers = ParameterAccess(
+            bus,
+            settings.address,
+            self.model,
+            settings.retries,
+            method.addressing,
+            settings.block_address,
+        )
         #: Who is told about every poll and event.
         self.listener = listener
         self.connected = False
@@ -205,6 +215,18 @@ class DriveState:
             word, at = await self._read_int(self.word_key, priority, once)
             seen = replace(seen, word=word, at=at)
         return await self._with_frequency(seen, priority, once)
+
+    def require_fresh(self, seen: InverterStatus) -> None:
+        """
+        See to it that a status is not older than a drive may be silent; a PLC may keep an old one.
+
+        :raises DriveError: it is.
+        """
+        longest = self.settings.lost_after
+        # who looks at low priority waits for its turn, while others see newer ones
+        newest = seen.at if self.seen is None else max(seen.at, self.seen.at)
+        if self.plc_time and time.monotonic() - newest >= longest:
+            raise DriveError(Cause.OLD_DATA, seconds=longest)
 
     async def wait_until(
         self,

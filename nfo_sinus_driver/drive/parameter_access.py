@@ -51,12 +51,22 @@ class ParameterAccess:
     """
     The parameters of one drive, for coroutines on the bus.
 
+    :param addressing: how they are addressed; ``''``: as the line does.
+    :param block_address: where the block of registers begins that they stand in, behind a PLC.
     :param retries: how often a request that nobody answered is sent again, where ``once`` is false.
     :raises LinkError: reading or writing fails, as the link does.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
     """
 
-    def __init__(self, bus: Bus, unit: int, model: Family, retries: int) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        unit: int,
+        model: Family,
+        retries: int,
+        addressing: str = '',
+        block_address: int = 0,
+    ) -> None:
         self.model = model
         self._bus = bus
         self._unit = unit
@@ -69,14 +79,16 @@ class ParameterAccess:
         self._denials: dict[str, list[Refused]] = {}
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
-        self.protocol = bus.protocol.addressing
+        self.protocol = addressing or bus.protocol.addressing
+        self._block_address = block_address
         reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
         bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
     def address(self, key: str) -> Address:
         """Return where a parameter stands."""
         if key not in self._addresses:
-            self._addresses[key] = Address(*self.model[key].at(self.protocol).place)
+            address = Address(*self.model[key].at(self.protocol).place)
+            self._addresses[key] = address._replace(index=address.index + self._block_address)
         return self._addresses[key]
 
     @property

@@ -46,7 +46,9 @@ from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
 from nfo_sinus_driver.drive.snapshot import Telemetry
+from nfo_sinus_driver.link import Interrupted
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoData
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
@@ -260,8 +262,10 @@ class Poller:
             period = _INACTIVE_PERIOD
         if self.yields:
             period = max(period, _YIELDING_PERIOD)
-        if self._inverter.sio_tot:
-            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)
+        inverter = self._inverter
+        for patience in (inverter.sio_tot, inverter.plc_time):
+            if patience:
+                period = min(period, patience * _KEEP_ALIVE_SHARE)
         return period
 
     @property
@@ -324,6 +328,7 @@ class Poller:
 
         # both words of a status are of one moment, so they are repeated together
         seen = await self._insist(look)
+        inverter.require_fresh(seen)
         # one that is busy, or whose answer was damaged, was there
         inverter.was_silent = self._registers.unanswered > self._unanswered
         self._unanswered = self._registers.unanswered
@@ -378,7 +383,8 @@ class Poller:
     async def _read_measured(self, role: Role) -> float:
         try:
             return await self._insist(lambda: self._inverter.measure(role, Priority.POLL))
-        except PortError:
+        except (PortError, Interrupted):
+            # told once only: the status that is read next would find a drive that somebody stopped
             raise
         except Refused:
             return NAN
@@ -398,7 +404,7 @@ class Poller:
         while True:
             try:
                 answer = await read()
-            except (PortError, Refused):
+            except (PortError, Refused, Interrupted):
                 raise
             except LinkError:
                 self._inverter.answering = False
@@ -426,7 +432,10 @@ class Poller:
         self._failing_since = min(self._failing_since, now)
         # one that answers, but tells no status, cannot be watched either
         unwatched = now - self._failing_since >= inverter.settings.lost_after
-        if isinstance(error, PortError) or self._silent_for_long or unwatched:
+        # and these have been waited out, or cannot be
+        at_once = isinstance(error, (PortError, NoData, Interrupted))
+        at_once = at_once or _is(error, Cause.OLD_DATA)
+        if at_once or self._silent_for_long or unwatched:
             self._lose(error)
 
     def _lose(self, error: LinkError | DriveError) -> None:
@@ -450,6 +459,10 @@ class Poller:
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
         inverter.listener.on_snapshot(self.snapshot)
+
+
+def _is(error: Exception, cause: Cause) -> bool:
+    return isinstance(error, DriveError) and error.report.cause is cause
 
 
 def take_snapshot(

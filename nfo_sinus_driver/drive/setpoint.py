@@ -35,6 +35,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Interrupted
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
@@ -416,6 +417,9 @@ class Setpoint:
             assert transfer.data is not None
             asked = self._meant({**self._standing, transfer.address: transfer.data})
             self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
+        elif isinstance(error, Interrupted):
+            # no status need tell it: who is between stops the drive, and lets it not go on
+            self._refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
             self.was_missed(error, transfer.address)
 

@@ -22,6 +22,7 @@ from fractions import Fraction
 import functools
 import math
 
+from nfo_sinus_driver.catalog import ControlMethod
 from nfo_sinus_driver.catalog import Profile
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import families
@@ -29,6 +30,7 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import LineProtocol
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
@@ -58,8 +60,10 @@ def _references(model: str, control_method: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one for method in methods for one in method.references))
 
 
-def _control_modes(model: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(mode for profile in _profiles(model) for mode in profile.setpoints))
+def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
+    """Return the control modes of a model, as far as a control method knows them."""
+    profiles = _profiles(model) if model == AUTO else [load_profile(model, method)]
+    return tuple(dict.fromkeys(mode for profile in profiles for mode in profile.setpoints))
 
 
 def _own_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
@@ -83,6 +87,9 @@ CONTROL_MODES = _control_modes(AUTO)
 #: The longest of the time-outs that drives have themselves, s.
 LONGEST_DRIVE_TIMEOUT = float(max(longest for longest, _ in _own_timeouts(AUTO)))
 
+#: How many registers a PLC shows for one drive, and where the last of them can begin.
+BLOCK_SIZE = 11
+LAST_BLOCK = 0x10000 - BLOCK_SIZE
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
@@ -94,6 +101,7 @@ class DriveSettings:
     How one drive is to be treated; the fields are the parameters of its node.
 
     :ivar address: one that the protocol of the line has.
+    :ivar block_address: the first register of the block that a PLC shows, with ``telegram1``.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
     :ivar control_method: as it was chosen; ``''`` stands for the usual one of the model.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
@@ -115,6 +123,7 @@ class DriveSettings:
     """
 
     address: int = 1
+    block_address: int = 0
     model: str = usual_family()
     control_method: str = ''
     reference: str = 'fieldbus'
@@ -143,6 +152,33 @@ class DriveSettings:
             return self.control_method
         return next(iter(load_profile(self.model).methods))
 
+    @property
+    def method_class(self) -> type[ControlMethod]:
+        """How it is commanded; how it would be, where it is only watched."""
+        methods = load_profile(self.model).methods
+        return methods.get(self.method) or next(iter(methods.values()))
+
+    def require_line(self, protocol: LineProtocol) -> None:
+        """
+        Make sure that the drive can be reached over a line.
+
+        :raises ValueError: it cannot; the message says what to set.
+        """
+        protocol.require_unit(self.address)
+        if self.model == AUTO:
+            return
+        needed = self.method_class.addressing
+        if needed and needed not in protocol.carries:
+            able = ' or '.join(one.name for one in PROTOCOLS.values() if needed in one.carries)
+            raise ValueError(
+                f'control_method {needed} of {self.model} goes through a PLC: '
+                f'set protocol to {able} (it is {protocol.name})'
+            )
+        if self.block_address and not needed:
+            raise ValueError(
+                f'block_address {self.block_address}: it is for control_method telegram1 alone'
+            )
+
     def __post_init__(self) -> None:
         _one_of('model', self.model, (*families(), AUTO))
         if self.control_method:
@@ -156,10 +192,11 @@ class DriveSettings:
             )
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
         self._require_known_method()
-        modes = _control_modes(self.model)
+        modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         if not any(self.address in protocol.units for protocol in PROTOCOLS.values()):
             raise ValueError(f'address {self.address}: allowed are 0 to 247')
+        _between('block_address', self.block_address, 0, LAST_BLOCK, '(a register)')
         _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
         _between('idle_poll_rate', self.idle_poll_rate, 0, 1000, 'Hz (0: as poll_rate)')
         _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')

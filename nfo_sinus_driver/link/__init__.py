@@ -19,11 +19,13 @@ from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import GatewaySilent
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
+from nfo_sinus_driver.link.interface import Interrupted
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
+from nfo_sinus_driver.link.interface import NoData
 from nfo_sinus_driver.link.interface import NoPath
 from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import PortError
@@ -45,11 +47,13 @@ __all__ = [
     'GatewaySilent',
     'Identification',
     'Inquiry',
+    'Interrupted',
     'LineProtocol',
     'LineSettings',
     'Link',
     'LinkError',
     'NoAnswer',
+    'NoData',
     'NoPath',
     'NotReady',
     'PortError',

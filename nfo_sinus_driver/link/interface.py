@@ -177,6 +177,7 @@ class LineProtocol:
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
+    :ivar carries: what else it reaches parameters by, that stand at who is between: a PLC.
     :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
         is tried.
     :ivar check: what to look at, in this order, where no drive answers.
@@ -193,6 +194,7 @@ class LineProtocol:
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
+    carries: frozenset[str] = frozenset()
     rates_disturb: bool = False
     check: str = _CHECK
 
@@ -321,6 +323,14 @@ class NoAnswer(LinkError):
 
 class GatewaySilent(NoAnswer):
     """The gateway itself said nothing in time, not even that the drive is silent."""
+
+
+class NoData(NoAnswer):
+    """A PLC between answered that it has no valid data from the drive; the message says more."""
+
+
+class Interrupted(LinkError):
+    """What is between has stopped the drive, for it was not reached for longer than its time."""
 
 
 class NoPath(LinkError):

@@ -34,6 +34,7 @@ from typing import TypeVar
 from urllib.parse import urlsplit
 
 from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import GatewaySilent
@@ -44,6 +45,7 @@ from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NoPath
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_link import UNITS
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
@@ -121,6 +123,7 @@ class TcpLink(ModbusLink):
         char_format='8E1',
         identifies=True,
         writes_and_reads=True,
+        carries=frozenset((telegram.ADDRESSING,)),
     )
 
     def __init__(self, host: str, port: int, response_timeout: float) -> None:
@@ -131,6 +134,7 @@ class TcpLink(ModbusLink):
         self._socket: socket.socket | None = None
         self._reader = FrameReader()
         self._number = 0
+        self._blocks = telegram.Blocks(self._ask)
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
@@ -151,12 +155,31 @@ class TcpLink(ModbusLink):
             self.close()
             raise PortError(f'{self._name} cannot be reached ({error}): {_HINT}') from error
         self._reader = FrameReader()
+        self._blocks.forget()
 
     def close(self) -> None:
         """Close the connection; harmless when it is closed already."""
         connection, self._socket = self._socket, None
         if connection is not None:
             connection.close()
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter, of a drive or of the block of a PLC."""
+        if address.space == telegram.ADDRESSING:
+            return self._blocks(unit, address).read(address)
+        return super().read(unit, address)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """Write one parameter, likewise."""
+        if address.space == telegram.ADDRESSING:
+            return self._blocks(unit, address).write(address, data)
+        return super().write(unit, address, data)
+
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
+        """Write one parameter and read another in one transaction, both of the same."""
+        if address.space == telegram.ADDRESSING:
+            return self._blocks(unit, address).write_and_read(address, data, source)
+        return super().write_and_read(unit, address, data, source)
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Take parameters that are safe to read; here nothing has to be resynchronised."""

@@ -24,6 +24,7 @@ from dataclasses import field
 import threading
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
@@ -60,11 +61,18 @@ class BusContext:
         finally:
             complete.set()
 
-    def address_conflict(self, name: str, address: int) -> str | None:
-        """Return the name of another drive that would answer to the address of this one, too."""
+    def address_conflict(self, name: str, address: int, block: int) -> str | None:
+        """
+        Return the name of another drive that would answer to the address of this one, too.
+
+        :param block: where its block of registers begins, where a PLC shows some; they may not
+            overlap.
+        """
         alone = self.bus.protocol.point_to_point
         for drive in self.drives:
             theirs = drive.settings.address
-            if drive.name != name and (theirs == address or alone in (theirs, address)):
+            apart = abs(drive.settings.block_address - block) >= BLOCK_SIZE
+            same = theirs == address and not apart
+            if drive.name != name and (same or alone in (theirs, address)):
                 return drive.name
         return None

@@ -240,8 +240,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         wanted = {name: value for name, value in values.items() if name in names}
         retries = self._bus_context.retries
         settings = DriveSettings(**wanted, retries=retries)  # type: ignore[arg-type]
-        self._bus_context.bus.protocol.require_unit(settings.address)
-        other = self._bus_context.address_conflict(self.get_name(), settings.address)
+        settings.require_line(self._bus_context.bus.protocol)
+        place = settings.address, settings.block_address
+        other = self._bus_context.address_conflict(self.get_name(), *place)
         if other is not None:
             raise ValueError(
                 f'address {settings.address} belongs to {other} already: '

@@ -31,7 +31,9 @@ from nfo_sinus_driver.node.wording import NodeError
 from nfo_sinus_driver.node.wording import Wording
 
 #: What identifies a drive or how it is commanded cannot change under way.
-ONLY_UNCONFIGURED = ('address', 'model', 'control_method', 'reference', 'classic_dialect')
+ONLY_UNCONFIGURED = (
+    'address', 'block_address', 'model', 'control_method', 'reference', 'classic_dialect'
+)
 
 
 class ManagedDrive:

@@ -29,6 +29,7 @@ from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.drive.settings import CONTROL_MODES
+from nfo_sinus_driver.drive.settings import LAST_BLOCK
 from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.link import BIT_RATES
@@ -162,6 +163,14 @@ DRIVE_SETTINGS = (
         'CANopen (node id) 1 to 127',
         0,
         247,
+    ),
+    Setting(
+        'block_address',
+        0,
+        'With control_method telegram1: the first of the registers that the PLC shows for this '
+        'drive',
+        0,
+        LAST_BLOCK,
     ),
     Setting(
         'model',

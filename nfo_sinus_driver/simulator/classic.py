@@ -26,9 +26,9 @@ from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
 from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
+from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long the rest of a message may take (s). No manual says [C86].
@@ -92,19 +92,19 @@ class Classic(OnSerialLine):
         return Request(address, frame, whole=not classic_frames.parse(frame).wrong)
 
     @staticmethod
-    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+    def concerns(station: Station, request: Request) -> bool:
         """Whether the drive is meant; an ENQUIRY to all is for nobody [C86]."""
         if request.address == BROADCAST:
             return classic_frames.is_select(request.body)
-        return request.address in (POINT_TO_POINT, drive.address)
+        return request.address in (POINT_TO_POINT, station.address)
 
     @staticmethod
-    def answer(drive: SimulatedDrive, request: Request) -> bytes:
+    def answer(station: Station, request: Request) -> bytes:
         """Let the drive carry out a message; return the answer, empty if there is none."""
-        server = drive.servers['classic']
+        server = station.servers['classic']
         assert isinstance(server, Server)
         small = server.lower_case
-        sender = drive.address if server.own_address else request.address
+        sender = station.address if server.own_address else request.address
         message = classic_frames.parse(request.body, small_letters=small)
         to_all = request.address == BROADCAST
         answer = b''

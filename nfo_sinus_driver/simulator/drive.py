@@ -36,6 +36,7 @@ from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import measure
+from nfo_sinus_driver.simulator.timing import Timing
 
 #: The characters of a serial number [M0 §6.2.4].
 SERIAL_LENGTH = 16
@@ -119,6 +120,15 @@ class SimulatedDrive:
     def listening(self) -> bool:
         """Whether it hears the line and answers: not while it boots or is held silent."""
         return self._boot_left <= 0 and self._silent_left <= 0
+
+    @property
+    def response_time(self) -> float:
+        """How long it waits before it answers (s)."""
+        return self.control_unit.response_time
+
+    def hears(self, protocol: str, timing: Timing) -> bool:
+        """Whether it is set to this protocol, speed and format."""
+        return self.control_unit.hears(protocol, timing)
 
     def heard(self) -> None:
         """Take note that a valid frame addressed to this drive arrived."""

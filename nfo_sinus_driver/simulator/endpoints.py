@@ -37,12 +37,15 @@ from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
 from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
 from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.modbus_frames import ThroughPlc
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.movitrac_frames import ADDRESSES
+from nfo_sinus_driver.simulator.plc import TELEGRAM
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.ports import PtyPort
 from nfo_sinus_driver.simulator.ports import TcpPort
 from nfo_sinus_driver.simulator.protocol import Protocol
+from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.socketcan import CanInterface
 from nfo_sinus_driver.simulator.socketcan import CanPort
 from nfo_sinus_driver.simulator.socketcan import is_interface
@@ -79,6 +82,7 @@ PROTOCOLS: Mapping[str, _Row] = {
     ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
     Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
     Movitrac.name: _Row(lambda _: Movitrac(), 'movitrac', 9600, '8N1', '8', ADDRESSES),
+    ThroughPlc.name: _Row(ThroughPlc, TELEGRAM, 19200, '8E1', '8'),
     CanLine.name: _Row(None, 'canopen', 125_000, '8N1', '8', NODES, BIT_RATES),
 }
 
@@ -122,6 +126,11 @@ class Endpoint:
         assert make is not None
         return make(gateway_timeout)
 
+    @property
+    def through_plc(self) -> bool:
+        """Whether a PLC stands between the line and the drives."""
+        return self.protocol == ThroughPlc.name
+
     def open(self) -> Port:
         """Return its port (PortError: it cannot be had)."""
         if self._is_interface:
@@ -133,6 +142,7 @@ class Endpoint:
         self,
         port: Port,
         drives: Sequence[SimulatedDrive],
+        stations: Sequence[Station],
         clock: Callable[[], float],
         *,
         gateway_timeout: float,
@@ -142,7 +152,11 @@ class Endpoint:
         always_heard: bool,
         trace: Trace | None,
     ) -> Wire:
-        """Return the line on its port; for what is given see :class:`Line` and `CanLine`."""
+        """
+        Return the line on its port; for what is given see :class:`Line` and `CanLine`.
+
+        :param stations: who is at a line of bytes: the drives, or what stands before them.
+        """
         if self._is_can:
             return CanLine(
                 port,
@@ -157,7 +171,7 @@ class Endpoint:
         return Line(
             port,
             self.make(gateway_timeout),
-            drives,
+            stations,
             self.timing,
             clock,
             paced=paced,
@@ -196,7 +210,8 @@ def endpoint(
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
         raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
-    if protocol == ModbusTcp.name:
+    make = PROTOCOLS[protocol].make
+    if make is not None and not make(0.0).serial:
         if link is not None:
             raise ValueError(f'{protocol} needs a TCP port, not a link')
         tcp = tcp or 0

@@ -32,6 +32,8 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
+from nfo_sinus_driver.simulator.plc import Channel
+from nfo_sinus_driver.simulator.plc import Plc
 from nfo_sinus_driver.simulator.wire import Wire
 
 #: Stands for an argument that must be given.
@@ -98,12 +100,28 @@ class Target:
     line: Wire
     drive: SimulatedDrive | None
     now: float
+    plc: Plc | None = None
 
     @property
     def one(self) -> SimulatedDrive:
         """The drive of a verb that needs one."""
         assert self.drive is not None
         return self.drive
+
+    @property
+    def channel(self) -> Channel:
+        """The drive as the PLC has it (ValueError: there is none)."""
+        for channel in self.the_plc.channels.values():
+            if channel.drive is self.drive:
+                return channel
+        raise ValueError('the drive is not on a fieldbus')
+
+    @property
+    def the_plc(self) -> Plc:
+        """The PLC before the drives (ValueError: there is none)."""
+        if self.plc is None:
+            raise ValueError('there is no PLC: it is there with --protocol telegram1')
+        return self.plc
 
     @property
     def address(self) -> int | None:
@@ -189,6 +207,18 @@ def _burst(target: Target, given: dict[str, Any]) -> None:
     target.line.faults.set_bursts(given['seconds'], given['period'], target.now)
 
 
+def _fieldbus_cut(target: Target, given: dict[str, Any]) -> None:
+    target.channel.cut_until = target.now + given['seconds']
+
+
+def _plc_stop(target: Target, given: dict[str, Any]) -> None:
+    target.the_plc.stopped_until = target.now + given['seconds']
+
+
+def _release(target: Target, given: dict[str, Any]) -> None:
+    target.channel.released = given['state'] == 'on'
+
+
 _SECONDS = Argument('seconds', float, 'for how many seconds')
 
 VERBS: Mapping[str, Verb] = {
@@ -269,6 +299,20 @@ VERBS: Mapping[str, Verb] = {
             Argument('period', float, 'from one to the next (s)', 5.0),
         ),
         to_drive=False,
+    ),
+    'fieldbus-cut': Verb(
+        'let no telegram pass between the PLC and the drive', _fieldbus_cut, (_SECONDS,)
+    ),
+    'plc-stop': Verb(
+        'let the program of the PLC stand, and its fieldbus; its registers are still answered',
+        _plc_stop,
+        (_SECONDS,),
+        to_drive=False,
+    ),
+    'release': Verb(
+        'let the PLC release the drive to ROS, or not',
+        _release,
+        (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
     ),
     'traffic': Verb(
         'on a CAN bus: let others send frames that are for nobody here',

@@ -30,11 +30,11 @@ import itertools
 import json
 from typing import TextIO
 
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import LineFaults
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.protocol import Protocol
+from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
 
@@ -67,7 +67,7 @@ class _Delivery:
 
 class Line(Wire):
     """
-    One serial line with several drives on it.
+    One line with several stations on it: drives, or what stands before them.
 
     :param paced: bytes take the time that they take on a real line, never less.
     :param turnaround: time a drive takes before it answers (s).
@@ -80,7 +80,7 @@ class Line(Wire):
         self,
         port: Port,
         protocol: Protocol,
-        drives: Sequence[SimulatedDrive],
+        stations: Sequence[Station],
         timing: Timing,
         clock: Callable[[], float],
         *,
@@ -92,7 +92,7 @@ class Line(Wire):
     ) -> None:
         super().__init__(port, timing, LineFaults(int(timing.char_format[0])))
         self.protocol = protocol
-        self.drives = drives
+        self.stations = stations
         self.name = protocol.name
         self.speed = f'{timing.baud} {timing.char_format}'
         self._clock = clock
@@ -143,18 +143,18 @@ class Line(Wire):
         if dead or request is None:
             return
         there = answered = False
-        for drive in self.drives:
-            if not self.protocol.concerns(drive, request):
+        for station in self.stations:
+            if not self.protocol.concerns(station, request):
                 continue
             there = True
-            drive.advance_to(arrived.last)
-            if not self._hears(drive):
+            station.advance_to(arrived.last)
+            if not self._hears(station):
                 continue
             # carrying it out may change them
-            address, wait = drive.address, drive.control_unit.response_time
+            address, wait = station.address, station.response_time
             if request.whole:
-                drive.heard()
-            frame = self.protocol.answer(drive, request)
+                station.heard()
+            frame = self.protocol.answer(station, request)
             if frame:
                 answered = True
                 instead = self.protocol.instead(request, there)
@@ -164,10 +164,10 @@ class Line(Wire):
             refusal = self.protocol.instead(request, there)
             self._send(request.address, [refusal] if refusal else [], arrived)
 
-    def _hears(self, drive: SimulatedDrive) -> bool:
-        if not drive.listening:
+    def _hears(self, station: Station) -> bool:
+        if not station.listening:
             return False
-        return self._always_heard or drive.control_unit.hears(self.protocol.spoken, self.timing)
+        return self._always_heard or station.hears(self.protocol.spoken, self.timing)
 
     def _send(
         self, address: int, replies: Sequence[Reply], asked: Arrived, wait: float = 0.0

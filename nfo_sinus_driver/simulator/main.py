@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Iterator
 from collections.abc import Sequence
 import contextlib
+import dataclasses
 import json
 import signal
 import sys
@@ -37,6 +38,7 @@ from nfo_sinus_driver.simulator.family import machine_of
 from nfo_sinus_driver.simulator.family import simulated
 from nfo_sinus_driver.simulator.injections import Argument
 from nfo_sinus_driver.simulator.injections import parse_setting
+from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.version import VERSION
@@ -48,6 +50,9 @@ _EPILOG = """
 While it runs, "simulator inject --link LINK VERB ..." makes things happen to it: faults, a lost
 RUN input, the keypad, a power cycle, noise on the line; see "simulator inject --help".
 """
+
+#: The options of a PLC, by the names of its settings.
+_OF_THE_PLC = tuple(field.name for field in dataclasses.fields(PlcSetting))
 
 _ROS_ARGS = '--ros-args'
 
@@ -138,8 +143,16 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         run_input=options.run_input,
         boot_time=options.boot_time,
         serial_numbers=options.serial,
+        plc=_plc(options),
         **{name: value for name, value in chosen.items() if value is not None},
     )
+
+
+def _plc(options: argparse.Namespace) -> PlcSetting | None:
+    """Return how the PLC is programmed; without an option for it ``None``."""
+    chosen = {name: getattr(options, name) for name in _OF_THE_PLC}
+    given = {name: value for name, value in chosen.items() if value is not None}
+    return PlcSetting(**given) if given else None
 
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
@@ -165,6 +178,19 @@ def _seconds(text: str) -> float:
     if not 0 <= seconds < 1e6:
         raise argparse.ArgumentTypeError(f'{text} is not possible: 0 or more seconds')
     return seconds
+
+
+def _block(text: str) -> tuple[int, int]:
+    unit, colon, register = text.partition(':')
+    try:
+        return int(unit), int(register) if colon else 0
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is not UNIT:REGISTER') from None
+
+
+def _span(text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(':')
+    return _seconds(low), _seconds(high if colon else low)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -257,6 +283,62 @@ def _parser() -> argparse.ArgumentParser:
         metavar='TEXT',
         help='serial number of a drive, at most 16 characters; once for each drive, in the order '
         'of their addresses (default: made of the address)',
+    )
+    add(
+        '--block',
+        dest='blocks',
+        type=_block,
+        action='append',
+        metavar='UNIT:REGISTER',
+        help='where the PLC has the block of a drive, once for each drive, in the order of their '
+        "addresses (default: at unit ADDRESS, register 0); these are telegram1's",
+    )
+    add(
+        '--plc-cycle',
+        dest='cycle',
+        type=_seconds,
+        metavar='SECONDS',
+        help='cycle of the program of the PLC (default: 0.01)',
+    )
+    add(
+        '--exchange-time',
+        dest='exchange',
+        type=_seconds,
+        metavar='SECONDS',
+        help='from one telegram between PLC and drive to the next (default: 0.02)',
+    )
+    add(
+        '--ros-time',
+        type=_seconds,
+        metavar='SECONDS',
+        help="how long the driver's life counter may stand still for the PLC (default: 1)",
+    )
+    add(
+        '--drive-time',
+        type=_seconds,
+        metavar='SECONDS',
+        help='how long the PLC takes the data of a drive for valid that it does not reach '
+        '(default: 0.5)',
+    )
+    add(
+        '--answer-time',
+        type=_span,
+        metavar='LEAST:MOST',
+        help='how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
+    )
+    add(
+        '--no-function-23',
+        dest='write_and_read',
+        action='store_false',
+        default=None,
+        help='the PLC refuses function 23',
+    )
+    add(
+        '--not-released',
+        dest='released',
+        action='store_false',
+        default=None,
+        help='the PLC does not release the drives to ROS',
     )
     for name, option in every_option().items():
         flag = f'--{name.replace("_", "-")}'

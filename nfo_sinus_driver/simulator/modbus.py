@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
 from collections.abc import Sequence
 import functools
@@ -31,6 +32,7 @@ from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.memory import carried
 from nfo_sinus_driver.simulator.memory import kept
+from nfo_sinus_driver.simulator.protocol import Station
 
 #: How a drive treats a function.
 KNOWN, REFUSED, SILENT = 'known', 'refused', 'silent'
@@ -55,22 +57,11 @@ _MOST_WRITTEN = 123
 _MOST_WRITTEN_WITH_READ = 121
 
 
-class Server:
-    """
-    What one drive does with Modbus requests.
-
-    One parameter in one message, the whole of it [M0 §6.2.3]. Registers are those of the tables;
-    a family may have other functions, and say who it is.
-    """
+class Requests(abc.ABC):
+    """What somebody does with Modbus requests, whose registers are another's business."""
 
     #: The functions that it has.
-    functions: ClassVar[frozenset[int]] = frozenset((READ, WRITE_SINGLE, WRITE_MULTIPLE))
-
-    def __init__(self, drive: SimulatedDrive) -> None:
-        self.drive = drive
-        self._by_base = _registers(drive.model)
-        # the manuals of some tell of none
-        self._log = drive.model.error_logs.get('modbus')
+    functions: ClassVar[frozenset[int]]
 
     def treats(self, function: int) -> str:
         """Return which of :data:`TREATMENTS` a function gets."""
@@ -78,11 +69,25 @@ class Server:
 
     def slave_id(self) -> bytes:
         """Return what function 17 reports."""
-        return self.drive.serial_number.encode('ascii')
+        return b''
 
     def device_objects(self) -> Mapping[int, bytes]:
         """Return the objects of Read Device Identification, by their numbers."""
         return {}
+
+    @abc.abstractmethod
+    def read(self, register: int, count: int) -> tuple[int, ...]:
+        """Return the words from a register on (Refused: as the reason says)."""
+
+    @abc.abstractmethod
+    def write(self, register: int, words: Sequence[int]) -> None:
+        """Write words from a register on (Refused: as the reason says)."""
+
+    @abc.abstractmethod
+    def write_and_read(
+        self, register: int, words: Sequence[int], source: int, count: int
+    ) -> tuple[int, ...]:
+        """Write at ``register``, then read at ``source``; or none of both."""
 
     def answer(self, pdu: bytes) -> bytes:
         """Carry out a request PDU and return the answer PDU; empty if it stays silent."""
@@ -99,52 +104,6 @@ class Server:
                 raise Refused(Reason.VALUE, str(error)) from error
         except Refused as refused:
             return pymodbus_compat.encode_exception(function, refused.reason)
-
-    # ---- registers ----
-
-    def read(self, register: int, count: int) -> tuple[int, ...]:
-        """Read the parameter at a register, as words, the low one first; else :class:`Refused`."""
-        entry = self._log_entry(register, count)
-        if entry is not None:
-            return entry
-        parameter = self._find(register, count)
-        raw = carried(parameter, self.drive.read_raw(parameter.key), 'modbus')
-        return to_words(parameter.at('modbus').number.encode(raw))
-
-    def write(self, register: int, words: Sequence[int]) -> None:
-        """Write the parameter at a register (Refused: as the reason says)."""
-        parameter = self._find(register, len(words))
-        raw = parameter.at('modbus').number.decode(to_bytes(words))
-        self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
-        self.drive.control_unit.written(parameter.key, 'modbus')
-
-    def write_and_read(
-        self, register: int, words: Sequence[int], source: int, count: int
-    ) -> tuple[int, ...]:
-        """Write the parameter at ``register``, then read that at ``source``; or none of both."""
-        self._find(source, count)
-        self.write(register, words)
-        return self.read(source, count)
-
-    def _log_entry(self, register: int, count: int) -> tuple[int, ...] | None:
-        """Return the entry of the error log at ``register``; ``None`` if it is none."""
-        log = self._log
-        entry, rest = divmod(register - log.first, log.stride) if log else (-1, 0)
-        if log is None or not 0 <= entry < log.limit:
-            return None
-        if rest or 2 * count != log.codec.size:
-            raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
-        return to_words(log.codec.encode(self.drive.faults.log_entry(entry)))
-
-    def _find(self, register: int, count: int) -> Parameter:
-        """Return the parameter that stands at ``register`` and has exactly ``count`` of them."""
-        parameter = self._by_base.get(register)
-        if parameter is None:
-            raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
-        whole = parameter.at('modbus').codec.size // 2
-        if count != whole:
-            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {whole} registers, not {count}')
-        return parameter
 
     # ---- requests ----
 
@@ -224,10 +183,75 @@ class Server:
         )
 
 
-def server(drive: SimulatedDrive) -> Server:
-    """Return what does this with the requests to a drive."""
-    found = drive.servers['modbus']
-    assert isinstance(found, Server)
+class Server(Requests):
+    """
+    What one drive does with Modbus requests.
+
+    One parameter in one message, the whole of it [M0 §6.2.3]. Registers are those of the tables;
+    a family may have other functions, and say who it is.
+    """
+
+    functions = frozenset((READ, WRITE_SINGLE, WRITE_MULTIPLE))
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        self.drive = drive
+        self._by_base = _registers(drive.model)
+        # the manuals of some tell of none
+        self._log = drive.model.error_logs.get('modbus')
+
+    def slave_id(self) -> bytes:
+        """Return what function 17 reports."""
+        return self.drive.serial_number.encode('ascii')
+
+    def read(self, register: int, count: int) -> tuple[int, ...]:
+        """Read the parameter at a register, as words, the low one first; else :class:`Refused`."""
+        entry = self._log_entry(register, count)
+        if entry is not None:
+            return entry
+        parameter = self._find(register, count)
+        raw = carried(parameter, self.drive.read_raw(parameter.key), 'modbus')
+        return to_words(parameter.at('modbus').number.encode(raw))
+
+    def write(self, register: int, words: Sequence[int]) -> None:
+        """Write the parameter at a register (Refused: as the reason says)."""
+        parameter = self._find(register, len(words))
+        raw = parameter.at('modbus').number.decode(to_bytes(words))
+        self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
+        self.drive.control_unit.written(parameter.key, 'modbus')
+
+    def write_and_read(
+        self, register: int, words: Sequence[int], source: int, count: int
+    ) -> tuple[int, ...]:
+        """Write the parameter at ``register``, then read that at ``source``; or none of both."""
+        self._find(source, count)
+        self.write(register, words)
+        return self.read(source, count)
+
+    def _log_entry(self, register: int, count: int) -> tuple[int, ...] | None:
+        """Return the entry of the error log at ``register``; ``None`` if it is none."""
+        log = self._log
+        entry, rest = divmod(register - log.first, log.stride) if log else (-1, 0)
+        if log is None or not 0 <= entry < log.limit:
+            return None
+        if rest or 2 * count != log.codec.size:
+            raise Refused(Reason.ADDRESS, f'no entry of the error log is at {register:04X}h')
+        return to_words(log.codec.encode(self.drive.faults.log_entry(entry)))
+
+    def _find(self, register: int, count: int) -> Parameter:
+        """Return the parameter that stands at ``register`` and has exactly ``count`` of them."""
+        parameter = self._by_base.get(register)
+        if parameter is None:
+            raise Refused(Reason.ADDRESS, f'no parameter begins at register {register:04X}h')
+        whole = parameter.at('modbus').codec.size // 2
+        if count != whole:
+            raise Refused(Reason.ADDRESS, f'{parameter.key} takes {whole} registers, not {count}')
+        return parameter
+
+
+def server(station: Station) -> Requests:
+    """Return what does this with the requests to a station."""
+    found = station.servers['modbus']
+    assert isinstance(found, Requests)
     return found
 
 

@@ -21,13 +21,13 @@ import binascii
 import re
 
 from nfo_sinus_driver.simulator import pymodbus_compat
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.memory import GatewayReason
 from nfo_sinus_driver.simulator.modbus import is_write
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
+from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: Everybody obeys a write to this address and nobody answers.
@@ -56,18 +56,18 @@ class _InFrames(OnSerialLine, abc.ABC):
     """What RTU and ASCII have in common: an address, a PDU, and silence where nobody answers."""
 
     @staticmethod
-    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+    def concerns(station: Station, request: Request) -> bool:
         """Whether the drive is meant; only writes are for everybody."""
-        return drive.address == request.address or _for_all(request.address, request.body)
+        return station.address == request.address or _for_all(request.address, request.body)
 
     @staticmethod
     @abc.abstractmethod
     def wrap(address: int, pdu: bytes) -> bytes:
         """Return the frame of a PDU."""
 
-    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+    def answer(self, station: Station, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        pdu = server(drive).answer(request.body)
+        pdu = server(station).answer(request.body)
         if not pdu or _for_all(request.address, request.body):
             return b''
         return self.wrap(request.address, pdu)
@@ -200,17 +200,17 @@ class ModbusTcp:
         """Return the frame of a PDU."""
         return pymodbus_compat.tcp_frame(transaction, unit, pdu)
 
-    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
+    def answer(self, station: Station, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        pdu = server(drive).answer(request.body[2:])
+        pdu = server(station).answer(request.body[2:])
         if not pdu or _for_all(request.address, request.body[2:]):
             return b''
         return self._framed(request, pdu)
 
     @staticmethod
-    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+    def concerns(station: Station, request: Request) -> bool:
         """Whether the drive is meant; only writes are for everybody."""
-        return drive.address == request.address or _for_all(request.address, request.body[2:])
+        return station.address == request.address or _for_all(request.address, request.body[2:])
 
     def instead(self, request: Request, there: bool) -> Reply | None:
         """Say, after having waited, that the drive does not answer; or that there is none."""
@@ -222,6 +222,12 @@ class ModbusTcp:
 
     def _framed(self, request: Request, pdu: bytes) -> bytes:
         return self.wrap(int.from_bytes(request.body[:2], 'big'), request.address, pdu)
+
+
+class ThroughPlc(ModbusTcp):
+    """Modbus TCP as of a PLC, whose units have the blocks of its drives."""
+
+    name = 'telegram1'
 
 
 def _for_all(address: int, pdu: bytes) -> bool:

@@ -24,12 +24,12 @@ from __future__ import annotations
 import abc
 
 from nfo_sinus_driver.simulator import movitrac_frames
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
 from nfo_sinus_driver.simulator.protocol import OnSerialLine
 from nfo_sinus_driver.simulator.protocol import Request
+from nfo_sinus_driver.simulator.protocol import Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The silence after which the rest of a frame is not waited for (s). No manual says; a busy
@@ -95,14 +95,14 @@ class Movitrac(OnSerialLine):
         return None if message is None else Request(message.address, frame)
 
     @staticmethod
-    def concerns(drive: SimulatedDrive, request: Request) -> bool:
+    def concerns(station: Station, request: Request) -> bool:
         """Whether the drive is meant; there is no broadcast."""
-        return _server(drive).any_address or request.address == drive.address
+        return _server(station).any_address or request.address == station.address
 
     @staticmethod
-    def answer(drive: SimulatedDrive, request: Request) -> bytes:
+    def answer(station: Station, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
-        server = _server(drive)
+        server = _server(station)
         message = movitrac_frames.parse(request.body)
         assert message is not None
         try:
@@ -114,7 +114,7 @@ class Movitrac(OnSerialLine):
         return movitrac_frames.acknowledge()
 
 
-def _server(drive: SimulatedDrive) -> Server:
-    server = drive.servers['movitrac']
+def _server(station: Station) -> Server:
+    server = station.servers['movitrac']
     assert isinstance(server, Server)
     return server

@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol as Interface
 
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.timing import Timing
 
@@ -37,6 +37,35 @@ class Request:
     address: int
     body: bytes
     whole: bool = True
+
+
+class Station(Interface):
+    """Who is at a line: a drive, or what stands between the line and the drives."""
+
+    @property
+    def address(self) -> int:
+        """The address that is in effect."""
+
+    @property
+    def servers(self) -> Mapping[str, object]:
+        """What answers the requests, by the protocols of the tables."""
+
+    @property
+    def listening(self) -> bool:
+        """Whether it hears the line and answers."""
+
+    @property
+    def response_time(self) -> float:
+        """How long it waits before it answers (s)."""
+
+    def hears(self, protocol: str, timing: Timing) -> bool:
+        """Whether it is set to this protocol, speed and format."""
+
+    def heard(self) -> None:
+        """Take note that a valid frame addressed to it arrived."""
+
+    def advance_to(self, now: float) -> None:
+        """Catch up with the caller's clock (s); the first call only sets the clock."""
 
 
 class Protocol(Interface):
@@ -60,17 +89,17 @@ class Protocol(Interface):
     def unwrap(self, frame: bytes) -> Request | None:
         """What the bytes say; ``None`` when they say nothing to anybody."""
 
-    def concerns(self, drive: SimulatedDrive, request: Request) -> bool:
-        """Whether the drive is meant, alone or with others."""
+    def concerns(self, station: Station, request: Request) -> bool:
+        """Whether the station is meant, alone or with others."""
 
-    def answer(self, drive: SimulatedDrive, request: Request) -> bytes:
-        """Let the drive carry out a request; return the answer's frame, empty if there is none."""
+    def answer(self, station: Station, request: Request) -> bytes:
+        """Let the station carry out a request; return its answer's frame, perhaps none."""
 
     def instead(self, request: Request, there: bool) -> Reply | None:
         """
-        What comes when no drive's answer does: a gateway has something to say, a wire has not.
+        What comes when no answer of a station does: a gateway has something to say, a wire has not.
 
-        :param there: there is such a drive, though it keeps silent.
+        :param there: there is such a station, though it keeps silent.
         """
 
 

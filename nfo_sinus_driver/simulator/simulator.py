@@ -40,6 +40,8 @@ from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.family import verbs_of
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Trace
+from nfo_sinus_driver.simulator.plc import Plc
+from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 
@@ -72,6 +74,7 @@ class Simulator:
     :param boot_time: how long a drive is silent after power-on (s).
     :param serial_numbers: of the first drives, in the order of their addresses; the rest have
         their own.
+    :param plc: how the PLC is programmed, where one stands before the drives.
     :param options: what else can be chosen of drives of this family.
     :raises ValueError: a wrong address, model, protocol, baud rate, parameter or option.
     :raises PortError: the port or link cannot be had.
@@ -82,6 +85,7 @@ class Simulator:
     :ivar control: path of the control channel, or ``None``.
     :ivar finished: it serves no more, because it was stopped or because of a failure.
     :ivar failure: what made the thread of the line fail, or ``None``.
+    :ivar plc: the PLC before the drives, or ``None``.
     :ivar drives: the drives by the addresses they began with; hold :attr:`lock` to touch them.
     """
 
@@ -106,6 +110,7 @@ class Simulator:
         run_input: bool = True,
         boot_time: float = 2.0,
         serial_numbers: Sequence[str] = (),
+        plc: PlcSetting | None = None,
         **options: Any,
     ) -> None:
         first = endpoint(protocol, link=link, tcp=tcp, baud=baud, char_format=char_format)
@@ -132,8 +137,17 @@ class Simulator:
         for drive, one in itertools.product(self.drives.values(), endpoints):
             if one.tables not in drive.servers:
                 raise ValueError(f'{model} does not speak {one.protocol}')
-        for drive in self.drives.values():
-            drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
+        self.plc: Plc | None = None
+        if first.through_plc:
+            if len(endpoints) > 1:
+                raise ValueError(f'{protocol}: behind a PLC drives have no other line')
+            self.plc = Plc(self.drives, plc or PlcSetting())
+        elif plc is not None or any(one.through_plc for one in endpoints):
+            raise ValueError(f'there is no PLC on a line of {protocol}')
+        else:
+            for drive in self.drives.values():
+                drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
+        stations = list(self.drives.values()) if self.plc is None else self.plc.units
         self._verbs = verbs_of(model)
         self.lock = threading.RLock()
         self.control: str | None = None
@@ -160,6 +174,7 @@ class Simulator:
                 line = one.wire(
                     port,
                     list(self.drives.values()),
+                    stations,
                     time.monotonic,
                     gateway_timeout=gateway_timeout,
                     paced=paced,
@@ -187,8 +202,8 @@ class Simulator:
         """Begin to serve."""
         self._wake_read, self._wake_write = os.pipe()
         now = time.monotonic()
-        for drive in self.drives.values():
-            drive.advance_to(now)
+        for one in self._moving:
+            one.advance_to(now)
         self._thread = threading.Thread(target=self._run, name='simulated line', daemon=True)
         self._thread.start()
 
@@ -217,8 +232,11 @@ class Simulator:
         """Return the state of a drive as it is now; without an address, of the only one."""
         with self.lock:
             drive = self._drive(address)
-            drive.advance_to(time.monotonic())
-            return describe(drive)
+            self._catch_up(drive, time.monotonic())
+            if self.plc is None:
+                return describe(drive)
+            (channel,) = (one for one in self.plc.channels.values() if one.drive is drive)
+            return {**describe(drive), 'plc': channel.describe()}
 
     def states(self) -> dict[int, dict[str, Any]]:
         """Return the states of all drives, by the addresses they began with."""
@@ -240,10 +258,18 @@ class Simulator:
             drive = None
             if verb.to_drive or address is not None:
                 drive = self._drive(address)
-                drive.advance_to(now)
-            verb.act(Target(self.line, drive, now), bound)
+                self._catch_up(drive, now)
+            verb.act(Target(self.line, drive, now, self.plc), bound)
             if self._thread is not None:
                 os.write(self._wake_write, b'.')
+
+    @property
+    def _moving(self) -> Sequence[SimulatedDrive | Plc]:
+        """What has to catch up with the clock; a PLC sees to its drives."""
+        return list(self.drives.values()) if self.plc is None else [self.plc]
+
+    def _catch_up(self, drive: SimulatedDrive, now: float) -> None:
+        (self.plc or drive).advance_to(now)
 
     def _drive(self, address: int | None) -> SimulatedDrive:
         known = ', '.join(str(number) for number in self.drives)
@@ -278,7 +304,7 @@ class Simulator:
             self.finished.set()
 
     def _serve(self) -> None:
-        turn = list(self.drives.values())
+        turn = list(self._moving)
         tick = time.monotonic()
         while not self.finished.is_set():
             due = self._due
@@ -302,9 +328,9 @@ class Simulator:
                     tick = due + _HURRY
                 else:
                     # one drive at a time, so that an answer never waits for all of them
-                    drive = turn.pop(0)
-                    turn.append(drive)
-                    drive.advance_to(now)
+                    one = turn.pop(0)
+                    turn.append(one)
+                    one.advance_to(now)
                     tick = now + _TICK / len(turn)
 
     @property

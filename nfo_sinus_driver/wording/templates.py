@@ -49,6 +49,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.TOO_LATE: 'no answer within {timeout:g} s',
     Cause.LOST: 'lost: {why}; retrying',
     Cause.LOST_IN_USE: f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}',
+    Cause.OLD_DATA: 'the data from the drive stand still in the PLC for {seconds:g} s or more (its '
+    'life counter does not change): check the fieldbus between them and that the program of the '
+    'PLC runs',
     Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
     Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
     Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
@@ -151,6 +154,8 @@ TEMPLATES: Mapping[Cause, str] = {
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
     f'switched off and on, or somebody used its keypad: check its mains; {_GO_ON}',
+    Cause.CONTROL_WITHHELD: 'the PLC has taken the release to ROS back ({status}): give it in the '
+    'PLC',
     Cause.RUNS_UNASKED: 'it runs under bus control although nobody enabled it: find out whether '
     'another master commands it',
     Cause.FOUND_RUNNING: 'the motor runs under bus control, started by an earlier session '
@@ -199,6 +204,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.OWN_TIMEOUT_STOPS_NOTHING: _NO_TIMEOUT.format(
         why='{name} is OFF', remedy='{call.set_drive_timeout}'
     ),
+    Cause.OWN_TIMEOUT_UNKNOWN: 'the PLC stops the motor if this {call.program} dies; what the '
+    'drive does if the PLC does, nobody here can read: {what}',
     Cause.OWN_TIMEOUT_SHORT: 'the time-out of the drive itself ({name} {timeout:g} s) is less than '
     'lost_after + {margin:g} s: noise that this {call.program} waits out may stop the '
     'motor; {call.set_drive_timeout}, at least {least:g} s',
@@ -206,6 +213,9 @@ TEMPLATES: Mapping[Cause, str] = {
     'enabled: {why}',
     Cause.OWN_TIMEOUT_IMPOSSIBLE: '{call.drive_timeout}: this model has no time-out of its own '
     'that can be set, so it must be 0',
+    Cause.OWN_TIMEOUT_OF_PLC: '{call.drive_timeout}: through a PLC nothing is set at the drive; '
+    'the PLC watches this {call.program}, and stops the motor {seconds:g} s after its last word, '
+    'so it must be 0',
     Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
         why='{why}', remedy='use the RUN input'
     ),

@@ -56,6 +56,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
+from support.drives import Drives
 from ways import UNFRAMED
 from ways import Way
 
@@ -196,7 +197,6 @@ class Bench(contextlib.ExitStack):
         super().__init__()
         self.folder = folder
         self.way = way
-        self.drives = way.drives
         #: What `Simulator` is told of the line, by the names of its arguments.
         self.line: dict[str, Any] = {**way.simulator, 'control': str(folder / 'control')}
         if way.protocol == 'modbus_tcp':
@@ -209,6 +209,11 @@ class Bench(contextlib.ExitStack):
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
         self.domain = domain
         self._drivers: list[Process] = []
+
+    @property
+    def drives(self) -> Drives:
+        """What a test over every way knows of its drives."""
+        return self.way.drives
 
     def simulator(self, *arguments: str, paced: bool = True) -> Simulated:
         """Start a simulated line, as slow as a real one if paced; return what looks into it."""

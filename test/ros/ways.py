@@ -75,6 +75,8 @@ class Way:
     :ivar baud_rate: bit/s, of both ends.
     :ivar dialect: the manual that describes the Classic protocol; of the simulator.
     :ivar features: those of :data:`WITHOUT` that it has.
+    :ivar method: the control method that the driver is told, where it is not the usual one.
+    :ivar block: the first register of the block, behind a PLC.
     :ivar beyond: the settings of the drive that it does not reach.
     :ivar untold: what a running drive does not tell of itself, by the fields of `DriveStatus`.
     :ivar unmeasured: the same of `Telemetry`.
@@ -86,6 +88,8 @@ class Way:
     model: str = 'sinus_g2'
     dialect: str = ''
     baud_rate: int = 57600
+    method: str = ''
+    block: int = 0
     beyond: frozenset[str] = frozenset()
     untold: frozenset[str] = frozenset()
     unmeasured: frozenset[str] = frozenset()
@@ -103,6 +107,9 @@ class Way:
     @property
     def simulator(self) -> dict[str, str | int]:
         """The settings of a simulated line, as `Simulator` names them."""
+        if self.method == 'telegram1':
+            block = f'1:{self.block}'
+            return {'protocol': self.method, 'model': self.model, 'address': 1, 'block': block}
         settings: dict[str, str | int] = {
             'protocol': self.protocol, 'model': self.model, 'baud': self.baud_rate
         }
@@ -114,6 +121,8 @@ class Way:
         settings: dict[str, str | int] = {
             'protocol': self.protocol, 'model': self.model, 'baud_rate': self.baud_rate
         }
+        if self.method:
+            settings |= {'control_method': self.method, 'block_address': self.block}
         # v2.03 is what a driver takes a drive for that is not said to be older
         return {**settings, 'classic_dialect': 'v5.0'} if self.dialect == '5.0' else settings
 
@@ -212,6 +221,12 @@ WAYS = {
             baud_rate=125_000, beyond=_NOT_ON_MODBUS,
         ),
     )
+}
+#: Through a PLC, by telegram 1, which tells less than any line of the drives themselves: their
+#: tests are their own.
+TELEGRAM1 = {
+    model: Way(f'telegram1_{model}', 'modbus_tcp', frozenset(), model, method='telegram1', block=7)
+    for model in ('sinus_optimal', 'sinus_h', 'sinus_g2')
 }
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.

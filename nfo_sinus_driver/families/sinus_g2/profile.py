@@ -51,6 +51,7 @@ from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words
+from nfo_sinus_driver.families.sinus_g2.telegram1.profile import G2Telegram1
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
@@ -457,7 +458,11 @@ PROFILE = Profile(
     title='NFO Sinus G2',
     status_word=words.STATUS_WORD,
     holders=_HOLDERS,
-    methods={'mode_scmd': ModeScmd, 'drive_control': DriveControl},
+    methods={
+        'mode_scmd': ModeScmd,
+        'drive_control': DriveControl,
+        'telegram1': G2Telegram1,
+    },
     setpoints=_SETPOINTS,
     in_charge=_in_charge,
     # it works even on drives with a serial fault ([M0 §6.1.5], [C9])

@@ -47,6 +47,7 @@ from nfo_sinus_driver.families.sinus_g2.profile import MOST
 from nfo_sinus_driver.families.sinus_g2.profile import STATUS_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import ModeScmd
 from nfo_sinus_driver.families.sinus_optimal import words
+from nfo_sinus_driver.families.sinus_optimal.telegram1.profile import OptimalTelegram1
 from nfo_sinus_driver.families.sinus_optimal.words import Control
 from nfo_sinus_driver.families.sinus_optimal.words import Mode
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
@@ -209,7 +210,11 @@ PROFILE = Profile(
     title='NFO Sinus Optimal',
     status_word=words.STATUS_WORD,
     holders=_HOLDERS,
-    methods={'mode_scmd': ModeSmode, 'drive_control': DriveControl},
+    methods={
+        'mode_scmd': ModeSmode,
+        'drive_control': DriveControl,
+        'telegram1': OptimalTelegram1,
+    },
     setpoints=_SETPOINTS,
     in_charge=_in_charge,
     most=MOST,

@@ -49,6 +49,7 @@ from nfo_sinus_driver.simulator.sinus.serial_side import REFUSALS
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 from nfo_sinus_driver.simulator.sinus.serial_side import SerialSide
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
+from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
 from nfo_sinus_driver.simulator.timing import Timing
 
 
@@ -85,6 +86,8 @@ _CODES = {
     Source.SCMD: _BUS_CODES,
     Source.CONTROL_WORD: _BUS_CODES,
 }
+#: How long the fieldbus module waits for a telegram (s); its master sets it, no manual says.
+FIELDBUS_TIME = 0.2
 _BRAKE_CHOPPER = 26
 _CURRENT_LIMIT = 27
 
@@ -127,6 +130,7 @@ class SinusControlUnit(ControlUnit):
     :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input, so the
         motor starts by itself when that is over; through a fault as ``variant`` says.
     :ivar by_fieldbus: the bus that commands is a fieldbus, to the older firmware [C3].
+    :ivar fieldbus: the telegrams of a fieldbus module, where it has one.
     :ivar variant: what it does where the manuals leave it open.
     :ivar ack_reads: how often 02A4h or E00E8 was read, which acknowledges.
     :ivar sio_err_reads: how often SioErr was read, which clears it and Sio Fail.
@@ -170,6 +174,8 @@ class SinusControlUnit(ControlUnit):
         self.ack_reads = 0
         self.sio_err_reads = 0
         self.mode_ext_writes = 0
+        self.fieldbus = FieldbusWatch()
+        self._telegram: int | None = None
         self._lenient = lenient
         #: Seconds of RunDly left; None while nobody wants to run.
         self._delay_left: float | None = None
@@ -183,6 +189,7 @@ class SinusControlUnit(ControlUnit):
     def restart(self) -> None:
         """Begin as after power-on: nobody commands. Set-points are in the memory and stay."""
         self.initialised = False
+        self._forget_fieldbus()
         self.take(Source.STOP)
 
     def boot(self) -> None:
@@ -317,6 +324,43 @@ class SinusControlUnit(ControlUnit):
         if self.source is Source.KEYPAD:
             self.take(Source.STOP)
 
+    # ---- the fieldbus ----
+
+    def take_telegram(self, word: int, setpoint: int) -> None:
+        """
+        Take a control word, as this family has it, and a set-point by telegram 1.
+
+        The word counts when it changes: who takes control away, at the keypad or by MODE, keeps
+        it until then.
+        """
+        self.fieldbus.heard()
+        self._take_setpoint(setpoint)
+        if word != self._telegram:
+            self._telegram = word
+            with contextlib.suppress(Refused):
+                self._write_control(word)
+        self.settle()
+
+    @abc.abstractmethod
+    def _take_setpoint(self, setpoint: int) -> None:
+        """Take the set-point of a telegram, signed."""
+
+    def _forget_fieldbus(self) -> None:
+        self.fieldbus.forget()
+        self._telegram = None
+
+    def _miss_fieldbus(self) -> None:
+        """Stop where the telegrams have ended: with AutoStop, else it runs on [M0 §5.3.5]."""
+        if self._misses_fieldbus and self.fieldbus.silent_for(FIELDBUS_TIME):
+            self._forget_fieldbus()
+            self.trip(self.faults.fieldbus_lost)
+
+    @property
+    def _misses_fieldbus(self) -> bool:
+        """Whether missing telegrams have a consequence."""
+        commands = self.source is Source.CONTROL_WORD and self.fieldbus.active
+        return commands and bool(self.memory.raw('serial.auto_stop'))
+
     # ---- the line ----
 
     @property
@@ -363,6 +407,8 @@ class SinusControlUnit(ControlUnit):
 
     def wait(self, dt: float) -> None:
         """Let ``dt`` seconds pass, of silence too."""
+        self.fieldbus.wait(dt)
+        self._miss_fieldbus()
         self.serial.advance(dt)
         if self.serial.timed_out:
             self.serial_error(LineError.TIMEOUT)
@@ -373,7 +419,7 @@ class SinusControlUnit(ControlUnit):
     def settled(self) -> bool:
         """Whether nothing happens by the clock alone: no start delay, no watch on silence."""
         watched = self.serial.watches and self.bus_controls
-        return not self._delay_left and not watched
+        return not self._delay_left and not watched and not self._misses_fieldbus
 
     def nameplate(self) -> Nameplate:
         """Return the motor's data as the parameters say."""

@@ -180,9 +180,11 @@ class SinusFaults(Faults):
         super().__init__(model, log_size=log_size, kept=kept)
         #: What a silent or damaged line leads to.
         self.line_lost = lost
+        #: What a fieldbus without telegrams leads to.
+        (self.fieldbus_lost,) = (code.code for code in model.codes(Meaning.FIELDBUS_FAILURE))
         #: Faults of the serial channel: they end fieldbus control, and MODE = Stop acknowledges
         #: them [M0 §6.1.5].
-        self.of_the_line = {lost, *(code.code for code in model.codes(Meaning.FIELDBUS_FAILURE))}
+        self.of_the_line = {lost, self.fieldbus_lost}
         self.sio_err = LineError(0)
 
     @property

@@ -33,7 +33,9 @@ from nfo_sinus_driver.families.sinus_g2.words import Status
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Regulation
+from nfo_sinus_driver.simulator.motor import nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
 from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
@@ -323,6 +325,22 @@ class G2ControlUnit(SinusControlUnit):
         if self.machine.phase is Phase.OPERATION_ENABLED:
             self._dc_brake_left = max(0.0, self._dc_brake_left - dt)
         self.self_restart.wait(dt, driven=self.motor.driven, voltage=self.motor.voltage_on)
+
+    @property
+    def actual(self) -> int:
+        """The actual value of what is regulated, in the counts of its set-point."""
+        key, motor = self.setpoint_key, self.motor
+        values = {
+            'status.frq_set': motor.frequency,
+            'status.spd_set': motor.speed,
+            'status.trq_set': 100 * motor.torque,
+            'status.reg_set': 100 * abs(motor.frequency) / motor.plate.frequency,
+        }
+        parameter = self.memory.model[key]
+        return nearest(parameter, values[key], home(parameter))
+
+    def _take_setpoint(self, setpoint: int) -> None:
+        self.memory.put(self.setpoint_key, setpoint)
 
     @property
     def mode(self) -> int:

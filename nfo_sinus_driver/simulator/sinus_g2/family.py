@@ -30,6 +30,7 @@ from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus_g2 import canopen
 from nfo_sinus_driver.simulator.sinus_g2 import canopen_shape
 from nfo_sinus_driver.simulator.sinus_g2 import classic
+from nfo_sinus_driver.simulator.sinus_g2 import telegram1
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.firmware import DIALECTS
@@ -88,7 +89,12 @@ def _fail_tuning(target: Target, given: dict[str, Any]) -> None:
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
     factory=FACTORY,
-    servers={'modbus': ModbusServer, 'classic': classic.Server, 'canopen': canopen.Server},
+    servers={
+        'modbus': ModbusServer,
+        'classic': classic.Server,
+        'canopen': canopen.Server,
+        'telegram1': telegram1.Server,
+    },
     options=(
         Option(
             'dialect',

@@ -50,6 +50,9 @@ from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 
 #: Codes of the setting control.mode.
 _FREQUENCY, _SPEED = 0, 3
+#: What a telegram carries at 50 Hz or at the nominal speed, and at most [M1, Profinet].
+FULL_TELEGRAM, MOST_OF_TELEGRAM = 8192, 24576
+_FULL_FREQUENCY = 50.0
 #: The largest reference that the manual speaks of: Hz, and nominal speeds [M1, Profinet].
 _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
@@ -73,6 +76,7 @@ class OptimalControlUnit(SinusControlUnit):
         self._steps = ControlSteps()
         self._running = False
         self._sleeping = False
+        self._telegram_setpoint = 0
 
     @property
     def mode(self) -> int:
@@ -217,6 +221,9 @@ class OptimalControlUnit(SinusControlUnit):
     def reference(self) -> float:
         """The reference that is followed in a run, signed (Hz)."""
         plate = self.motor.plate
+        if self._by_telegram:
+            share = min(max(self._telegram_setpoint, -MOST_OF_TELEGRAM), MOST_OF_TELEGRAM)
+            return self.telegram_unit * share
         if self.scmd != Smode.FIELDBUS:
             return plate.frequency * TERMINAL_SHARE
         setpoint = self.memory.number(self.setpoint_key)
@@ -225,6 +232,34 @@ class OptimalControlUnit(SinusControlUnit):
         else:
             most, scale = _MOST_SPEEDS * plate.speed, plate.pole_pairs / 60
         return scale * min(max(setpoint, -most), most)
+
+    @property
+    def _by_telegram(self) -> bool:
+        """Whether the reference comes by telegram, with the control word."""
+        return self.source is Source.CONTROL_WORD and self.fieldbus.active
+
+    @property
+    def telegram_unit(self) -> float:
+        """
+        What one count of a value of the telegram is, as a frequency (Hz) [M1].
+
+        8192 are 50 Hz in Frequency mode, and the nominal speed in Speed mode: that of the
+        manual's example, 1500 rpm for four poles, is the motor's without slip.
+        """
+        by_speed = self.memory.raw('control.mode') == _SPEED
+        full = self.motor.plate.frequency if by_speed else _FULL_FREQUENCY
+        return full / FULL_TELEGRAM
+
+    @property
+    def telegram_actual(self) -> float:
+        """The actual value of the telegram, in its counts, signed."""
+        motor = self.motor
+        by_speed = self.memory.raw('control.mode') == _SPEED
+        turned = motor.speed * motor.plate.pole_pairs / 60 if by_speed else motor.frequency
+        return turned / self.telegram_unit
+
+    def _take_setpoint(self, setpoint: int) -> None:
+        self._telegram_setpoint = setpoint
 
     def _commanded(self) -> bool:
         bus = self.scmd != Smode.STOP or self._steps.run

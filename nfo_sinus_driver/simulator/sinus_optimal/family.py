@@ -24,6 +24,7 @@ from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.modbus import READ_INPUT
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus.control_unit import FACTORY
+from nfo_sinus_driver.simulator.sinus_optimal import telegram1
 from nfo_sinus_driver.simulator.sinus_optimal.control_unit import OptimalControlUnit
 
 #: Settings that need no value of their own: they begin at the least that is allowed.
@@ -55,7 +56,7 @@ FAMILY = SimulatedFamily(
     control_unit=OptimalControlUnit,
     factory=FACTORY,
     machine=_machine,
-    servers={'modbus': ModbusServer},
+    servers={'modbus': ModbusServer, 'telegram1': telegram1.Server},
     options=parts.OPTIONS,
     verbs=parts.VERBS,
 )

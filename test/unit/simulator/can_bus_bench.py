@@ -78,6 +78,7 @@ class Bus:
         self.line = way.wire(
             self.port,
             list(self.drives.values()),
+            (),
             lambda: self.now,
             gateway_timeout=0.0,
             paced=paced,

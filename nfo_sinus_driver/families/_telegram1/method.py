@@ -1,0 +1,206 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Telegram 1 through a PLC or gateway: what is the same in every family [M1, M3, M0 §6.3].
+
+Control word and set-point are written together, and stand in the block of registers of the PLC
+until others do. The status word has what the PLC says of it above ZSW1. Words by which a motor may
+run go on from those before: after a gap in which the PLC may have stopped the drive they are
+refused, so that nothing but an enable lets it run again [C108].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from nfo_sinus_driver.catalog.profile import ControlMethod
+from nfo_sinus_driver.catalog.profile import Hold
+from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import NotPossible
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Refusal
+from nfo_sinus_driver.catalog.profile import Removal
+from nfo_sinus_driver.catalog.profile import SetpointTarget
+from nfo_sinus_driver.catalog.profile import Status
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.status import Fact
+from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import StatusWord
+
+STATUS = 'telegram.status'
+ACTUAL = 'telegram.actual'
+#: STW1 and set-point, by which no motor is let run.
+BEGIN = 'telegram.begin'
+#: Those by which one may, going on from what stands.
+NEXT = 'telegram.next'
+#: Bits of STW1 that are to be cleared.
+CLEAR = 'telegram.clear'
+SETPOINT = 'telegram.setpoint'
+
+#: What the PLC says of the data, above ZSW1.
+VALID = 1 << 16
+RELEASED = 1 << 17
+FAULT_ACK = 1 << 7
+#: How long a fault is given to go while the bit stands that acknowledges it, s.
+_ACKNOWLEDGED_IN = 0.5
+
+NOT_RELEASED = 190
+FAULT = 191
+WARNING = 192
+#: The code of a status that nothing else is to be said of, by its state.
+_BY_STATE: Mapping[State, int] = {state: 200 + state.value for state in State}
+
+
+@dataclass(frozen=True)
+class Words(StatusWord):
+    """
+    What ZSW1 means, with what the PLC says of it above; control is lost with the release.
+
+    :ivar shown: ZSW1 alone.
+    """
+
+    shown: int = 0xFFFF
+
+    def _bits(self, word: int) -> Fact:
+        facts = super()._bits(word)
+        return facts if word & RELEASED else facts & ~Fact.NETWORK_CONTROL
+
+
+def code_of(word: int, state: State, *, fault: int, warning: int = 0) -> int:
+    """Return the code that a status word tells: fault, no release, warning, or its state."""
+    if word & fault:
+        return FAULT
+    if not word & RELEASED:
+        return NOT_RELEASED
+    return WARNING if word & warning else _BY_STATE[state]
+
+
+class Telegram1(ControlMethod):
+    """
+    Control by STW1 and set-point in the block of registers of a PLC.
+
+    :cvar ready: STW1 with which the bus has control and the motor stands.
+    :cvar runs: the bits of it by which the motor runs; a stop clears them.
+    :cvar control: the bit of ZSW1 that confirms control.
+    """
+
+    means = 'telegram 1'
+    references = ('fieldbus',)
+    addressing = 'telegram1'
+    plc_time = 1.0
+    keeps_control = (
+        'without STW1 keypad or terminals would have it, by which the motor could start'
+    )
+    ready: ClassVar[int]
+    runs: ClassVar[int]
+    control: ClassVar[int] = 1 << 9
+
+    def in_control(self) -> Steps[bool]:
+        """Tell whether the bus has control, by us or by whom was here before."""
+        word = int((yield Read(STATUS)))
+        return bool(word & self.control and word & RELEASED)
+
+    def holder(self) -> Steps[Holder]:
+        """Tell who has control of the drive."""
+        return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
+
+    def require_startable(self) -> Steps[None]:
+        """
+        See to it that the PLC lets us command the drive.
+
+        :raises NotPossible: it does not.
+        """
+        if not int((yield Read(STATUS))) & RELEASED:
+            raise NotPossible(
+                'the PLC has not released the drive to ROS (bit 1 of register +3 of its block is '
+                '0): release it in the PLC'
+            )
+
+    def zero_setpoint(self, control_mode: str) -> Steps[None]:
+        """Write set-point 0; the PLC has it with its answer. Refused where no STW1 stands."""
+        yield Write(SETPOINT, 0.0)
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """
+        Clear the run bits of what stands, and the set-point with them, in one telegram.
+
+        Where none of ours stands, who has control stays as it is, and a drive that the bus has
+        keeps it.
+        """
+        try:
+            yield Write(CLEAR, self.runs | FAULT_ACK, once=True)
+        except Refusal:
+            word = int((yield Read(STATUS, once=True)))
+            if word & self.control and word & RELEASED:
+                yield begin(self.standing(word), once=True)
+
+    def standing(self, word: int) -> int:
+        """Return STW1 by which a drive with this status stops as usual, and keeps control."""
+        return self.ready
+
+    def release(self) -> Steps[None]:
+        """Leave the drive ready, under control of the bus; it stands, or its ramp ends first."""
+        if (yield from self.in_control()):
+            yield begin(self.standing(int((yield Read(STATUS)))))
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Remove run bits and set-point."""
+        yield from self.stop(control_mode)
+        return Removal.COMMAND
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """
+        Acknowledge a fault by one edge of bit 7, the run bits clear, and set-point 0.
+
+        The bit stands until the fault is gone, for a while, so that the drive has seen it.
+
+        :raises NotPossible: the PLC does not let us command the drive.
+        """
+        yield from self.require_startable()
+        yield begin(self.ready)
+        yield begin(self.ready | FAULT_ACK)
+        yield Hold(self._without_fault, _ACKNOWLEDGED_IN)
+        yield begin(self.ready)
+        return ''
+
+    @staticmethod
+    def _without_fault(status: Status) -> bool:
+        return status.state not in (State.FAULTED, State.FAULT_REACTION_ACTIVE)
+
+
+def begin(word: int, *, once: bool = False) -> Write:
+    """Return what writes STW1 by which no motor is let run, and set-point 0."""
+    return Write(BEGIN, word << 16, once=once)
+
+
+def following(word: int, *, once: bool = False) -> Write:
+    """Return what writes STW1 that goes on from the one before, and set-point 0."""
+    return Write(NEXT, word << 16, once=once)
+
+
+def in_charge(status: Status | None) -> Steps[str]:
+    """Return the control method, of which there is one behind a PLC."""
+    yield from ()
+    return 'telegram1'
+
+
+def setpoints(most: float, *, forward_only: bool = False) -> Mapping[str, SetpointTarget]:
+    """Return where set-points go; which control mode it is the telegram does not tell."""
+    return {'Freque': SetpointTarget(SETPOINT, most, forward_only=forward_only)}

@@ -1,0 +1,87 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+How an Optimal is commanded by telegram 1, through a PLC [M1].
+
+PLC control, then Enable, then Switch on, each once ZSW1 has confirmed the one before. A stop takes
+Switch on away, and the motor ramps; Enable taken away would release it [C109].
+"""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Steps
+from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.status import Role
+from nfo_sinus_driver.families._telegram1 import method
+from nfo_sinus_driver.families._telegram1.method import Telegram1
+from nfo_sinus_driver.families._telegram1.method import Words
+from nfo_sinus_driver.families.sinus_optimal.words import STATUS_WORD
+from nfo_sinus_driver.families.sinus_optimal.words import Status
+from nfo_sinus_driver.families.sinus_optimal.words import state_of
+
+_PLC_CONTROL = 1 << 10
+_ENABLE = 1 << 3
+_SWITCH_ON = 1 << 0
+#: The motor is driven, be it to a stop.
+_DRIVEN = Status.SWITCHED_ON | Status.STOPPING
+
+
+class OptimalTelegram1(Telegram1):
+    """Control by telegram 1; it has no quick stop [C96]."""
+
+    ready = _PLC_CONTROL
+    runs = _SWITCH_ON
+
+    def take_control(self) -> Steps[None]:
+        """Have PLC control, without Switch on; a motor that still ramps keeps Enable."""
+        yield method.begin(self.standing(int((yield Read(method.STATUS)))))
+        yield Until(lambda status: bool((status.word or 0) & self.control))
+
+    def run(self) -> Steps[None]:
+        """Enable, then switch on, when the drive shows that it is enabled."""
+        yield method.following(self.ready | _ENABLE)
+        yield Until(lambda status: bool((status.word or 0) & Status.ENABLED))
+        yield method.following(self.ready | _ENABLE | _SWITCH_ON, once=True)
+
+    def standing(self, word: int) -> int:
+        """Return the word that keeps Enable where the motor is driven, so that it ramps."""
+        return self.ready | _ENABLE if word & _DRIVEN else self.ready
+
+
+PROFILE = Profile(
+    title='NFO Sinus Optimal',
+    status_word=Words(
+        state=lambda word: state_of(word & 0xFFFF),
+        by_bit=STATUS_WORD.by_bit,
+        by_state=STATUS_WORD.by_state,
+        stateless=True,
+        code=lambda word: method.code_of(
+            word,
+            state_of(word & 0xFFFF),
+            fault=Status.FAULT_ACTIVE,
+            warning=Status.ALARM_ACTIVE,
+        ),
+    ),
+    holders={},
+    methods={'telegram1': OptimalTelegram1},
+    setpoints=method.setpoints(150.0),
+    in_charge=method.in_charge,
+    writes_and_reads=True,
+    # a tenth above what a set-point may be, for a motor may be overhauled
+    most={Role.ACTUAL_FREQUENCY: 165.0},
+)

@@ -1,0 +1,290 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Telegram 1 behind a PLC or gateway: a block of registers, one telegram each way.
+
+The PLC is the controller of the drive on its fieldbus and shows the driver a block of its own
+holding registers, five to be read and three to be written. Every transaction carries all of them
+(function 23, or 16 and 03 where that is refused), so that what is told and what is commanded are of
+one moment, and a life counter each way says who is alive.
+
+What is written goes out with every transaction from then on: our counter moves while the driver
+lives, and so the PLC knows that the command words are meant still. After so long without it as
+:data:`PLC_TIME` the PLC stops the drive, and would let it go on at the next word that moves the
+counter [C108]. So words that let a motor run are forgotten after such a gap, or with the
+connection; nothing is written then until somebody begins anew. Before anybody has, it is only read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import struct
+import time
+from typing import TypeVar
+
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Interrupted
+from nfo_sinus_driver.link.interface import LinkError
+from nfo_sinus_driver.link.interface import NoData
+from nfo_sinus_driver.link.interface import NoPath
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.modbus_pdu import Read
+from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+
+_T = TypeVar('_T')
+
+#: How parameters are addressed that stand in a block, and their space; the index is where the block
+#: begins, and the sub-index which part of it is meant, as follows.
+ADDRESSING = 'telegram1'
+#: To be read: ZSW1, and in the higher word what the PLC says of it, bit 0: valid, 1: released.
+STATUS = 0
+#: The actual value.
+ACTUAL = 1
+#: To be written: STW1 and the set-point, by which no motor is let run. It is written whatever was
+#: before.
+BEGIN = 2
+#: The same, by which one may run: it goes on from the words before, and is refused after a gap.
+NEXT = 3
+#: Which bits of the STW1 that stands are to be cleared, so that no motor is let run, and the
+#: set-point with them; refused where none stands.
+CLEAR = 4
+#: The set-point alone; refused where no STW1 stands.
+SETPOINT = 5
+
+#: Without a new count from us for so long the PLC stops the drive, s.
+PLC_TIME = 1.0
+#: Of the block.
+LAYOUT_VERSION = 1
+#: From where on the driver writes.
+WRITTEN_FROM = 8
+
+_TOLD = struct.Struct('>5H')
+_COMMANDED = struct.Struct('>3H')
+_VALID = 1 << 0
+_NOTHING_STANDS = (
+    'no control word of this driver stands in the block: it has not been written yet, or the PLC '
+    f'was not reached for longer than its time, {PLC_TIME:g} s; enable again'
+)
+
+Ask = Callable[[Request[_T]], tuple[_T, float]]
+#: What is written, and where.
+_Written = tuple[Address, bytes]
+#: The five registers, and a moment.
+_Told = tuple[tuple[int, ...], float]
+
+
+class Block:
+    """
+    One block: what stands in it, and how old that is.
+
+    :param ask: sends a request of Modbus; returns its answer and when that came.
+    :param unit: who has it.
+    :param start: its first register.
+    """
+
+    def __init__(self, ask: Ask[bytes], unit: int, start: int) -> None:
+        self._ask = ask
+        self._unit = unit
+        self._start = start
+        #: STW1 and set-point as they are written with every transaction; ``None``: nothing is.
+        self._command: tuple[int, int] | None = None
+        #: They may let a motor run.
+        self._live = False
+        #: When the last transaction with them began that was answered.
+        self._sent_at = 0.0
+        self._count = 0
+        #: The PLC's life counter, and when it was first seen.
+        self._life: int | None = None
+        self._life_at = 0.0
+        #: The layout was looked at.
+        self._known = False
+        #: Function 23 was refused.
+        self._apart = False
+
+    def forget(self) -> None:
+        """Write no words any more that may let a motor run; the connection is another one."""
+        self._known = False
+        if self._live:
+            self._command, self._live = None, False
+
+    def read(self, address: Address) -> Reply:
+        """Read a part of it; arrived has it when the PLC first had it from the drive."""
+        told, arrived = self._exchange()
+        return Reply(self._part(told, address), arrived)
+
+    def write(self, address: Address, data: bytes) -> Reply:
+        """Write a part of it."""
+        _, arrived = self._exchange((address, data))
+        return Reply(b'', arrived)
+
+    def write_and_read(self, address: Address, data: bytes, source: Address) -> Reply:
+        """Write a part of it and read another; nothing where the PLC has no valid data."""
+        told, arrived = self._exchange((address, data))
+        try:
+            return Reply(self._part(told, source), arrived)
+        except NoData:
+            # it was written all the same
+            return Reply(b'', arrived)
+
+    def _part(self, told: tuple[int, ...], address: Address) -> bytes:
+        word, actual, _, flags, _ = told
+        if not flags & _VALID:
+            raise NoData(
+                f'the PLC has no valid data from the drive (bit 0 of register {self._start + 3} of '
+                f'unit {self._unit} is 0): check the fieldbus between them and that the drive has '
+                'power'
+            )
+        return struct.pack('>HH', word, flags) if address.sub_index == STATUS else _word(actual)
+
+    def _exchange(self, write: _Written | None = None) -> _Told:
+        """Carry out a transaction; return the five registers, and since when they were seen."""
+        began = time.monotonic()
+        if self._live and began - self._sent_at > PLC_TIME:
+            self._command, self._live = None, False
+            if write is None or write[0].sub_index != BEGIN:
+                raise self._interrupted(began - self._sent_at, maybe_done=False)
+        if write is None and self._command is None:
+            return self._look()
+        if not self._known:
+            # nothing is written to registers that may be something else
+            self._look()
+            began = time.monotonic()
+        command, live = self._command_after(write)
+        # it may be carried out even if no answer comes
+        before = self._sent_at, self._live, self._command
+        last, was_live, _ = before
+        self._command, self._live = command, live
+        if live and not was_live:
+            last = self._sent_at = began
+        self._count = self._count % 0xFFFF + 1
+        try:
+            told, arrived = self._send(_COMMANDED.pack(*command, self._count))
+        except (Refused, NoPath):
+            if live:
+                # what was refused is not written again with the next transaction
+                self._sent_at, self._live, self._command = before
+            raise
+        self._sent_at = began
+        if live and arrived - last > PLC_TIME:
+            # the PLC may have stopped the drive before it came, and let it go on now
+            self._command, self._live = None, False
+            raise self._interrupted(arrived - last, maybe_done=True)
+        return self._take(told, arrived)
+
+    def _command_after(self, write: _Written | None) -> tuple[tuple[int, int], bool]:
+        """Return STW1 and set-point as they shall be, and whether a motor may run by them."""
+        if write is None:
+            assert self._command is not None
+            return self._command, self._live
+        address, data = write
+        part = address.sub_index
+        if part == BEGIN or (part == NEXT and self._command is not None):
+            word, setpoint = struct.unpack('>HH', data)
+            return (word, setpoint), part == NEXT
+        if self._command is None:
+            raise Refused(Refused.DEVICE_FAILURE, _NOTHING_STANDS)
+        word, _ = self._command
+        value = int.from_bytes(data, 'big')
+        if part == CLEAR:
+            return (word & ~value, 0), False
+        assert part == SETPOINT, part
+        return (word, value), self._live
+
+    def _look(self) -> _Told:
+        """Only read."""
+        try:
+            data, arrived = self._ask(Read(self._unit, self._start, 5))
+        except Refused as refusal:
+            raise self._of_block(refusal) from None
+        return self._take(_TOLD.unpack(data), arrived)
+
+    def _send(self, data: bytes) -> _Told:
+        """Write and read."""
+        at = self._start + WRITTEN_FROM
+        try:
+            if not self._apart:
+                request = WriteAndRead(self._unit, at, data, self._start, 5)
+                try:
+                    answer, arrived = self._ask(request)
+                    return _TOLD.unpack(answer), arrived
+                except Refused as refusal:
+                    if refusal.code != Refused.ILLEGAL_FUNCTION:
+                        raise
+                    self._apart = True
+            self._ask(Write(self._unit, at, data))
+            try:
+                answer, arrived = self._ask(Read(self._unit, self._start, 5))
+            except LinkError as error:
+                error.maybe_done = True
+                raise
+            return _TOLD.unpack(answer), arrived
+        except Refused as refusal:
+            raise self._of_block(refusal) from None
+
+    def _take(self, told: tuple[int, ...], arrived: float) -> _Told:
+        version = told[4]
+        self._known = version == LAYOUT_VERSION
+        if not self._known:
+            raise NoPath(
+                f'register {self._start + 4} of unit {self._unit} is {version} and not '
+                f'{LAYOUT_VERSION}, the version of the layout of the block: check block_address, '
+                'and that the program of the PLC is that of docs/telegram1.md'
+            )
+        if told[2] != self._life:
+            self._life, self._life_at = told[2], arrived
+        return told, self._life_at
+
+    def _of_block(self, refusal: Refused) -> LinkError:
+        if refusal.code != Refused.ILLEGAL_ADDRESS:
+            return refusal
+        return NoPath(
+            f'unit {self._unit} has no registers {self._start} to {self._start + 10} '
+            f'(exception {refusal.code}): check block_address, and the program of the PLC'
+        )
+
+    def _interrupted(self, seconds: float, *, maybe_done: bool) -> Interrupted:
+        error = Interrupted(
+            f'the PLC was not reached for {seconds:.1f} s, and stops the drive after {PLC_TIME:g} s'
+        )
+        error.maybe_done = maybe_done
+        return error
+
+
+class Blocks:
+    """The blocks of one line, by unit and first register."""
+
+    def __init__(self, ask: Ask[bytes]) -> None:
+        self._ask = ask
+        self._blocks: dict[tuple[int, int], Block] = {}
+
+    def __call__(self, unit: int, address: Address) -> Block:
+        """Return the block that a parameter stands in."""
+        place = unit, address.index
+        if place not in self._blocks:
+            self._blocks[place] = Block(self._ask, *place)
+        return self._blocks[place]
+
+    def forget(self) -> None:
+        """Take note that the connection is another one."""
+        for block in self._blocks.values():
+            block.forget()
+
+
+def _word(value: int) -> bytes:
+    return value.to_bytes(2, 'big')

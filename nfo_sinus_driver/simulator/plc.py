@@ -1,0 +1,289 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A PLC between a master on Modbus TCP and drives on its fieldbus, which speak telegram 1.
+
+It runs the program of :mod:`plc_program` in cycles, and exchanges telegrams with the drives in
+another rhythm. Modbus requests come in between; the registers are there for them all the time,
+whatever became of the drives. It is told the time, as everything here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field
+import random
+from typing import Any
+
+from nfo_sinus_driver.simulator import modbus
+from nfo_sinus_driver.simulator import telegram1
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.plc_program import FIRST_WRITTEN
+from nfo_sinus_driver.simulator.plc_program import REGISTERS
+from nfo_sinus_driver.simulator.plc_program import Block
+from nfo_sinus_driver.simulator.plc_program import RosTelegram1
+from nfo_sinus_driver.simulator.timing import Timing
+
+#: The name of the telegram in the tables of the families.
+TELEGRAM = 'telegram1'
+_UNITS = range(1, 248)
+_LAST_REGISTER = 0xFFFF
+
+
+@dataclass(frozen=True)
+class PlcSetting:
+    """
+    How a PLC is programmed.
+
+    :ivar blocks: unit and first register of the block of each drive, in the order of the drives;
+        by default the drive's address, and 0.
+    :ivar cycle: of its program (s).
+    :ivar exchange: from one telegram with a drive to the next (s).
+    :ivar ros_time: how long the driver's life counter may stand still (s).
+    :ivar drive_time: how long no exchange with the drive may come (s).
+    :ivar answer_time: the least and the longest time that an answer takes (s).
+    :ivar write_and_read: it has function 23.
+    :ivar released: the drives are released to ROS.
+    :raises ValueError: a time or a block that cannot be.
+    """
+
+    blocks: Sequence[tuple[int, int]] = ()
+    cycle: float = 0.01
+    exchange: float = 0.02
+    ros_time: float = 1.0
+    drive_time: float = 0.5
+    answer_time: tuple[float, float] = (0.0, 0.0)
+    write_and_read: bool = True
+    released: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ('cycle', 'exchange', 'ros_time', 'drive_time'):
+            if not getattr(self, name) > 0:
+                raise ValueError(f'{name} = {getattr(self, name):g} s is not possible')
+        low, high = self.answer_time
+        if not 0 <= low <= high:
+            raise ValueError(f'an answer takes {low:g} to {high:g} s: the lesser time goes first')
+        taken: set[tuple[int, int]] = set()
+        for unit, register in self.blocks:
+            if unit not in _UNITS or not 0 <= register <= _LAST_REGISTER + 1 - REGISTERS:
+                raise ValueError(f'no block can be at unit {unit}, register {register}')
+            registers = {(unit, register + offset) for offset in range(REGISTERS)}
+            if registers & taken:
+                raise ValueError(f'the block at unit {unit}, register {register} is over another')
+            taken |= registers
+
+
+@dataclass
+class Channel:
+    """
+    One drive on the fieldbus of the PLC, and its block.
+
+    :ivar register: the first of the block.
+    :ivar cut_until: until when the fieldbus does not reach the drive (s).
+    """
+
+    drive: SimulatedDrive
+    server: telegram1.Server
+    unit: int
+    register: int
+    block: Block
+    program: RosTelegram1
+    released: bool
+    zsw1: int = 0
+    actual: int = 0
+    exchanged: bool = False
+    cut_until: float = field(default=float('-inf'))
+
+    def exchange(self, now: float) -> None:
+        """Exchange a telegram with the drive, if it is reached."""
+        self.drive.advance_to(now)
+        if now < self.cut_until or not self.drive.listening or not self.server.online:
+            return
+        program = self.program
+        self.zsw1, self.actual = self.server.exchange(program.stw1, program.setpoint)
+        self.exchanged = True
+
+    def run(self) -> None:
+        """Run the program once."""
+        self.program(self.block, self.zsw1, self.actual, self.exchanged, self.released)
+        self.exchanged = False
+
+    def describe(self) -> dict[str, Any]:
+        """Return what stands in the block, and what the program says; it can be JSON."""
+        return {
+            'unit': self.unit,
+            'register': self.register,
+            'block': list(self.block.registers()),
+            'stw1': self.program.stw1,
+            'setpoint': self.program.setpoint,
+            'ros_alive': self.program.ros_alive,
+        }
+
+
+class Plc:
+    """
+    A PLC with a drive for each block.
+
+    :param drives: those on its fieldbus.
+    :raises ValueError: not a block for each drive, or a drive without this telegram.
+
+    :ivar channels: by the addresses that the drives began with.
+    :ivar stopped_until: until when its program stands (s).
+    """
+
+    def __init__(self, drives: Mapping[int, SimulatedDrive], setting: PlcSetting) -> None:
+        if setting.blocks and len(setting.blocks) != len(drives):
+            raise ValueError(f'{len(setting.blocks)} blocks for {len(drives)} drives')
+        blocks = setting.blocks or [(address, 0) for address in drives]
+        self.setting = setting
+        self.stopped_until = float('-inf')
+        self._now = 0.0
+        self._next_cycle: float | None = None
+        self._next_exchange = 0.0
+        self._chance = random.Random(0)
+        self.channels = {
+            address: self._channel(drive, *block)
+            for (address, drive), block in zip(drives.items(), blocks, strict=True)
+        }
+
+    def _channel(self, drive: SimulatedDrive, unit: int, register: int) -> Channel:
+        server = drive.servers.get(TELEGRAM)
+        if not isinstance(server, telegram1.Server):
+            raise ValueError(f'{drive.model.name} does not speak {TELEGRAM}')
+        program = RosTelegram1(
+            lambda: self._now,
+            lost_clears=server.lost_clears,
+            lost_sets=server.lost_sets,
+            ros_time=self.setting.ros_time,
+            drive_time=self.setting.drive_time,
+        )
+        released = self.setting.released
+        return Channel(drive, server, unit, register, Block(), program, released)
+
+    @property
+    def units(self) -> list[Unit]:
+        """The units that it is to its master."""
+        return [Unit(self, unit) for unit in sorted({one.unit for one in self.channels.values()})]
+
+    @property
+    def answer_time(self) -> float:
+        """How long the next answer takes (s)."""
+        return self._chance.uniform(*self.setting.answer_time)
+
+    def advance_to(self, now: float) -> None:
+        """Run cycles and exchange telegrams until now (s); the first call only sets the clock."""
+        if self._next_cycle is None:
+            self._next_cycle = self._next_exchange = now
+            for channel in self.channels.values():
+                channel.drive.advance_to(now)
+        while min(self._next_cycle, self._next_exchange) <= now:
+            if self._next_exchange <= self._next_cycle:
+                self._now = self._next_exchange
+                self._next_exchange += self.setting.exchange
+                if self._runs:
+                    for channel in self.channels.values():
+                        channel.exchange(self._now)
+            else:
+                self._now = self._next_cycle
+                self._next_cycle += self.setting.cycle
+                if self._runs:
+                    for channel in self.channels.values():
+                        channel.run()
+        for channel in self.channels.values():
+            channel.drive.advance_to(now)
+
+    @property
+    def _runs(self) -> bool:
+        return self._now >= self.stopped_until
+
+
+class Unit:
+    """
+    One unit of a PLC, as it stands at a line.
+
+    :ivar address: its number.
+    :ivar servers: what answers its requests.
+    :ivar listening: a PLC always is.
+    """
+
+    listening = True
+
+    def __init__(self, plc: Plc, address: int) -> None:
+        self._plc = plc
+        self.address = address
+        self.servers: Mapping[str, object] = {'modbus': Registers(plc, address)}
+
+    @property
+    def response_time(self) -> float:
+        """How long it waits before it answers (s)."""
+        return self._plc.answer_time
+
+    @staticmethod
+    def hears(protocol: str, timing: Timing) -> bool:
+        """Whether it is set to a line: there is nothing to set."""
+        return True
+
+    @staticmethod
+    def heard() -> None:
+        """Take note of a frame; it tells a PLC nothing, its program watches the life counter."""
+
+    def advance_to(self, now: float) -> None:
+        """Catch up with the caller's clock (s)."""
+        self._plc.advance_to(now)
+
+
+class Registers(modbus.Requests):
+    """The holding registers of one unit: its blocks, of which the driver writes the end alone."""
+
+    functions = frozenset((modbus.READ, modbus.WRITE_MULTIPLE, modbus.WRITE_AND_READ))
+
+    def __init__(self, plc: Plc, unit: int) -> None:
+        self._refused = () if plc.setting.write_and_read else (modbus.WRITE_AND_READ,)
+        self._channels = [one for one in plc.channels.values() if one.unit == unit]
+
+    def treats(self, function: int) -> str:
+        """Return how a function is treated."""
+        return modbus.REFUSED if function in self._refused else super().treats(function)
+
+    def read(self, register: int, count: int) -> tuple[int, ...]:
+        """Return registers of a block (Refused: ADDRESS)."""
+        channel, offset = self._find(register, count)
+        return channel.block.registers()[offset : offset + count]
+
+    def write(self, register: int, words: Sequence[int]) -> None:
+        """Write registers that are the driver's (Refused: ADDRESS)."""
+        channel, offset = self._find(register, len(words))
+        if offset < FIRST_WRITTEN:
+            raise Refused(Reason.ADDRESS, f'the PLC writes register {register} itself')
+        channel.block.put(offset, tuple(words))
+
+    def write_and_read(
+        self, register: int, words: Sequence[int], source: int, count: int
+    ) -> tuple[int, ...]:
+        """Write, then read; or none of both."""
+        self._find(source, count)
+        self.write(register, words)
+        return self.read(source, count)
+
+    def _find(self, register: int, count: int) -> tuple[Channel, int]:
+        for channel in self._channels:
+            offset = register - channel.register
+            if offset in range(REGISTERS + 1 - count):
+                return channel, offset
+        raise Refused(Reason.ADDRESS, f'no block has {count} registers at {register}')

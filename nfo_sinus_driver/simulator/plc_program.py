@@ -1,0 +1,180 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The program of the PLC between ROS and the drives, the same as ``config/telegram1/`` has it.
+
+What is shipped is Structured Text; a test compares it with this file statement by statement. So
+the body of :class:`RosTelegram1` is written as that language can say it: assignments, IF, calls of
+timers, and nothing else. It knows no clock of its own: a PLC tells it the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import struct
+
+#: How the registers of a block make its fields: words, and two signed numbers.
+_LAYOUT = struct.Struct('>HhHHH6xHhH')
+#: Registers of a block, and the first of those that the driver writes.
+REGISTERS, FIRST_WRITTEN = 11, 8
+
+
+@dataclass
+class Block:
+    """
+    The registers that the driver and the PLC share, for one drive.
+
+    :ivar zsw1: +0, status word 1 from the drive.
+    :ivar actual: +1, its actual value.
+    :ivar plc_life: +2, changes with every exchange with the drive.
+    :ivar flags: +3, bit 0 the data are valid, bit 1 released to ROS.
+    :ivar version: +4, of this layout.
+    :ivar stw1: +8, control word 1 from the driver.
+    :ivar setpoint: +9, its set-point.
+    :ivar ros_life: +10, changes while the driver lives.
+    """
+
+    zsw1: int = 0
+    actual: int = 0
+    plc_life: int = 0
+    flags: int = 0
+    version: int = 0
+    stw1: int = 0
+    setpoint: int = 0
+    ros_life: int = 0
+
+    def registers(self) -> tuple[int, ...]:
+        """Return the block as it stands in holding registers."""
+        fields = (self.zsw1, self.actual, self.plc_life, self.flags, self.version)
+        data = _LAYOUT.pack(*fields, self.stw1, self.setpoint, self.ros_life)
+        return struct.unpack(f'>{REGISTERS}H', data)
+
+    def put(self, offset: int, words: tuple[int, ...]) -> None:
+        """Set registers from ``offset`` on, as a Modbus master does."""
+        registers = list(self.registers())
+        registers[offset : offset + len(words)] = words
+        fields = _LAYOUT.unpack(struct.pack(f'>{REGISTERS}H', *registers))
+        self.zsw1, self.actual, self.plc_life, self.flags, self.version = fields[:5]
+        self.stw1, self.setpoint, self.ros_life = fields[5:]
+
+
+class Ton:
+    """
+    The timer TON of IEC 61131-3: ``q`` once its input has been true for the preset time.
+
+    :param clock: tells the time (s).
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._since: float | None = None
+        self.q = False
+
+    def __call__(self, input_: bool, preset: float) -> None:
+        """Take the input, with the preset time (s)."""
+        now = self._clock()
+        if not input_:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        # a clock that counts fractions is never exactly at the preset
+        self.q = self._since is not None and now - self._since >= preset - 1e-9
+
+
+class RosTelegram1:
+    """
+    The function block ``FB_RosTelegram1``: one drive, called once in every cycle of the PLC.
+
+    :param clock: tells the time (s).
+    :param lost_clears: bits of STW1 that are cleared while ROS is lost or has no release.
+    :param lost_sets: bits that are set then, without which the drive would not obey.
+    :param ros_time: how long the driver's life counter may stand still (s).
+    :param drive_time: how long no exchange with the drive may come (s).
+
+    :ivar stw1: for the drive.
+    :ivar setpoint: for the drive.
+    :ivar ros_alive: the driver's life counter has moved within its time.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        *,
+        lost_clears: int = 0x0001,
+        lost_sets: int = 0x0000,
+        ros_time: float = 1.0,
+        drive_time: float = 0.5,
+    ) -> None:
+        # VAR_INPUT with initial values
+        self.lost_clears = lost_clears
+        self.lost_sets = lost_sets
+        self.ros_time = ros_time
+        self.drive_time = drive_time
+        # VAR_OUTPUT
+        self.stw1 = 0
+        self.setpoint = 0
+        self.ros_alive = False
+        # VAR
+        self.started = False
+        self.seen_life = 0
+        self.drive_heard = False
+        self.new_flags = 0
+        self.ros_still = Ton(clock)
+        self.drive_silent = Ton(clock)
+
+    def __call__(
+        self, block: Block, zsw1: int, actual: int, exchanged: bool, release: bool
+    ) -> None:
+        """
+        Run once.
+
+        :param block: the registers.
+        :param zsw1: status word 1 from the drive.
+        :param actual: its actual value.
+        :param exchanged: both came from the drive since the last call.
+        :param release: ROS may control the drive.
+        """
+        self.drive_silent(not exchanged, self.drive_time)
+        if exchanged:
+            block.zsw1 = zsw1
+            block.actual = actual
+            self.drive_heard = True
+            if block.plc_life == 65535:
+                block.plc_life = 0
+            else:
+                block.plc_life = block.plc_life + 1
+        elif self.drive_silent.q:
+            self.drive_heard = False
+        self.new_flags = 0x0000
+        if self.drive_heard:
+            self.new_flags = self.new_flags | 0x0001
+        if release:
+            self.new_flags = self.new_flags | 0x0002
+        block.flags = self.new_flags
+        block.version = 1
+        self.ros_still(block.ros_life == self.seen_life, self.ros_time)
+        if not self.started:
+            self.started = True
+        elif block.ros_life != self.seen_life:
+            self.ros_alive = True
+        elif self.ros_still.q:
+            self.ros_alive = False
+        self.seen_life = block.ros_life
+        if not (self.ros_alive and release):
+            block.stw1 = (block.stw1 & ~self.lost_clears) | self.lost_sets
+            block.setpoint = 0
+        self.stw1 = block.stw1
+        self.setpoint = block.setpoint

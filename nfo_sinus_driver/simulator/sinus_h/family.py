@@ -1,0 +1,70 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the simulator has to know of a Sinus H."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nfo_sinus_driver.simulator.family import Option
+from nfo_sinus_driver.simulator.family import SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Argument
+from nfo_sinus_driver.simulator.injections import Target
+from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.sinus_h import keypad
+from nfo_sinus_driver.simulator.sinus_h.control_unit import CHOICES
+from nfo_sinus_driver.simulator.sinus_h.control_unit import KEYS
+from nfo_sinus_driver.simulator.sinus_h.control_unit import SinusHControlUnit
+from nfo_sinus_driver.simulator.sinus_h.telegram1 import Server
+
+
+def _press(target: Target, given: dict[str, Any]) -> None:
+    unit = target.one.control_unit
+    assert isinstance(unit, SinusHControlUnit)
+    unit.press(given['key'])
+
+
+FAMILY = SimulatedFamily(
+    control_unit=SinusHControlUnit,
+    factory=keypad.FACTORY,
+    machine=keypad.with_keypad,
+    servers={'telegram1': Server},
+    options=(
+        Option(
+            'unlisted_exits',
+            'of the Sinus H: exits of its states that the manual does not list (default: none)',
+            CHOICES['unlisted_exits'],
+        ),
+        Option(
+            'echo_bits',
+            'of the Sinus H: bits 1 and 2 of ZSW1 tell the state, or those of the control word '
+            '(default: state)',
+            CHOICES['echo_bits'],
+        ),
+        Option(
+            'keypad_stop',
+            'of the Sinus H: what STOP at the keypad does while the fieldbus commands '
+            '(default: stops)',
+            CHOICES['keypad_stop'],
+        ),
+    ),
+    verbs={
+        'keypad': Verb(
+            'press a key: start and stop of the keypad, reset of a fault',
+            _press,
+            (Argument('key', str, 'start, stop or reset', choices=KEYS),),
+        ),
+    },
+)

@@ -1,0 +1,49 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Telegram 1 as the PROFINET module of a Sinus H takes it [M3 §7.1]."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.simulator import telegram1
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.sinus_h import keypad
+from nfo_sinus_driver.simulator.sinus_h.control_unit import SinusHControlUnit
+from nfo_sinus_driver.simulator.sinus_h.state_machine import Control
+from nfo_sinus_driver.simulator.telegram1 import clipped
+
+
+class Server(telegram1.Server):
+    """
+    The fieldbus side of one Sinus H.
+
+    With bit 0 clear alone it would stay in operation, and with bit 10 clear nothing counts [C107].
+    """
+
+    lost_clears = int(Control.ON | Control.NO_QUICK_STOP)
+    lost_sets = int(Control.CONTROL_BY_PLC)
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, SinusHControlUnit)
+        self._unit = drive.control_unit
+
+    @property
+    def online(self) -> bool:
+        """Whether the module is set to the standard telegram (COM-22)."""
+        return self._unit.memory.raw(keypad.TELEGRAM) == keypad.STANDARD_TELEGRAM
+
+    def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
+        """Take control word and set-point; return status word and actual value."""
+        self._unit.take_telegram(Control(stw1), setpoint)
+        return int(self._unit.status_word), clipped(self._unit.actual)

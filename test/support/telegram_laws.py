@@ -1,0 +1,199 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Judges the control words in the block of a PLC, by the tables of the manuals and nothing else.
+
+It knows no profile: which bit may come when is written down here once more, as [M1], [M3 §6, §7.2]
+and [M0 tables 14 to 16] print it, with [C107] and [C109].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Iterator
+from collections.abc import Mapping
+import dataclasses
+import struct
+from typing import Any
+
+#: How long the driver's count may stand still for the PLC, s [C108].
+PLC_TIME = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Exchange:
+    """What was written in one transaction, and what had been read before it: ZSW1, flags."""
+
+    stw1: int
+    setpoint: int
+    life: int
+    zsw1: int | None
+    flags: int
+
+
+def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) -> Iterator[Exchange]:
+    """Return what was written to a block, from the frames of a trace on Modbus TCP."""
+    zsw1, flags = None, 0
+    #: What is on its way: whether the block is read, and what is written.
+    asked: dict[bytes, tuple[bool, Exchange | None]] = {}
+    for frame in frames:
+        data = bytes.fromhex(frame['hex'])
+        if len(data) < 8 or data[6] != unit:
+            continue
+        number, function = data[:2], data[7]
+        if frame['direction'] == 'request':
+            # of what was not answered nobody knows
+            for _, unanswered in asked.values():
+                if unanswered is not None:
+                    yield unanswered
+            words = struct.unpack_from('>HH', data, 8) if function in (3, 16, 23) else ()
+            at = {
+                23: 17 if function == 23 and struct.unpack_from('>HH', data, 12) == (start + 8, 3)
+                else 0,
+                16: 13 if words == (start + 8, 3) else 0,
+            }.get(function, 0)
+            assert at or function in (3, 43, 17), f'function {function} at a block'
+            written = Exchange(*struct.unpack_from('>3H', data, at), zsw1, flags) if at else None
+            asked = {number: (function in (3, 23) and words == (start, 5), written)}
+        elif number in asked:
+            reads, written = asked.pop(number)
+            if function & 0x80:
+                continue
+            if written is not None:
+                yield written
+            if reads:
+                zsw1, _, _, flags, version = struct.unpack_from('>5H', data, 9)
+                assert version == 1
+
+
+class Judge:
+    """Hears the words to one drive, one after another; complains of what the tables forbid."""
+
+    #: Bits of STW1 that mean something, and of ZSW1: control.
+    known: int
+    run: int
+    control = 1 << 9
+
+    def __init__(self) -> None:
+        self._before: Exchange | None = None
+
+    def complaints(self, now: Exchange) -> Iterator[str]:
+        """Take what was written; yield what is wrong with it."""
+        before, self._before = self._before, now
+        shown = f'STW1 {now.stw1:04X}h after ZSW1 {now.zsw1 or 0:04X}h'
+        if now.zsw1 is None:
+            yield f'{shown}: written before anything was read'
+            return
+        if before is not None and now.life == before.life:
+            yield f'{shown}: the life counter stood still'
+        stood = before.stw1 if before is not None else 0
+        if now.stw1 & ~self.known:
+            yield f'{shown}: bits that nobody knows'
+        if now.setpoint and not now.stw1 & self.run:
+            yield f'{shown}: set-point {now.setpoint} beside no run command'
+        rises = now.stw1 & ~stood
+        if rises & self.run and now.setpoint:
+            yield f'{shown}: the run command comes with a set-point'
+        if rises & self.run and not now.flags & 2:
+            yield f'{shown}: run without the release of the PLC'
+        if rises & 1 << 7 and now.stw1 & self.run:
+            yield f'{shown}: a fault is acknowledged beside a run command'
+        if rises & 1 << 7 and not now.zsw1 & 1 << 3:
+            yield f'{shown}: there is no fault to acknowledge'
+        for wrong in self.order(now.stw1, stood, now.zsw1):
+            yield f'{shown} (it was {stood:04X}h): {wrong}'
+
+    def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
+        """Yield what is wrong with the order of the bits."""
+        raise NotImplementedError
+
+
+class OptimalJudge(Judge):
+    """[M1]: PLC control, Enable, Switch on; each precedes the next, and is confirmed."""
+
+    known = 1 << 0 | 1 << 3 | 1 << 7 | 1 << 10
+    run = 1 << 0
+
+    def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
+        """Yield what is wrong with the order of the bits."""
+        rises, falls = word & ~stood, stood & ~word
+        if rises & 1 << 3 and not (stood & 1 << 10 and zsw1 & self.control):
+            yield 'Enable before PLC control was confirmed'
+        if rises & 1 << 0 and not (stood & 1 << 3 and zsw1 & 1 << 2):
+            yield 'Switch on before Enable was confirmed'
+        if falls & 1 << 3 and zsw1 & (1 << 1 | 1 << 15):
+            yield 'Enable is taken from a motor that is driven: it coasts'
+        if falls & 1 << 10:
+            yield 'PLC control is given away'
+        if word & 1 << 0 and not word & 1 << 3:
+            yield 'Switch on without Enable'
+
+
+class HJudge(Judge):
+    """[M3 §6, §7.2.1]."""
+
+    known = 0x04FF
+    run = 1 << 3
+
+    def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
+        """Yield what is wrong with the order of the bits."""
+        rises, falls = word & ~stood, stood & ~word
+        pattern = zsw1 & 0x47
+        if not word & 1 << 10:
+            yield 'without bit 10 all of it is ignored [C107]'
+        if rises & 1 << 0 and stood and pattern not in (0x01, 0x03, 0x07):
+            yield 'SwitchON before S2 was shown'
+        if rises & 1 << 3 and pattern != 0x03:
+            yield 'OperationEnable before S3 was shown'
+        if word & 1 << 3 and word & 0x07 != 0x07:
+            yield 'bit 3 without bits 0 to 2'
+        if falls & 1 << 0 and word & 0x06 == 0x06 and pattern == 0x07:
+            yield 'SwitchOFF is no way out of S4 [C107]'
+
+
+class G2Judge(Judge):
+    """[M0 tables 14 to 16]."""
+
+    known = 0xE8FF
+    run = 1 << 0 | 1 << 3 | 1 << 13
+
+    def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
+        """Yield what is wrong with the order of the bits."""
+        rises = word & ~stood
+        stopping = zsw1 & 1 << 15
+        if word & 1 << 3 and word & 1 << 13:
+            yield 'both directions mean no change [C36]'
+        if rises & 1 << 0 and not (zsw1 & 0x4F == 0x01 or stopping):
+            yield 'bit 0 before READY_TO_SWITCH_ON was shown'
+        if rises & (1 << 3 | 1 << 13) and not (zsw1 & 0x4F == 0x03 or stopping):
+            yield 'a direction before SWITCHED_ON was shown'
+        if rises & 1 << 0 and rises & (1 << 3 | 1 << 13):
+            yield 'bit 0 and a direction at once'
+        if not word & 1 << 14:
+            yield 'control is asked for no more'
+
+
+JUDGES: Mapping[str, type[Judge]] = {
+    'sinus_optimal': OptimalJudge, 'sinus_h': HJudge, 'sinus_g2': G2Judge
+}
+
+
+def violations(
+    frames: Iterable[Mapping[str, Any]], model: str, unit: int = 1, start: int = 0
+) -> list[str]:
+    """Return what is wrong with all that was written to the block of a unit."""
+    judge = JUDGES[model]()
+    return [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]

@@ -1,0 +1,523 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The PLC between a master and the drives: in virtual time, and as a process on a TCP port."""
+
+import contextlib
+import json
+import struct
+import subprocess
+import sys
+import time
+
+from hypothesis import given
+from hypothesis import strategies as st
+from pymodbus.client import ModbusTcpClient
+import pytest
+
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.modbus import server
+from nfo_sinus_driver.simulator.plc import Plc
+from nfo_sinus_driver.simulator.plc import PlcSetting
+from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.simulator.timing import Timing
+
+TIMEOUT = 10.0
+#: For what comes by the clock of the PLC, s.
+PATIENCE = 60.0
+#: What starts each drive, word after word, its set-point for 20 Hz, and what its ZSW1 says then.
+STARTS = {
+    'sinus_optimal': ((0x0400, 0x0408, 0x0409), 3277),
+    'sinus_g2': ((0xC076, 0xC077, 0xC07F), 200),
+    'sinus_h': ((0x0476, 0x0477, 0x047F), 2000),
+}
+MODELS = sorted(STARTS)
+
+
+class Bench:
+    """A PLC with drives, asked by PDUs; time passes when told."""
+
+    def __init__(self, *models, settings=None, drive_settings=None, **options):
+        self.drives = {
+            address: simulated_drive(
+                model, address, settings=drive_settings, boot_time=0.0, **options
+            )
+            for address, model in enumerate(models, 1)
+        }
+        self.plc = Plc(self.drives, settings or PlcSetting())
+        self.units = {unit.address: unit for unit in self.plc.units}
+        self.now = 100.0
+        self.life = 0
+        self.plc.advance_to(self.now)
+
+    def ask(self, pdu, unit=1):
+        station = self.units[unit]
+        station.advance_to(self.now)
+        return server(station).answer(pdu)
+
+    def read(self, register=0, count=5, unit=1):
+        answer = self.ask(struct.pack('>BHH', 3, register, count), unit)
+        assert answer[0] == 3, answer.hex()
+        return struct.unpack(f'>{count}H', answer[2:])
+
+    def write(self, register, *words, unit=1):
+        data = struct.pack(f'>BHHB{len(words)}H', 16, register, len(words), 2 * len(words), *words)
+        return self.ask(data, unit)
+
+    def ros(self, stw1, setpoint, unit=1, register=0):
+        """Write and read as the driver does, by function 23."""
+        self.life = (self.life + 1) & 0xFFFF
+        pdu = struct.pack(
+            '>BHHHHBHhH', 23, register, 5, register + 8, 3, 6, stw1, setpoint, self.life
+        )
+        answer = self.ask(pdu, unit)
+        assert answer[0] == 23, answer.hex()
+        return struct.unpack('>HhHHH', answer[2:])
+
+    def wait(self, seconds):
+        self.now += seconds
+        self.plc.advance_to(self.now)
+
+    def live(self, seconds, *words, **where):
+        """Let a driver live, which writes every 50 ms."""
+        for _ in range(round(seconds / 0.05)):
+            self.wait(0.05)
+            found = self.ros(*words, **where)
+        return found
+
+    def start(self, model, **where):
+        words, setpoint = STARTS[model]
+        for word in words:
+            self.live(0.2, word, setpoint, **where)
+        found = self.live(6.0, words[-1], setpoint, **where)
+        assert found[1] == pytest.approx(setpoint, abs=2)
+        return words[-1], setpoint
+
+    def motor(self, address=1):
+        return self.drives[address].motor
+
+
+# --- who watches whom ---
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_drive_runs_by_the_words_in_its_block(model):
+    bench = Bench(model)
+    bench.start(model)
+    assert bench.motor().frequency == pytest.approx(20.0, abs=0.05)
+    assert bench.read()[3:] == (3, 1)
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_driver_that_died_lets_the_motor_stop_by_the_ramp(model):
+    bench = Bench(model)
+    bench.start(model)
+    bench.wait(0.9)
+    assert bench.motor().frequency == pytest.approx(20.0, abs=0.05)
+    bench.wait(0.3)
+    assert bench.motor().driven
+    assert bench.motor().trend < 0
+    bench.wait(3.0)
+    assert not bench.motor().driven
+    assert not bench.motor().turning
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_after_the_watchdog_the_old_word_with_a_new_life_does_not_start_an_enabled_sequence(model):
+    # what the driver has to hold: after such a gap it begins with the run bits clear [C108]
+    bench = Bench(model)
+    word, setpoint = bench.start(model)
+    bench.wait(8.0)
+    assert not bench.motor().driven
+    bench.live(2.0, word, setpoint)
+    # those whose Enable stood start at once, the Sinus H fell back to S1
+    assert bench.motor().driven == (model != 'sinus_h')
+
+
+def test_sinus_h_is_led_out_of_operation():
+    bench = Bench('sinus_h')
+    bench.start('sinus_h')
+    bench.wait(1.2)
+    assert bench.drives[1].control_unit.report()['state'] == 'S1'
+
+
+def test_sinus_h_stays_in_operation_where_only_bit_0_is_cleared():
+    # what the setting of the function block is for [C107]
+    bench = Bench('sinus_h')
+    bench.plc.channels[1].program.lost_clears = 1
+    bench.start('sinus_h')
+    bench.wait(10.0)
+    assert bench.drives[1].control_unit.report()['state'] == 'S4'
+
+
+def test_a_plc_that_was_restarted_leads_a_sinus_h_out_of_operation():
+    bench = Bench('sinus_h')
+    bench.start('sinus_h')
+    bench.plc = Plc(bench.drives, PlcSetting())
+    bench.plc.advance_to(bench.now)
+    bench.wait(0.1)
+    assert bench.drives[1].control_unit.report()['state'] == 'S1'
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_cut_fieldbus_stops_the_counter_at_once_and_ends_validity_in_time(model):
+    bench = Bench(model)
+    word, setpoint = bench.start(model)
+    bench.plc.channels[1].cut_until = bench.now + 3.0
+    before = bench.live(0.1, word, setpoint)
+    after = bench.live(0.3, word, setpoint)
+    assert after[2] == before[2]
+    assert after[3] & 1
+    after = bench.live(0.4, word, setpoint)
+    assert not after[3] & 1
+    assert after[0] == before[0], 'the last that came'
+    assert bench.motor().driven, 'no watch is set in the drive'
+    bench.live(2.5, word, setpoint)
+    assert bench.read()[3] & 1
+    assert bench.read()[2] != before[2]
+
+
+def test_lost_command_of_a_sinus_h_behind_a_cut_fieldbus():
+    bench = Bench('sinus_h', drive_settings={'prt.lost_cmd_mode': 'Free-Run'})
+    word, setpoint = bench.start('sinus_h')
+    bench.plc.channels[1].cut_until = bench.now + 3.0
+    bench.live(1.2, word, setpoint)
+    assert not bench.motor().driven
+    assert bench.drives[1].faults.codes == [35]
+    zsw1, *_ = bench.live(2.5, word, setpoint)
+    assert zsw1 & 0x08
+
+
+def test_stopped_plc_is_stale_and_yet_valid():
+    bench = Bench('sinus_optimal')
+    word, setpoint = bench.start('sinus_optimal')
+    bench.plc.stopped_until = bench.now + 2.0
+    before = bench.live(0.1, word, setpoint)
+    assert bench.live(1.5, word, setpoint)[1:] == before[1:]
+    assert bench.live(0.7, word, setpoint)[2] != before[2]
+
+
+def test_drive_without_power_is_not_valid_and_comes_back_at_standstill():
+    bench = Bench('sinus_h')
+    word, setpoint = bench.start('sinus_h')
+    bench.drives[1].power_cycle(2.0)
+    assert not bench.live(1.0, word, setpoint)[3] & 1
+    found = bench.live(2.0, word, setpoint)
+    assert found[3] & 1
+    assert found[:2] == (0x270, 0)
+
+
+def test_without_release_the_drive_stops():
+    bench = Bench('sinus_optimal')
+    word, setpoint = bench.start('sinus_optimal')
+    bench.plc.channels[1].released = False
+    assert bench.live(0.1, word, setpoint)[3] == 1
+    bench.live(5.0, word, setpoint)
+    assert not bench.motor().driven
+
+
+def test_other_telegram_is_never_valid():
+    bench = Bench('sinus_h', drive_settings={'com.opt_para_13': 'Vendor Specific Telegram'})
+    assert bench.live(1.0, 0x0476, 0) == (0, 0, 0, 2, 1)
+
+
+# --- blocks ---
+
+
+def test_two_drives_in_one_unit_have_two_blocks():
+    settings = PlcSetting(blocks=((1, 0), (1, 16)))
+    bench = Bench('sinus_optimal', 'sinus_h', settings=settings)
+    assert [unit.address for unit in bench.plc.units] == [1]
+    bench.start('sinus_h', register=16)
+    assert bench.motor(2).driven
+    assert not bench.motor(1).driven
+    assert bench.read(16)[1] == pytest.approx(2000, abs=2)
+    assert bench.read(0)[1] == 0
+
+
+def test_each_drive_has_a_unit_by_default():
+    bench = Bench('sinus_optimal', 'sinus_g2')
+    assert [unit.address for unit in bench.plc.units] == [1, 2]
+    bench.start('sinus_g2', unit=2)
+    assert not bench.motor(1).driven
+    assert bench.motor(2).driven
+
+
+@pytest.mark.parametrize(
+    ('register', 'count'), [(0, 12), (5, 7), (11, 1), (100, 1), (0xFFFF, 1), (15, 2)]
+)
+def test_what_is_no_block_is_refused(register, count):
+    bench = Bench('sinus_optimal')
+    assert bench.ask(struct.pack('>BHH', 3, register, count)) == b'\x83\x02'
+
+
+@pytest.mark.parametrize('register', range(8))
+def test_what_the_plc_writes_nobody_else_writes(register):
+    bench = Bench('sinus_optimal')
+    assert bench.write(register, 1) == b'\x90\x02'
+    assert bench.write(7, 1, 2) == b'\x90\x02'
+
+
+def test_functions_03_and_16_do_as_23_does():
+    bench = Bench('sinus_optimal', settings=PlcSetting(write_and_read=False))
+    pdu = struct.pack('>BHHHHBHHH', 23, 0, 5, 8, 3, 6, 0x0400, 0, 1)
+    assert bench.ask(pdu) == b'\x97\x01'
+    for life, word in enumerate((0x0400, 0x0408), 1):
+        assert bench.write(8, word, 100, life) == struct.pack('>BHH', 16, 8, 3)
+        bench.wait(0.2)
+    assert bench.read(8, 3) == (0x0408, 100, 2)
+    assert bench.read(0, 1)[0] & 0x204 == 0x204
+
+
+@pytest.mark.parametrize('function', [1, 2, 4, 5, 6, 15, 17, 22, 43])
+def test_other_functions_are_refused(function):
+    bench = Bench('sinus_optimal')
+    pdu = struct.pack('>BHH', function, 8, 1)
+    assert bench.ask(pdu) == bytes((function | 0x80, 1))
+
+
+def test_a_refused_write_writes_nothing():
+    bench = Bench('sinus_optimal')
+    pdu = struct.pack('>BHHHHBHHH', 23, 0, 12, 8, 3, 6, 0x0400, 5, 7)
+    assert bench.ask(pdu) == b'\x97\x02'
+    assert bench.read(8, 3)[1:] == (0, 0)
+
+
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        {'cycle': 0.0},
+        {'exchange': -1.0},
+        {'ros_time': 0.0},
+        {'answer_time': (0.4, 0.05)},
+        {'blocks': ((1, 0), (1, 10))},
+        {'blocks': ((0, 0),)},
+        {'blocks': ((1, 65530),)},
+        {'blocks': ((1, -1),)},
+    ],
+)
+def test_what_no_plc_can_be(wrong):
+    with pytest.raises(ValueError, match=r'possible|over another|first|no block'):
+        PlcSetting(**wrong)
+
+
+def test_each_drive_needs_a_block():
+    with pytest.raises(ValueError, match='1 blocks for 2 drives'):
+        Bench('sinus_h', 'sinus_h', settings=PlcSetting(blocks=((1, 0),)))
+
+
+def test_a_drive_without_a_fieldbus_is_refused():
+    with pytest.raises(ValueError, match='movitrac31 does not speak telegram1'):
+        Bench('movitrac31')
+
+
+def test_answer_time_is_within_its_limits():
+    bench = Bench('sinus_optimal', settings=PlcSetting(answer_time=(0.05, 0.4)))
+    times = [bench.units[1].response_time for _ in range(200)]
+    assert 0.05 <= min(times) < 0.1
+    assert 0.35 < max(times) <= 0.4
+
+
+# --- in any order ---
+
+
+@given(
+    st.sampled_from(MODELS),
+    st.lists(
+        st.tuples(
+            st.sampled_from(['live', 'live', 'live', 'gap', 'cut', 'stop', 'power', 'fault']),
+            st.integers(0, 3),
+            st.sampled_from([0.05, 0.3, 0.9, 1.5]),
+        ),
+        max_size=20,
+    ),
+    st.sampled_from([0.005, 0.01, 0.05]),
+    st.sampled_from([0.008, 0.02, 0.07]),
+)
+def test_motor_never_runs_longer_without_a_driver_than_the_plc_allows(
+    model, steps, cycle, exchange
+):
+    bench = Bench(model, settings=PlcSetting(cycle=cycle, exchange=exchange))
+    words, setpoint = STARTS[model]
+    words = (0, *words)
+    alone = 0.0
+    for what, number, seconds in steps:
+        channel = bench.plc.channels[1]
+        if what == 'live':
+            bench.live(seconds, words[number], setpoint)
+            alone = 0.0
+            continue
+        if what == 'cut':
+            channel.cut_until = bench.now + seconds
+        elif what == 'stop':
+            bench.plc.stopped_until = bench.now + seconds
+        elif what == 'power':
+            bench.drives[1].power_cycle(seconds)
+        elif what == 'fault':
+            bench.drives[1].trip({'sinus_h': 11}.get(model, 3))
+        ramp = bench.motor().ramp
+        bench.wait(seconds)
+        # while the fieldbus or the PLC stands the drive is on its own, and its ramp goes on
+        alone = 0.0 if what in ('cut', 'stop') else alone + seconds
+        if alone > 1.0 + 2 * cycle + 2 * exchange + 0.1 + seconds:
+            assert abs(bench.motor().ramp) <= abs(ramp) + 1e-6
+
+
+# --- as a process, or a thread, to a foreign master ---
+
+
+class Master:
+    """pymodbus's client."""
+
+    def __init__(self, port):
+        host, _, number = port.rpartition(':')
+        self.client = ModbusTcpClient(host, port=int(number), timeout=TIMEOUT)
+        assert self.client.connect()
+        self.life = 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.client.close()
+
+    @property
+    def unit(self):
+        # its name changed with pymodbus 3.10, and stands in no signature of some
+        names = ModbusTcpClient.read_holding_registers.__kwdefaults__ or {}
+        return {'device_id': 1} if 'device_id' in names else {'slave': 1}
+
+    def exchange(self, stw1, setpoint):
+        self.life += 1
+        answer = self.client.readwrite_registers(
+            read_address=0,
+            read_count=5,
+            write_address=8,
+            values=[stw1, setpoint & 0xFFFF, self.life],
+            **self.unit,
+        )
+        assert not answer.isError(), answer
+        return answer.registers
+
+    def until(self, condition, word, setpoint):
+        deadline = time.monotonic() + PATIENCE
+        while not condition(registers := self.exchange(word, setpoint)):
+            assert time.monotonic() < deadline, registers
+        return registers
+
+
+@contextlib.contextmanager
+def serving(model):
+    with (
+        Simulator(model=model, protocol='telegram1', boot_time=0.0) as simulator,
+        Master(simulator.port) as master,
+    ):
+        yield simulator, master
+
+
+def test_served_to_a_foreign_master():
+    with serving('sinus_h') as (simulator, master):
+        master.until(lambda found: found[0] & 0x47 == 0x01, 0x0476, 0)
+        master.until(lambda found: found[0] & 0x47 == 0x03, 0x0477, 0)
+        master.until(lambda found: found[1] > 10, 0x047F, 500)
+        client, unit = master.client, master.unit
+        assert not client.read_holding_registers(0, count=5, **unit).isError()
+        assert client.read_holding_registers(0, count=12, **unit).isError()
+        assert not client.write_registers(8, [0x0477, 0, 77], **unit).isError()
+        state = simulator.state()
+        assert state['plc']['block'][8:] == [0x0477, 0, 77]
+        assert state['plc']['ros_alive'] is True
+
+
+def test_unknown_unit_is_told_by_the_gateway_code():
+    with serving('sinus_g2') as (_, master):
+        frame = bytes.fromhex('000100000006090300000005')
+        master.client.socket.sendall(frame)
+        assert master.client.socket.recv(64)[7:] == b'\x83\x0a'
+
+
+def test_injections_of_the_plc():
+    with serving('sinus_optimal') as (simulator, master):
+        master.until(lambda found: found[3] == 3, 0, 0)
+        simulator.inject('release', 'off')
+        master.until(lambda found: found[3] == 1, 0, 0)
+        simulator.inject('fieldbus-cut', 60.0)
+        master.until(lambda found: found[3] == 0, 0, 0)
+        simulator.inject('fieldbus-cut', 0.0)
+        master.until(lambda found: found[3] == 1, 0, 0)
+        simulator.inject('plc-stop', 60.0)
+        before = master.exchange(0, 0)
+        assert all(master.exchange(0, 0)[2] == before[2] for _ in range(20))
+
+
+@pytest.mark.parametrize('verb', [('release', 'off'), ('fieldbus-cut', 1.0), ('plc-stop', 1.0)])
+def test_no_plc_no_injection(verb):
+    simulator = Simulator(protocol='modbus_tcp')
+    try:
+        with pytest.raises(ValueError, match=r'no PLC.*--protocol telegram1'):
+            simulator.inject(*verb)
+    finally:
+        simulator.stop()
+
+
+@pytest.mark.parametrize(
+    ('options', 'reason'),
+    [
+        ({'protocol': 'telegram1', 'also': ['modbus_tcp:0']}, 'no other line'),
+        ({'protocol': 'modbus_tcp', 'also': ['telegram1:0']}, 'no PLC'),
+        ({'protocol': 'modbus_rtu', 'plc': PlcSetting()}, 'no PLC'),
+        ({'protocol': 'telegram1', 'link': '/tmp/nowhere'}, 'needs a TCP port'),
+        ({'protocol': 'modbus_rtu', 'model': 'sinus_h'}, 'does not speak modbus_rtu'),
+        ({'protocol': 'telegram1', 'model': 'movitrac31'}, 'does not speak telegram1'),
+    ],
+)
+def test_what_cannot_be_said(options, reason):
+    with pytest.raises(ValueError, match=reason):
+        Simulator(**options)
+
+
+def test_command(tmp_path):
+    control, trace = tmp_path / 'control', tmp_path / 'trace'
+    command = [sys.executable, '-m', 'nfo_sinus_driver.simulator']
+    options = ['--protocol', 'telegram1', '--model', 'sinus_h', '--tcp', '0', '--boot-time', '0']
+    options += ['--address', '3', '--address', '4', '--block', '1:0', '--block', '1:16']
+    options += ['--answer-time', '0.01:0.02', '--set', 'prt.lost_cmd_mode=Dec']
+    options += ['--control', str(control), '--trace', str(trace)]
+    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            said = process.stdout.readline()
+            assert 'telegram1' in said
+            port = said.partition(' on ')[2].partition(',')[0]
+            with Master(port) as master:
+                master.until(lambda found: found[0] & 0x47 == 0x01, 0x0476, 0)
+            inject = [*command, 'inject', '--control', str(control)]
+            cut = [*inject, '--address', '4', 'fieldbus-cut', '5']
+            assert subprocess.run(cut, check=False).returncode == 0
+            done = subprocess.run([*inject, 'state'], capture_output=True, text=True, check=True)
+            state = json.loads(done.stdout)
+            assert state['3']['plc']['register'] == 0
+            assert state['4']['plc']['register'] == 16
+            assert state['4']['parameters']['prt.lost_cmd_mode'] == 'Dec'
+            directions = {json.loads(line)['direction'] for line in trace.open()}
+            assert directions == {'request', 'answer'}
+        finally:
+            process.terminate()
+
+
+def test_a_unit_hears_everything():
+    bench = Bench('sinus_h')
+    unit = bench.units[1]
+    unit.heard()
+    assert unit.hears('modbus_rtu', Timing())
+    assert unit.listening

@@ -1,0 +1,337 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated Optimal and G2 on a fieldbus: telegram 1 by their manuals ([M1], [M0 §7])."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.simulator.family import simulated_drive
+
+# Optimal: bits of STW1 and ZSW1, copied from [M1]
+SWITCH_ON, ENABLE, ACK, PLC = 1 << 0, 1 << 3, 1 << 7, 1 << 10
+READY, OPERATING, ENABLED, FAULT = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+DISABLED, CONTROLLED, REACHED, REVERSE, STOPPING = 1 << 6, 1 << 9, 1 << 10, 1 << 14, 1 << 15
+FULL = 8192
+
+# G2: DriveControl [M0 table 14] and the masks of [M0 table 16]
+G2_CONTROLLED = 0xC000 | 0x70
+G2_STANDBY = G2_CONTROLLED | 0x06
+G2_ON = G2_STANDBY | 0x01
+G2_FORWARD, G2_REVERSE = G2_ON | 0x08, G2_ON | 0x2000
+
+
+class Bench:
+    """One drive on a fieldbus with a telegram every 20 ms, or none."""
+
+    def __init__(self, model, settings=None, **options):
+        self.drive = simulated_drive(model, settings=settings, boot_time=0.0, **options)
+        self.server = self.drive.servers['telegram1']
+        self.word = self.setpoint = 0
+        self.zsw1 = self.actual = 0
+
+    def send(self, word, setpoint=None):
+        self.word = word
+        if setpoint is not None:
+            self.setpoint = setpoint
+        self.zsw1, self.actual = self.server.exchange(word, self.setpoint)
+
+    def wait(self, seconds, telegrams=True):
+        for _ in range(round(seconds / 0.02)):
+            self.drive.advance(0.02)
+            if telegrams:
+                self.send(self.word)
+
+    def step(self, word, setpoint=None):
+        """Give a word and wait until the drive has responded to it."""
+        self.send(word, setpoint)
+        self.wait(0.1)
+        return self.zsw1
+
+    @property
+    def motor(self):
+        return self.drive.motor
+
+
+def optimal(**settings):
+    return Bench('sinus_optimal', settings)
+
+
+def running_optimal(setpoint=FULL // 2, seconds=6.0, **settings):
+    bench = optimal(**settings)
+    bench.step(PLC)
+    bench.step(PLC | ENABLE)
+    bench.step(PLC | ENABLE | SWITCH_ON, setpoint)
+    bench.wait(seconds)
+    return bench
+
+
+# --- Optimal: the sequence of its manual ---
+
+
+def test_each_bit_is_confirmed_before_the_next():
+    bench = optimal()
+    bench.send(0)
+    assert bench.zsw1 & (READY | CONTROLLED | ENABLED | OPERATING) == READY
+    assert bench.step(PLC) & (CONTROLLED | ENABLED | OPERATING) == CONTROLLED
+    assert bench.step(PLC | ENABLE) & (CONTROLLED | ENABLED | OPERATING) == CONTROLLED | ENABLED
+    assert bench.step(PLC | ENABLE | SWITCH_ON, FULL) & OPERATING
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        (PLC | ENABLE,),
+        (PLC | ENABLE | SWITCH_ON,),
+        (PLC, PLC | SWITCH_ON),
+        (PLC, PLC | ENABLE | SWITCH_ON),
+        (ENABLE, ENABLE | SWITCH_ON),
+        (SWITCH_ON,),
+    ],
+)
+def test_a_bit_that_comes_too_early_does_nothing(words):
+    bench = optimal()
+    for word in words:
+        bench.step(word, FULL)
+    bench.wait(3.0)
+    assert not bench.zsw1 & OPERATING
+    assert not bench.motor.driven
+
+
+def test_the_drive_takes_its_time_to_confirm():
+    bench = optimal()
+    bench.send(PLC)
+    assert not bench.zsw1 & CONTROLLED
+    bench.send(PLC | ENABLE)
+    bench.wait(1.0)
+    assert bench.zsw1 & CONTROLLED
+    assert not bench.zsw1 & ENABLED, 'it came too early, and has to be given again'
+
+
+def test_switch_on_taken_away_brakes_then_it_can_start_again():
+    bench = running_optimal()
+    bench.send(PLC | ENABLE)
+    bench.wait(0.2)
+    assert bench.zsw1 & STOPPING
+    assert bench.zsw1 & OPERATING
+    bench.wait(6.0)
+    assert not bench.zsw1 & (STOPPING | OPERATING)
+    assert bench.step(PLC | ENABLE | SWITCH_ON) & OPERATING
+
+
+@pytest.mark.parametrize('word', [PLC, PLC | SWITCH_ON, 0, ENABLE | SWITCH_ON])
+def test_enable_or_control_taken_away_ends_the_run(word):
+    bench = running_optimal()
+    bench.send(word)
+    bench.wait(8.0)
+    assert not bench.motor.driven
+    assert not bench.zsw1 & OPERATING
+
+
+@pytest.mark.parametrize(
+    ('sent', 'told'), [(1 << 1, 1 << 4), (1 << 2, 1 << 5), (0x6, 0x30), (0, 0)]
+)
+def test_bits_1_and_2_are_echoes(sent, told):
+    bench = optimal()
+    bench.step(PLC | sent)
+    assert bench.zsw1 & 0x30 == told
+
+
+@pytest.mark.parametrize(
+    ('setpoint', 'frequency'),
+    [(FULL, 50), (-FULL, -50), (FULL // 2, 25), (1, 50 / FULL), (24576, 150), (32767, 150)],
+)
+def test_setpoint_in_frequency_mode(setpoint, frequency):
+    bench = running_optimal(setpoint, seconds=1.0, **{'control.accel': 1.0})
+    bench.wait(6.0)
+    assert bench.motor.demand == pytest.approx(frequency, rel=1e-6)
+    if abs(frequency) <= 50:
+        assert bench.actual == pytest.approx(setpoint, abs=2)
+        assert bench.zsw1 & REACHED
+    assert bool(bench.zsw1 & REVERSE) == (setpoint < 0)
+
+
+def test_setpoint_in_speed_mode():
+    bench = running_optimal(FULL, **{'control.mode': 'Speed'})
+    bench.wait(3.0)
+    assert bench.motor.speed == pytest.approx(1500, abs=3)
+    assert bench.actual == pytest.approx(FULL, abs=20)
+
+
+def test_fault_and_its_acknowledgement_by_an_edge():
+    bench = running_optimal()
+    bench.drive.trip(12)
+    bench.wait(0.1)
+    assert bench.zsw1 & FAULT
+    assert not bench.motor.driven
+    bench.step(PLC)
+    bench.step(PLC | ACK)
+    assert not bench.zsw1 & FAULT
+    bench.drive.trip(12)
+    bench.wait(0.1)
+    assert bench.zsw1 & FAULT, 'a bit that still stands is no edge'
+
+
+def test_run_input():
+    bench = running_optimal()
+    bench.drive.set_run_input(False)
+    bench.wait(8.0)
+    assert bench.zsw1 & DISABLED
+    assert not bench.motor.driven
+
+
+@pytest.mark.parametrize('key', ['stop', 'ext'])
+def test_who_takes_control_at_the_keypad_keeps_it(key):
+    bench = running_optimal(**{'control.auto_start': False})
+    bench.drive.set_run_input(key != 'ext')
+    bench.drive.control_unit.press(key)
+    bench.wait(5.0)
+    assert not bench.zsw1 & CONTROLLED
+    assert not bench.motor.driven
+
+
+def test_after_a_power_cycle_a_standing_word_does_nothing():
+    for bench in (running_optimal(), running_g2()):
+        bench.drive.power_cycle(0.5)
+        for _ in range(25):
+            bench.drive.advance(0.02)
+        bench.wait(5.0)
+        assert not bench.motor.driven
+
+
+@pytest.mark.parametrize('model', ['sinus_optimal', 'sinus_g2'])
+@pytest.mark.parametrize('auto_stop', [False, True])
+def test_lost_fieldbus_goes_by_auto_stop(model, auto_stop):
+    run = running_optimal if model == 'sinus_optimal' else running_g2
+    bench = run(**{'serial.auto_stop': auto_stop})
+    bench.wait(0.1, telegrams=False)
+    assert bench.motor.driven
+    bench.wait(5.0, telegrams=False)
+    assert bench.motor.driven == (not auto_stop)
+    assert bench.drive.faults.codes == ([15] if auto_stop else [])
+    bench.wait(5.0)
+    assert bench.motor.driven == (not auto_stop), 'what stood does not start it again'
+
+
+# --- G2 ---
+
+
+def running_g2(word=G2_FORWARD, setpoint=200, **settings):
+    bench = Bench('sinus_g2', settings)
+    bench.step(G2_STANDBY)
+    bench.step(G2_ON)
+    bench.step(word, setpoint)
+    bench.wait(6.0)
+    return bench
+
+
+def test_g2_goes_through_its_states():
+    bench = Bench('sinus_g2')
+    assert bench.step(0) & 0xC04F == 0x0040
+    assert bench.step(G2_STANDBY) & 0xC06F == 0x0021
+    assert bench.step(G2_ON) & 0xC06F == 0x0023
+    assert bench.step(G2_FORWARD, 100) & 0xC06F == 0x0027
+    assert bench.zsw1 & 0x0300 == 0x0300, 'control and reference from the net'
+    bench.wait(4.0)
+    assert bench.actual == 100
+    assert bench.motor.frequency == pytest.approx(10.0)
+    assert bench.step(G2_STANDBY) & 0xC06F == 0x8027, 'SHUTDOWN'
+    bench.wait(3.0)
+    assert bench.zsw1 & 0xC06F == 0x0021
+
+
+def test_g2_needs_a_positive_edge_of_bit_0():
+    bench = Bench('sinus_g2')
+    bench.step(G2_FORWARD, 200)
+    bench.wait(3.0)
+    assert not bench.motor.driven
+    assert bench.zsw1 & 0x40
+
+
+def test_g2_turns_in_reverse_by_bit_13():
+    bench = running_g2(G2_REVERSE)
+    assert bench.zsw1 & 0xC06F == 0x4023
+    assert bench.actual == -200
+
+
+@pytest.mark.parametrize(('mode', 'setpoint'), [('Freque', 200), ('Speed', 600)])
+def test_g2_values_are_those_of_its_setpoint_registers(mode, setpoint):
+    bench = running_g2(setpoint=setpoint, **{'control.mode': mode})
+    turned = bench.motor.frequency * 10 if mode == 'Freque' else bench.motor.speed
+    assert bench.actual == pytest.approx(setpoint, abs=2)
+    assert turned == pytest.approx(setpoint, abs=2)
+
+
+@pytest.mark.parametrize('missing', [0x02, 0x04])
+def test_g2_quick_stop_coasts(missing):
+    bench = running_g2()
+    bench.send(G2_FORWARD & ~missing)
+    bench.wait(0.02)
+    assert not bench.motor.driven
+    assert bench.motor.turning
+
+
+def test_g2_fault_and_its_acknowledgement():
+    bench = running_g2()
+    bench.drive.trip(5)
+    bench.wait(1.0)
+    assert bench.zsw1 & 0xC04F == 0x0008
+    bench.step(G2_STANDBY)
+    bench.step(G2_STANDBY | 0x80)
+    assert bench.zsw1 & 0xC06F == 0x0021
+    bench.wait(2.0)
+    assert not bench.motor.driven
+
+
+# --- in any order ---
+
+OPTIMALS = (0, PLC, PLC | ENABLE, PLC | ENABLE | SWITCH_ON, PLC | ACK)
+WORDS = (*OPTIMALS, G2_STANDBY, G2_ON, G2_FORWARD, G2_REVERSE, G2_STANDBY | 0x80, 0xFFFF)
+
+
+@given(
+    st.sampled_from(['sinus_optimal', 'sinus_g2']),
+    st.lists(
+        st.tuples(
+            st.sampled_from(['word', 'word', 'word', 'fault', 'stop', 'power', 'silence', 'run']),
+            st.sampled_from(WORDS),
+            st.integers(-0x8000, 0x7FFF),
+            st.sampled_from([0.0, 0.02, 0.1, 1.0]),
+        ),
+        max_size=20,
+    ),
+)
+def test_in_any_order_only_a_word_starts_the_motor(model, steps):
+    bench = Bench(model)
+    for what, word, setpoint, seconds in steps:
+        before = bench.motor.driven
+        if what == 'word':
+            bench.send(word, setpoint)
+        elif what == 'fault':
+            bench.drive.trip(3)
+        elif what == 'stop':
+            bench.drive.control_unit.press('stop')
+        elif what == 'power':
+            bench.drive.power_cycle(0.0)
+        elif what == 'run':
+            bench.drive.set_run_input(bool(setpoint & 1))
+        bench.wait(seconds, telegrams=what != 'silence')
+        if what in ('fault', 'stop', 'power'):
+            assert not bench.motor.driven or before
+            assert not bench.motor.driven
+        assert -0x8000 <= bench.actual <= 0x7FFF
+        assert 0 <= bench.zsw1 <= 0xFFFF
+        if bench.drive.faults:
+            assert not bench.motor.driven
