@@ -158,11 +158,19 @@ def usual_family() -> str:
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 
+def _has_tables(name: str, method: str) -> bool:
+    """Tell whether a control method has tables of its own."""
+    folders = _folders()
+    if not method or name not in folders:
+        return False
+    return (folders[name] / method / 'parameters.csv').exists()
+
+
 def _place(name: str, method: str) -> tuple[str, Path]:
     """Return package and folder of the tables that a control method has, if some of its own."""
     folder = _folders()[name]
     package = f'{_FAMILIES}.{name}'
-    if method and (folder / method / 'parameters.csv').exists():
+    if _has_tables(name, method):
         return f'{package}.{method}', folder / method
     return package, folder
 
@@ -195,7 +203,6 @@ def load_profile(name: str, method: str = '') -> Profile:
     return profile
 
 
-@functools.cache
 def load_family(name: str, method: str = '') -> Family:
     """
     Read and check the tables of one drive family.
@@ -204,6 +211,12 @@ def load_family(name: str, method: str = '') -> Family:
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
+    # the same family for all the methods that share its tables
+    return _read_family(name, method if _has_tables(name, method) else '')
+
+
+@functools.cache
+def _read_family(name: str, method: str = '') -> Family:
     profile = load_profile(name, method)
     _, folder = _place(name, method)
     keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])

@@ -418,8 +418,8 @@ LAWS = (
         9,
         'an idle bus is silent longer than the time-out of the drive',
         WATCH,
-        '            period = min(period, self._inverter.sio_tot * _KEEP_ALIVE_SHARE)',
-        '            pass',
+        '                period = min(period, patience * _KEEP_ALIVE_SHARE)',
+        '                pass',
         (WAYS_OUT, '-k', 'kept_alive'),
     ),
     Mutant(

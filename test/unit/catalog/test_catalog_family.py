@@ -39,7 +39,7 @@ CODES = 'status_codes.csv'
 ROLES = 'roles.csv'
 ERROR_LOG = 'error_log.csv'
 TABLES = (PARAMETERS, ADDRESSES, CODES, ROLES, ERROR_LOG)
-load_afresh = load_family.__wrapped__
+load_afresh = family._read_family.__wrapped__
 
 Row = dict[str, str]
 

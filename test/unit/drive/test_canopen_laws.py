@@ -140,10 +140,8 @@ def test_an_adapter_is_unplugged_and_back(tmp_path: Path) -> None:
     with CanopenRig(tmp_path) as rig:
         rig.connect()
         with rig.turning():
-            port = rig.simulator.lines[0].port
-            rig.touch(port.hang_up)
+            rig.simulator.inject('hangup', 2.0)
             wait_until(lambda: rig.told('is the adapter unplugged?'))
-            rig.touch(port.come_back)
             wait_until(lambda: rig.drive.snapshot.connected)
             rig.still()
             assert not rig.drive.armed

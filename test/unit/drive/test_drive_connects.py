@@ -230,7 +230,7 @@ def test_exit_in_the_middle_of_silence(make_rig: MakeRig, hasty: None, retries: 
         ({'address': -1}, 'allowed are 0 to 247'),
         ({'address': 248}, 'allowed are 0 to 247'),
         ({'model': 'sinus_x'}, "'sinus_g2', "),
-        ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'monitor'"),
+        ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'tele"),
         (
             {'reference': 'analog', 'control_method': 'drive_control'},
             'with drive_control on sinus_g2 it must be fieldbus or terminal',

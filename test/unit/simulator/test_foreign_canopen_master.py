@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import queue
 import struct
 from types import SimpleNamespace
 
@@ -142,14 +143,15 @@ def test_it_sees_boot_up_heartbeat_and_states(
 
 
 def test_it_finds_the_nodes(network: canopen.Network) -> None:
-    heard = []
-    for number in (1, 2):
-        network.subscribe(0x580 + number, lambda identifier, *_: heard.append(identifier))
+    heard: queue.SimpleQueue[int] = queue.SimpleQueue()
     nodes = [node_of(network, number) for number in (1, 2)]
+    for number in (1, 2):
+        # after its client, which would take them for answers to what it asks
+        network.subscribe(0x580 + number, lambda identifier, *_: heard.put(identifier))
     network.scanner.search(3)
-    # its own answers come after those to the search
+    assert {heard.get(timeout=PATIENCE) for _ in nodes} == {0x581, 0x582}
     assert [node.sdo[0x1001].raw for node in nodes] == [0, 0]
-    assert network.scanner.nodes == [1, 2] and heard.count(0x581) == 2
+    assert sorted(network.scanner.nodes) == [1, 2]
 
 
 def test_it_hears_an_emergency(simulator: Simulator, network: canopen.Network) -> None:

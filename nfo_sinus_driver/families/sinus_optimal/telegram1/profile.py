@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Read
+from nfo_sinus_driver.catalog.profile import Status as InverterStatus
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.status import Role
@@ -48,9 +49,21 @@ class OptimalTelegram1(Telegram1):
     runs = _SWITCH_ON
 
     def take_control(self) -> Steps[None]:
-        """Have PLC control, without Switch on; a motor that still ramps keeps Enable."""
-        yield method.begin(self.standing(int((yield Read(method.STATUS)))))
-        yield Until(lambda status: bool((status.word or 0) & self.control))
+        """
+        Have PLC control, without Switch on; a motor that still ramps keeps Enable.
+
+        Where Enable is taken away the drive has to show that, too: else what it has shown before
+        would be taken for the answer to the Enable that follows [C109].
+        """
+        standing = self.standing(int((yield Read(method.STATUS))))
+        yield method.begin(standing)
+        enabled = bool(standing & _ENABLE)
+
+        def is_taken(status: InverterStatus) -> bool:
+            word = status.word or 0
+            return bool(word & self.control) and bool(word & Status.ENABLED) == enabled
+
+        yield Until(is_taken)
 
     def run(self) -> Steps[None]:
         """Enable, then switch on, when the drive shows that it is enabled."""
