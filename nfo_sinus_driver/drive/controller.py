@@ -26,6 +26,7 @@ from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
+import math
 import time
 
 from nfo_sinus_driver.bus import Cancelled
@@ -95,6 +96,8 @@ class Controller:
         self._state = ControlState.OFFLINE
         #: When something happened last: what was read before says nothing of it.
         self._since = 0.0
+        #: When a stop was confirmed last.
+        self._stopped_at = -math.inf
         #: What enables, and who has the drive, while there is one.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
@@ -158,6 +161,8 @@ class Controller:
         before = self._state
         self._state = control_state.TRANSITIONS.get((before, event), before)
         self._since = time.monotonic()
+        if event is ControlEvent.STOPPED:
+            self._stopped_at = self._since
         if self._state is before:
             return
         if before is ControlState.ENABLED:
@@ -223,6 +228,15 @@ class Controller:
             require_no_fault(self._inverter, self._inverter.seen)
         raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
+    def require_newer(self, asked_at: float) -> None:
+        """
+        See to it that no stop was confirmed since somebody asked for a motion, s, monotonic.
+
+        Whoever asks for one thing and then for a stop may be heard in the other order.
+        """
+        if asked_at < self._stopped_at:
+            raise DriveError(Cause.STOPPED_SINCE_ASKED)
+
     async def _require_enable(self) -> None:
         """
         See to it that an enable may begin.
@@ -245,12 +259,16 @@ class Controller:
 
     # --- what a person asks for ---------------------------------------------------------------
 
-    async def enable(self, prepare: Callable[[], Awaitable[None]]) -> Report:
+    async def enable(
+        self, prepare: Callable[[], Awaitable[None]], asked_at: float = math.inf
+    ) -> Report:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
         :param prepare: does what has to be done before a run command, once the bus has control.
+        :param asked_at: when somebody asked for it, s, monotonic.
         """
+        self.require_newer(asked_at)
         if self.enabled:
             return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()

@@ -288,12 +288,17 @@ class Drive:
         return await self._deactivate(patience)
 
     @on_bus
-    async def enable(self) -> Report:
-        """Take control and run at set-point 0, then follow set-points that come in."""
+    async def enable(self, asked_at: float = math.inf) -> Report:
+        """
+        Take control and run at set-point 0, then follow set-points that come in.
+
+        :param asked_at: when somebody asked for that, s of ``time.monotonic``, if not just now: it
+            is refused if a stop was confirmed since.
+        """
         self._require_active()
         controller = self._procedures.controller
         self._require_connected()
-        answer = await controller.enable(self._watchdog.require_set)
+        answer = await controller.enable(self._watchdog.require_set, asked_at)
         self._watch.wake()
         return answer
 
@@ -356,16 +361,21 @@ class Drive:
 
     @on_bus
     async def tune(
-        self, procedure: Procedure, progress: Callable[[Snapshot, float], None] | None = None
+        self,
+        procedure: Procedure,
+        progress: Callable[[Snapshot, float], None] | None = None,
+        asked_at: float = math.inf,
     ) -> Tuned:
         """
         Have the drive measure or calculate its motor; minutes may pass until the result.
 
         :param progress: told on the bus what the drive says, and how long it takes already, s:
             whenever the inverter status changes, and twice a second.
+        :param asked_at: as for :meth:`enable`.
         """
         # as with enable, the motor may turn
         self._require_active()
+        self._procedures.controller.require_newer(asked_at)
 
         def tell(seen: InverterStatus, elapsed: float) -> None:
             if progress is not None:

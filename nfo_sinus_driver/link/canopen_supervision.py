@@ -277,9 +277,10 @@ class CanopenWatch:
             if number & _LONGEST and number >> 16 & 0x7F not in (0, client):
                 # it watches over somebody else by this one
                 continue
-            # it watches from the first heartbeat on that it hears
             supervision.show_heartbeat(unit, milliseconds / 1000, entry)
             if (yield _Request(place, wanted)) is not None and (yield _Request(place)) == wanted:
+                # it watches from the first heartbeat on that it hears: none may run before that
+                supervision.show_heartbeat(unit, milliseconds / 1000, entry)
                 self.means = HEARTBEAT_MEANS
             else:
                 supervision.end(unit)

@@ -29,6 +29,7 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
@@ -92,7 +93,10 @@ class AllDrives:
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'
 
     def _enable(self) -> tuple[list[str], list[str]]:
-        return self._command(_enable_one, _LONGEST_ENABLE)
+        asked_at = received_at()
+        return self._command(
+            lambda managed: managed.require_active().enable(asked_at), _LONGEST_ENABLE
+        )
 
     def _command(self, command: _Command, timeout: float) -> tuple[list[str], list[str]]:
         """Give a command to every controlled drive; return what failed, and what was done."""
@@ -125,7 +129,3 @@ def _stop_one(managed: ManagedDrive) -> Future[Report]:
     if managed.drive.identity is None:
         raise NodeError('it has never answered')
     return managed.drive.stop()
-
-
-def _enable_one(managed: ManagedDrive) -> Future[Report]:
-    return managed.require_active().enable()

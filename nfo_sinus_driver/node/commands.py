@@ -21,9 +21,11 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import contextlib
+import functools
 import math
 import queue
 import threading
+import time
 from typing import Any
 from typing import TypeVar
 
@@ -50,6 +52,7 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
 from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -123,7 +126,9 @@ class Commands:
         if not request.data:
             return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
         return self._answer(
-            response, lambda: self._managed.require_active().enable(), _LONGEST_COMMAND
+            response,
+            lambda: self._managed.require_active().enable(received_at()),
+            _LONGEST_COMMAND,
         )
 
 
@@ -234,9 +239,10 @@ class TuningServices:
             node,
             Tune,
             '~/tune',
-            self._execute,
+            functools.partial(self._execute, math.inf),
             callback_group=group,
             goal_callback=self._on_goal,
+            handle_accepted_callback=self._on_accepted,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
@@ -244,7 +250,10 @@ class TuningServices:
         self, procedure: Procedure
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            tuned = self._result(lambda: self._managed.require_active().tune(procedure).result())
+            asked_at = received_at()
+            tuned = self._result(
+                lambda: self._managed.require_active().tune(procedure, asked_at=asked_at).result()
+            )
             response.success = tuned.success
             response.message = self._managed.wording.say(tuned.report)
             return response
@@ -273,8 +282,11 @@ class TuningServices:
         )
         return GoalResponse.REJECT
 
-    def _execute(self, goal: ServerGoalHandle) -> Tune.Result:
-        tuned = self._result(lambda: self._followed(goal))
+    def _on_accepted(self, goal: ServerGoalHandle) -> None:
+        goal.execute(functools.partial(self._execute, time.monotonic()))
+
+    def _execute(self, asked_at: float, goal: ServerGoalHandle) -> Tune.Result:
+        tuned = self._result(lambda: self._followed(goal, asked_at))
         if tuned.success:
             goal.succeed()
         elif goal.is_cancel_requested:
@@ -287,12 +299,12 @@ class TuningServices:
             changed=[str(change) for change in tuned.changes],
         )
 
-    def _followed(self, goal: ServerGoalHandle) -> Tuned:
+    def _followed(self, goal: ServerGoalHandle, asked_at: float) -> Tuned:
         procedure = _PROCEDURES[goal.request.procedure]
         drive = self._managed.require_active()
         # the bus reports how far it is, and nobody may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
-        future = drive.tune(procedure, lambda *report: reports.put(report))
+        future = drive.tune(procedure, lambda *report: reports.put(report), asked_at)
         cancelling = False
         while True:
             ended = future.done()

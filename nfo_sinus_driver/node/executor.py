@@ -12,22 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who serves one node: its thread sleeps until something is asked of the node, and of no other."""
+"""
+Who serves one node: its thread sleeps until something is asked of the node, and of no other.
+
+Services have no order among them: of two requests the later may be taken first. So this tells when
+each was received, too.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
+from collections.abc import Callable
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 import logging
 import threading
 import time
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ConditionReachedException
 from rclpy.executors import Executor
 from rclpy.executors import ExternalShutdownException
 from rclpy.executors import ShutdownException
 from rclpy.executors import TimeoutException
+from rclpy.executors import await_or_execute
 from rclpy.node import Node
+from rclpy.service import Service
 from rclpy.task import Task
 
 _log = logging.getLogger(__name__)
@@ -36,6 +47,24 @@ _log = logging.getLogger(__name__)
 _NOTHING = (
     ConditionReachedException, ExternalShutdownException, ShutdownException, TimeoutException
 )
+
+_received: ContextVar[float] = ContextVar('received')
+
+
+def received_at() -> float:
+    """
+    Return when the request was received that the service called now answers, s, monotonic.
+
+    That is the present where the middleware does not tell.
+    """
+    return _received.get(time.monotonic())
+
+
+def _received_at(received: int) -> float:
+    """Return the moment of a wall time in ns, s, monotonic; 0 ns is not known."""
+    # whoever sets the clock just now makes nothing come from the future
+    ago = max(0.0, (time.time_ns() - received) / 1e9) if received else 0.0
+    return time.monotonic() - ago
 
 
 class NodeExecutor(Executor):
@@ -90,6 +119,28 @@ class NodeExecutor(Executor):
         # until then rclpy would hand out the same again and again
         begun.wait()
 
+    def _take_service(self, srv: Service) -> Callable[[], Awaitable[None]] | None:
+        """Take a request as rclpy does, which forgets when it was received."""
+        try:
+            with srv.handle:
+                request, header = srv.handle.service_take_request(srv.srv_type.Request)
+        except InvalidHandle:
+            # the service is being destroyed
+            return None
+        if header is None:
+            return _do_nothing
+        received = _received_at(header.received_timestamp)
+
+        async def answer() -> None:
+            token = _received.set(received)
+            try:
+                response = await await_or_execute(srv.callback, request, srv.srv_type.Response())
+            finally:
+                _received.reset(token)
+            srv.send_response(response, header)
+
+        return answer
+
     def _is_ending(self) -> bool:
         return self._ending
 
@@ -99,6 +150,10 @@ class NodeExecutor(Executor):
                 self.spin_once()
             except Exception:
                 _log.exception('error in an executor; it goes on')
+
+
+async def _do_nothing() -> None:
+    """Somebody else has taken the request."""
 
 
 def _run(task: Task, begun: threading.Event) -> None:

@@ -73,6 +73,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.NOT_POSSIBLE: '{why}',
     Cause.ENABLING_ALREADY: 'it is being enabled already',
     Cause.STOP_PENDING: 'a stop is on its way and not confirmed yet: wait for it, then enable',
+    Cause.STOPPED_SINCE_ASKED: (
+        'a stop was confirmed after this was asked for: ask again if the motor shall run'
+    ),
     Cause.PROCEDURE_GOES_ON: '{what} is going on: wait for its end, or stop it',
     Cause.FAULT_FORBIDS: f'fault {{status}} is active: {_REMEDY}; then {{call.acknowledge}}',
     Cause.OTHER_METHOD_RUNS: 'the motor still runs by control_method {method} ({status}): another '

@@ -388,7 +388,9 @@ class Client(contextlib.ExitStack):
         client = self._clients.get(path)
         if client is None:
             # ten, rclpy's own depth, loses requests of many at once on a slow machine
-            client = self.node.create_client(type_, path, qos_profile=QoSProfile(depth=1000))
+            client = self.where_it_spins(
+                lambda: self.node.create_client(type_, path, qos_profile=QoSProfile(depth=1000))
+            )
             self._clients[path] = client
         wait_until(client.service_is_ready, f'there is a service {path}')
         return client.call_async(type_.Request(**fields))

@@ -43,6 +43,7 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 
 _REFUSING = ('--stop-in-tuning', 'refused')
@@ -107,6 +108,25 @@ def test_no_enable_survives_a_stop_that_was_asked_for_after_it(bench: Bench) -> 
                 timeout=PATIENCE,
             )
             assert not state['turning'] or not bench.drives.commanded(state)
+
+
+def test_an_enable_that_waits_behind_a_stop_is_refused_when_its_turn_comes(bench: Bench) -> None:
+    # slow answers keep the stop on its way
+    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1))
+    bench.driver('-p', 'response_timeout:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0), client.setpoints(20.0):
+        # as many as can wait for their answer at once: what comes then is taken after the stop
+        stops = [
+            client.call_async('enable', SetBool, data=False) for _ in range(CALLS_OF_ENABLE)
+        ]
+        late = client.call_async('enable', SetBool, data=True)
+        wait_until(lambda: all(call.done() for call in (*stops, late)), 'enable answers')
+        assert all(stop.result().success for stop in stops)
+        assert not late.result().success, late.result().message
+        assert 'ask again' in late.result().message or 'on its way' in late.result().message
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+        assert client.enable().success, 'asked for after the stop it is carried out'
 
 
 def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:

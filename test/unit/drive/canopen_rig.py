@@ -26,6 +26,7 @@ from typing import Any
 from drive_rig import PATIENCE
 from drive_rig import QUICK
 from drive_rig import Notes
+from drive_rig import patient
 from drive_rig import wait_until
 from support.said import Said
 from support.said import said
@@ -60,6 +61,8 @@ class CanopenRig(contextlib.ExitStack):
         **settings: Any,
     ) -> None:
         super().__init__()
+        settings.setdefault('lost_after', patient(settings.get('drive_timeout', 0.0)))
+        settings.setdefault('setpoint_timeout', 0.0)
         line = {'boot_time': 0.2, **(line or {})}
         self.simulator = Simulator(
             addresses,

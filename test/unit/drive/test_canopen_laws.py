@@ -82,7 +82,8 @@ def test_a_ride_over_each_shape_of_the_node(
 
 @pytest.mark.parametrize('shape', ['full', 'guarded', 'wide'])
 def test_the_drive_stops_when_the_driver_is_gone(tmp_path: Path, shape: str) -> None:
-    with CanopenRig(tmp_path, drive_timeout=2.0, options=SHAPES[shape]) as rig:
+    # a driver that finds the drive lost on a slow machine would stop it before
+    with CanopenRig(tmp_path, drive_timeout=4.0, options=SHAPES[shape]) as rig:
         rig.connect()
         with rig.turning():
             # the worker ends without a word, as by SIGKILL
@@ -90,6 +91,16 @@ def test_the_drive_stops_when_the_driver_is_gone(tmp_path: Path, shape: str) -> 
             rig.bus.wake(None)
             wait_until(lambda: rig.far.faults.codes in ([14], [15]))
             wait_until(lambda: not rig.far.motor.driven)
+
+
+@pytest.mark.parametrize('shape', ['full', 'guarded'])
+def test_the_drive_watches_before_the_motor_starts(tmp_path: Path, shape: str) -> None:
+    with CanopenRig(tmp_path, drive_timeout=4.0, options=SHAPES[shape]) as rig:
+        rig.connect()
+        rig.drive.enable().result(PATIENCE)
+        rig.bus._stopping = True
+        rig.bus.wake(None)
+        wait_until(lambda: rig.far.faults.codes in ([14], [15]))
 
 
 def test_the_watch_outlives_an_idle_driver(tmp_path: Path) -> None:

@@ -144,6 +144,25 @@ def test_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(
         rig.send(None)
 
 
+def test_what_was_asked_for_before_a_stop_was_confirmed_is_refused_after_it(
+    make_virtual: MakeVirtual,
+) -> None:
+    rig = make_virtual()
+    rig.ride()
+    stop = rig.drive.stop()
+    rig.pass_time(0.0)
+    asked_at = rig.clock.now
+    assert answered(rig, stop)
+    assert rig.clock.now > asked_at
+    rig.pass_time(1.0)
+    for command in (
+        rig.drive.enable(asked_at), rig.drive.tune(Procedure.FULL, asked_at=asked_at)
+    ):
+        assert 'a stop was confirmed after this was asked for' in rig.answer(command)
+        assert rig.far.control_unit.scmd == Scmd.STOP
+    assert 'enabled' in rig.answer(rig.drive.enable(rig.clock.now))
+
+
 def test_an_enable_is_refused_until_every_quick_stop_has_ended(make_virtual: MakeVirtual) -> None:
     rig = make_virtual()
     rig.ride()
