@@ -59,9 +59,9 @@ types: setup ## mypy, on all that is not ROS
 # More workers than processors: these tests wait more than they work.
 unit: setup ## tests without ROS, with the current and with the oldest pymodbus (FULL=1: all there is)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 test/unit
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 9 test/unit
 	@echo '== unit again, what uses pymodbus: the current one'
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 6 $(if $(FULL), \
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 $(if $(FULL), \
 		test/unit/link test/unit/simulator, $(USES_PYMODBUS))
 
 ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)

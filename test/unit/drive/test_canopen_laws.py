@@ -22,6 +22,7 @@ from canopen_rig import CanopenRig
 from drive_rig import PATIENCE
 from drive_rig import wait_until
 import pytest
+from support.examples import FULL
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
@@ -47,7 +48,7 @@ OVERLOAD = 5
 
 @EACH_SHAPE
 @METHODS
-@pytest.mark.parametrize('turnaround', [0.003, 0.05])
+@pytest.mark.parametrize('turnaround', [0.003, 0.05] if FULL else [0.003])
 def test_a_ride_over_each_shape_of_the_node(
     tmp_path: Path, shape: str, method: str, turnaround: float
 ) -> None:

@@ -27,6 +27,7 @@ from typing import Any
 from drive_rig import wait_until
 import pytest
 from support import telegram_laws
+from support.examples import FULL
 from telegram_rig import MODELS
 from telegram_rig import TelegramRig
 
@@ -53,6 +54,10 @@ WAYS_OUT: dict[str, Callable[[Drive], Future[Any]]] = {
     'exit': lambda drive: drive.stop_for_good(4.0),
 }
 Make = Callable[..., TelegramRig]
+
+
+#: For what does not depend on the family: the full run has all.
+ONE_MODEL = pytest.mark.parametrize('model', MODELS if FULL else MODELS[:1], indirect=True)
 
 
 @pytest.fixture(params=MODELS)
@@ -139,7 +144,8 @@ def test_a_fault_is_acknowledged_and_nothing_runs(make: Make, model: str) -> Non
     rig.ride(10.0)
 
 
-def test_a_release_is_needed(make: Make) -> None:
+@ONE_MODEL
+def test_a_release_is_needed(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=10.0, drive_time=10.0, released=False))
     rig.connect()
     assert 'has not released the drive to ROS' in rig.answer(rig.drive.enable())
@@ -155,7 +161,8 @@ def test_a_release_is_needed(make: Make) -> None:
     rig.stays()
 
 
-def test_the_driver_is_killed(make: Make) -> None:
+@ONE_MODEL
+def test_the_driver_is_killed(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=0.5, drive_time=10.0))
     rig.ride()
     # nothing is said any more, not even that it ends
@@ -164,7 +171,8 @@ def test_the_driver_is_killed(make: Make) -> None:
     rig.stands()
 
 
-def test_a_line_that_is_dead_for_long(make: Make) -> None:
+@ONE_MODEL
+def test_a_line_that_is_dead_for_long(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=0.5, drive_time=10.0), response_timeout=0.3, lost_after=5.0)
     rig.ride()
     rig.simulator.inject('line-dead', seconds=1.6)
@@ -176,7 +184,8 @@ def test_a_line_that_is_dead_for_long(make: Make) -> None:
     rig.ride(10.0)
 
 
-def test_a_plc_that_answers_slowly(make: Make) -> None:
+@ONE_MODEL
+def test_a_plc_that_answers_slowly(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=10.0, drive_time=10.0, answer_time=(0.05, 0.4)))
     rig.connect()
     rig.enable()
@@ -186,7 +195,8 @@ def test_a_plc_that_answers_slowly(make: Make) -> None:
     rig.stands()
 
 
-def test_a_plc_without_function_23(make: Make) -> None:
+@ONE_MODEL
+def test_a_plc_without_function_23(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=10.0, drive_time=10.0, write_and_read=False))
     rig.ride()
     assert 'stop' in rig.answer(rig.drive.stop())
