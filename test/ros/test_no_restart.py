@@ -28,6 +28,7 @@ from bench import wait_until
 import pytest
 from support.variants import hardest
 from ways import Way
+from ways import needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -152,12 +153,12 @@ def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
     [
         _fault_and_acknowledgement,
         _fault_that_stands,
-        _run_input_lost_and_back,
+        pytest.param(_run_input_lost_and_back, marks=needs('direct')),
         _keypad_stop,
         _power_cycle,
         _line_gone_for_five_seconds,
         _adapter_unplugged,
-        _mode_changed_by_somebody,
+        pytest.param(_mode_changed_by_somebody, marks=needs('direct')),
         _stop_service,
         _quick_stop_service,
         _disable,
@@ -192,6 +193,7 @@ def test_a_restarted_driver_lets_nothing_turn(bench: Bench, number: int) -> None
         _turns_after_enable(drive, client)
 
 
+@needs('direct')
 def test_enable_without_run_input_is_refused_and_withdrawn(bench: Bench) -> None:
     drive = bench.simulator(*_hardest(bench), '--no-run-input')
     bench.driver()
@@ -221,6 +223,7 @@ def test_setpoints_from_before_enable_do_not_count(bench: Bench) -> None:
     assert status.setpoint == 0
 
 
+@needs('direct')
 def test_a_drive_that_is_run_from_its_terminals_is_left_alone(bench: Bench) -> None:
     drive = bench.simulator(*_hardest(bench))
     bench.drives.run_by_terminals(drive)

@@ -185,6 +185,7 @@ def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     assert bench.drives.taken(state), 'control is still ours, and that makes this a test'
 
 
+@needs('direct')
 def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
     bench.simulator()
     driver = bench.driver()

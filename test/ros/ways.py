@@ -52,6 +52,8 @@ WITHOUT = {
     'own': 'it goes the one way that its command goes',
     'canopen': 'it is about CANopen',
     'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
+    'direct': 'behind a PLC there are no terminals, no time-out of the drive and no other drives',
+    'reverse': 'this model turns one way by its telegram',
     'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
 }
 
@@ -102,7 +104,7 @@ class Way:
     @property
     def drives(self) -> Drives:
         """What is to be known of its drives."""
-        return DRIVES.get(f'{self.model} {self.protocol}', DRIVES[self.model])
+        return DRIVES.get(f'{self.model} {self.method or self.protocol}') or DRIVES[self.model]
 
     @property
     def simulator(self) -> dict[str, str | int]:
@@ -155,11 +157,14 @@ class Way:
 
 
 #: Of any firmware, and of the usual one.
-_OLD_G2 = frozenset(('characters', 'local', 'delay', 'format', 'nominal', 'parameters', 'timeout'))
+_OLD_G2 = frozenset((
+    'characters', 'local', 'delay', 'direct', 'format', 'nominal', 'parameters', 'reverse',
+    'timeout',
+))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
-    'bare', 'characters', 'delay', 'fast', 'fine', 'format', 'later', 'local', 'modbus', 'newer',
-    'nominal',
+    'bare', 'characters', 'delay', 'direct', 'fast', 'fine', 'format', 'later', 'local', 'modbus',
+    'newer', 'nominal', 'reverse',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {'characters', 'fast', 'format', 'local'}
@@ -212,7 +217,10 @@ WAYS = {
         Way(
             'movitrac', 'movitrac',
             frozenset(
-                ('characters', 'local', 'movitrac', 'nominal', 'serial', 'states', 'timeout')
+                (
+                    'characters', 'direct', 'local', 'movitrac', 'nominal', 'reverse', 'serial',
+                    'states', 'timeout',
+                )
             ),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
         ),
@@ -220,14 +228,20 @@ WAYS = {
             'canopen', 'canopen', _ON_CANOPEN,
             baud_rate=125_000, beyond=_NOT_ON_MODBUS,
         ),
+        *(
+            Way(
+                f'telegram1_{name}', 'modbus_tcp', features, model, method='telegram1', block=7,
+            )
+            for name, model, features in (
+                ('h', 'sinus_h', frozenset()),
+                ('optimal', 'sinus_optimal', frozenset(('reverse',))),
+                ('g2', 'sinus_g2', frozenset(('reverse',))),
+            )
+        ),
     )
 }
-#: Through a PLC, by telegram 1, which tells less than any line of the drives themselves: their
-#: tests are their own.
-TELEGRAM1 = {
-    model: Way(f'telegram1_{model}', 'modbus_tcp', frozenset(), model, method='telegram1', block=7)
-    for model in ('sinus_optimal', 'sinus_h', 'sinus_g2')
-}
+#: Through a PLC, which tells less than any line of the drives themselves, by their models.
+TELEGRAM1 = {way.model: way for way in WAYS.values() if way.method == 'telegram1'}
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.
 EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii', 'movitrac')

@@ -29,14 +29,19 @@ State = Mapping[str, Any]
 
 
 class Fault(NamedTuple):
-    """A fault by its code, what the drive calls it, and words of what is said of it."""
+    """
+    A fault by its code, what it is called, and words of what is said of it.
+
+    :ivar told: the code that the driver tells, where it is not told which fault it is.
+    """
 
     code: int
     text: str
     explained: tuple[str, ...] = ()
+    told: int = 0
 
     def __str__(self) -> str:
-        return f'{self.code} {self.text}'
+        return f'{self.told or self.code} {self.text}'
 
 
 @dataclass(frozen=True)
@@ -216,6 +221,49 @@ class Movitrac(Drives):
         drive.inject('terminal', 41, 'open')
 
 
+@dataclass(frozen=True)
+class BehindPlc(Drives):
+    """
+    Those that a PLC commands for the driver, by STW1 of telegram 1.
+
+    :ivar run: the bits of STW1 that are there for no other reason than a run command.
+    """
+
+    run: int = 0
+
+    def ramps(self, up: float, down: float | None = None) -> tuple[str, ...]:
+        return super().ramps(up, down) if self.up else ()
+
+    def commanded(self, state: State) -> bool:
+        return bool(state['plc']['stw1'] & self.run)
+
+    def taken(self, state: State) -> bool:
+        return bool(state['plc']['stw1'] & 1 << 10)
+
+    def left(self, state: State) -> bool:
+        # what is left is that the PLC commands it
+        return not self.commanded(state) and not state['plc']['setpoint']
+
+    def stopping(self, state: State) -> bool:
+        return not state['driven'] or not self.commanded(state)
+
+    def timeout(self, seconds: float) -> tuple[str, ...]:
+        raise NotImplementedError('that is the affair of the PLC')
+
+    def has_timeout(self, state: State, seconds: float) -> bool:
+        raise NotImplementedError('that is the affair of the PLC')
+
+    def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
+        drive.inject('keypad', 'stop')
+        noticed()
+
+    def run_by_terminals(self, drive: Simulated) -> None:
+        raise NotImplementedError('the PLC alone commands it')
+
+    def end_run_by_terminals(self, drive: Simulated) -> None:
+        raise NotImplementedError('the PLC alone commands it')
+
+
 _SINUS = {
     'control_method': 'mode_scmd',
     'up': 'control.accel',
@@ -235,6 +283,17 @@ _G2 = {
     'no_timeout': ('--set', 'serial.auto_stop=OFF'),
     'nominal': 50.0,
 }
+#: Whatever it is, the telegram tells that there is one.
+_SOME_FAULT = {'text': 'Fault', 'told': 191}
+_PLC = {
+    **_SINUS,
+    'control_method': 'telegram1',
+    'overload': Fault(5, **_SOME_FAULT),
+    'overheating': Fault(3, **_SOME_FAULT),
+    'overvoltage': Fault(8, **_SOME_FAULT),
+    'hot_motor': Fault(4, **_SOME_FAULT),
+    'silence': 'Fault',
+}
 DRIVES = {
     'sinus_g2': Sinus(**_G2),
     # the module holds it in bus mode, and watches over the driver
@@ -245,6 +304,19 @@ DRIVES = {
         overvoltage=Fault(8, 'DC High', ('Lengthen the retardation time',)),
         hot_motor=Fault(4, 'PTC Temp', ('temperature sensor', 'Let the motor cool')),
         coasts=False,
+    ),
+    'sinus_optimal telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0, coasts=False),
+    'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x2009, nominal=150.0),
+    # its ramps are set at its keypad alone
+    'sinus_h': BehindPlc(
+        **{
+            **_PLC,
+            'up': '',
+            'down': '',
+            'overload': Fault(11, **_SOME_FAULT),
+            'overheating': Fault(11, **_SOME_FAULT),
+        },
+        run=0x0008, nominal=60.0,
     ),
     'movitrac31': Movitrac(
         control_method='function_bits',
