@@ -56,10 +56,13 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
+from support import telegram_laws
+from support import trace_laws
 from support.drives import Drives
 from ways import UNFRAMED
 from ways import Way
 
+from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: Machines are shared and slow: a condition that does not come true in this time never will, s.
@@ -71,6 +74,8 @@ A_WHILE = 2.0
 
 #: How often a drive is polled where a test does not want it as fast as the line allows, Hz.
 POLL_RATE = 25.0
+#: For how long a PLC misses the driver, or the drive, before it stops the motor, s.
+_PLC_TIME = 5.0
 #: For a test that does.
 FULL_RATE = ('-p', 'poll_rate:=0.0')
 #: For a test that wants the command itself, and no fork.
@@ -207,6 +212,8 @@ class Bench(contextlib.ExitStack):
             self.port = self.line['link'] = str(folder / 'line')
         self.trace = folder / 'trace.jsonl'
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        if way.method == 'telegram1':
+            self._environment[forks.PLC_TIME] = str(_PLC_TIME)
         self.domain = domain
         self._drivers: list[Process] = []
 
@@ -219,6 +226,8 @@ class Bench(contextlib.ExitStack):
         """Start a simulated line, as slow as a real one if paced; return what looks into it."""
         command = [_executable('simulator'), '--trace', str(self.trace)]
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
+        if self.way.method == 'telegram1':
+            command += ['--ros-time', str(_PLC_TIME), '--drive-time', str(_PLC_TIME)]
         command += [*(['--paced'] if paced else []), *arguments]
         log = self.folder / 'simulator.log'
         process = Process(command, self._environment, log, forks.start)
@@ -268,6 +277,14 @@ class Bench(contextlib.ExitStack):
         """Return what the simulator's line has traced so far."""
         lines = self.trace.read_text().splitlines()
         return [json.loads(line) for line in lines if line.endswith('}')]
+
+    def violations(self) -> list[str]:
+        """Return what breaks the laws of the house in the trace."""
+        way, frames = self.way, self.frames()
+        if way.method == 'telegram1':
+            return telegram_laws.violations(frames, way.model, 1, way.block)
+        gap = LineSettings(way.baud_rate).frame_gap
+        return trace_laws.violations(frames, gap, way.model, way.protocol)
 
     def requests(self) -> list[str]:
         """Return what Modbus requests arrived so far: unit and PDU in hexadecimal."""

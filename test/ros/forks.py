@@ -47,6 +47,9 @@ _MODULES = (
     'sensor_msgs.msg',
     'yaml',
 )
+#: In the environment: how patient the driver takes a PLC for, s, on a machine that may rest for
+#: longer than a PLC waits.
+PLC_TIME = 'PLC_TIME_OF_TESTS'
 _SET_CHILD_SUBREAPER = 36
 #: How often it is looked whether one has ended, s.
 _PERIOD = 0.005
@@ -139,6 +142,10 @@ def _become(command: list[str], environment: dict[str, str], log: str) -> None:
         os.dup2(opened, descriptor)
         os.close(opened)
     os.dup2(1, 2)
+    if PLC_TIME in environment:
+        importlib.import_module('nfo_sinus_driver.link.telegram').PLC_TIME = float(
+            environment[PLC_TIME]
+        )
     sys.argv = command
     runpy.run_path(command[0], run_name='__main__')
 

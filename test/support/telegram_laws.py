@@ -29,9 +29,6 @@ import dataclasses
 import struct
 from typing import Any
 
-#: How long the driver's count may stand still for the PLC, s [C108].
-PLC_TIME = 1.0
-
 
 @dataclasses.dataclass(frozen=True)
 class Exchange:

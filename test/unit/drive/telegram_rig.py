@@ -25,6 +25,7 @@ from pathlib import Path
 import threading
 import time
 from typing import Any
+from unittest import mock
 
 from drive_rig import PATIENCE
 from drive_rig import Notes
@@ -38,6 +39,7 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -57,6 +59,7 @@ class TelegramRig:
         *,
         plc: PlcSetting | None = None,
         response_timeout: float = 2.0,
+        plc_time: float = UNHURRIED,
         **settings: Any,
     ) -> None:
         self.model = model
@@ -72,10 +75,13 @@ class TelegramRig:
         usual = {'control_method': 'telegram1', 'lost_after': UNHURRIED, 'setpoint_timeout': 0.0}
         self.settings = DriveSettings(model=model, **{**usual, **settings})
         self.drive = Drive(self.bus, self.settings, self.notes)
+        # as the PLC, the driver gives it the benefit of the doubt
+        self._plc_time = mock.patch.object(telegram, 'PLC_TIME', plc_time)
         self._publishing = threading.Event()
         self._publisher: threading.Thread | None = None
 
     def start(self) -> None:
+        self._plc_time.start()
         self.simulator.start()
         self.bus.start()
 
@@ -83,6 +89,7 @@ class TelegramRig:
         self.send(None)
         self.bus.close()
         self.simulator.stop()
+        self._plc_time.stop()
         found = telegram_laws.violations(self.frames, self.model)
         assert not found, found
 

@@ -173,7 +173,10 @@ def test_the_driver_is_killed(make: Make, model: str) -> None:
 
 @ONE_MODEL
 def test_a_line_that_is_dead_for_long(make: Make, model: str) -> None:
-    rig = make(plc=PlcSetting(ros_time=0.5, drive_time=10.0), response_timeout=0.3, lost_after=5.0)
+    rig = make(
+        plc=PlcSetting(ros_time=0.5, drive_time=10.0),
+        response_timeout=0.3, lost_after=5.0, plc_time=1.0,
+    )
     rig.ride()
     rig.simulator.inject('line-dead', seconds=1.6)
     wait_until(lambda: rig.notes.told('was not reached for'))
