@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
 import ctypes
+import itertools
 import json
 import os
 from pathlib import Path
@@ -228,6 +229,9 @@ class Bench(contextlib.ExitStack):
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
         if self.way.method == 'telegram1':
             command += ['--ros-time', str(_PLC_TIME), '--drive-time', str(_PLC_TIME)]
+            # each drive at the same place of another unit
+            units = [n for word, n in itertools.pairwise(arguments) if word == '--address'] or ['1']
+            command += [word for unit in units for word in ('--block', f'{unit}:{self.way.block}')]
         command += [*(['--paced'] if paced else []), *arguments]
         log = self.folder / 'simulator.log'
         process = Process(command, self._environment, log, forks.start)
@@ -282,7 +286,12 @@ class Bench(contextlib.ExitStack):
         """Return what breaks the laws of the house in the trace."""
         way, frames = self.way, self.frames()
         if way.method == 'telegram1':
-            return telegram_laws.violations(frames, way.model, 1, way.block)
+            units = {bytes.fromhex(frame['hex'])[6] for frame in frames}
+            return [
+                complaint
+                for unit in sorted(units)
+                for complaint in telegram_laws.violations(frames, way.model, unit, way.block)
+            ]
         gap = LineSettings(way.baud_rate).frame_gap
         return trace_laws.violations(frames, gap, way.model, way.protocol)
 

@@ -46,6 +46,7 @@ def running(simulator) -> list[bool]:
     return [simulator.state(address)['turning'] for address in (1, 2, 3)]
 
 
+@needs('watched')
 def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(bench: Bench) -> None:
     simulator, everybody = start(bench)
     answer = everybody.call('enable_all')
@@ -69,6 +70,7 @@ def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(ben
     assert simulator.state(3)['writes'] == {}
 
 
+@needs('watched')
 def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -> None:
     simulator, everybody = start(bench)
     assert everybody.call('enable_all').success

@@ -21,6 +21,9 @@ from bench import Bench
 from bench import Client
 from bench import holds_for
 from bench import wait_until
+from ways import needs
+
+pytestmark = needs('direct')
 
 _TWO = """
 nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}

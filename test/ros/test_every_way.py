@@ -313,6 +313,7 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
         drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
 
 
+@needs('watched')
 def test_monitor_writes_nothing(bench: Bench) -> None:
     drive = _simulator(bench)
     bench.driver(*_MODEST, '-p', 'control_method:=monitor')

@@ -372,6 +372,7 @@ def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> No
         assert client.messages['status'][-1].control_method == DriveStatus.DRIVE_CONTROL
 
 
+@needs('watched')
 def test_monitor_writes_nothing(bench: Bench) -> None:
     drive = bench.simulator()
     driver = bench.driver(*FULL_RATE, '-p', 'control_method:=monitor', '-p', 'drive_timeout:=2.0')

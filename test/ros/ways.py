@@ -52,7 +52,8 @@ WITHOUT = {
     'own': 'it goes the one way that its command goes',
     'canopen': 'it is about CANopen',
     'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
-    'direct': 'behind a PLC there are no terminals, no time-out of the drive and no other drives',
+    'direct': 'behind a PLC there are no terminals, and no time-out of the drive for its driver',
+    'watched': 'its telegram tells its state to who commands it alone',
     'reverse': 'this model turns one way by its telegram',
     'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
 }
@@ -110,8 +111,7 @@ class Way:
     def simulator(self) -> dict[str, str | int]:
         """The settings of a simulated line, as `Simulator` names them."""
         if self.method == 'telegram1':
-            block = f'1:{self.block}'
-            return {'protocol': self.method, 'model': self.model, 'address': 1, 'block': block}
+            return {'protocol': self.method, 'model': self.model}
         settings: dict[str, str | int] = {
             'protocol': self.protocol, 'model': self.model, 'baud': self.baud_rate
         }
@@ -159,12 +159,12 @@ class Way:
 #: Of any firmware, and of the usual one.
 _OLD_G2 = frozenset((
     'characters', 'local', 'delay', 'direct', 'format', 'nominal', 'parameters', 'reverse',
-    'timeout',
+    'timeout', 'watched',
 ))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'characters', 'delay', 'direct', 'fast', 'fine', 'format', 'later', 'local', 'modbus',
-    'newer', 'nominal', 'reverse',
+    'newer', 'nominal', 'reverse', 'watched',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {'characters', 'fast', 'format', 'local'}
@@ -219,7 +219,7 @@ WAYS = {
             frozenset(
                 (
                     'characters', 'direct', 'local', 'movitrac', 'nominal', 'reverse', 'serial',
-                    'states', 'timeout',
+                    'states', 'timeout', 'watched',
                 )
             ),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
@@ -233,7 +233,7 @@ WAYS = {
                 f'telegram1_{name}', 'modbus_tcp', features, model, method='telegram1', block=7,
             )
             for name, model, features in (
-                ('h', 'sinus_h', frozenset()),
+                ('h', 'sinus_h', frozenset(('watched',))),
                 ('optimal', 'sinus_optimal', frozenset(('reverse',))),
                 ('g2', 'sinus_g2', frozenset(('reverse',))),
             )

@@ -22,6 +22,7 @@ and [M0 tables 14 to 16] print it, with [C107] and [C109].
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
@@ -76,7 +77,7 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
                 assert version == 1
 
 
-class Judge:
+class Judge(abc.ABC):
     """Hears the words to one drive, one after another; complains of what the tables forbid."""
 
     #: Bits of STW1 that mean something, and of ZSW1: control.
@@ -113,9 +114,9 @@ class Judge:
         for wrong in self.order(now.stw1, stood, now.zsw1):
             yield f'{shown} (it was {stood:04X}h): {wrong}'
 
+    @abc.abstractmethod
     def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
         """Yield what is wrong with the order of the bits."""
-        raise NotImplementedError
 
 
 class OptimalJudge(Judge):

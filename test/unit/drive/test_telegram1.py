@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 import contextlib
 from pathlib import Path
+import time
 from typing import Any
 
 from drive_rig import wait_until
@@ -196,6 +197,28 @@ def test_a_plc_that_answers_slowly(make: Make, model: str) -> None:
     wait_until(lambda: abs(rig.far.motor.frequency - 15.0) < 0.5)
     assert 'stop' in rig.answer(rig.drive.stop())
     rig.stands()
+
+
+@ONE_MODEL
+def test_a_stop_is_the_next_thing_in_the_block(make: Make, model: str) -> None:
+    setting = PlcSetting(ros_time=10.0, drive_time=10.0, answer_time=(0.05, 0.05))
+    # more is always waiting for its turn
+    rig = make(plc=setting, telemetry_rate=50.0)
+    run = telegram_laws.JUDGES[model].run
+    for _ in range(5):
+        rig.ride()
+        asked_at = time.monotonic()
+        rig.answer(rig.drive.stop())
+        rig.send(None)
+        words = [
+            one.stw1
+            for one in telegram_laws.exchanges(
+                [frame for frame in rig.frames if frame['first'] > asked_at], 1
+            )
+        ]
+        # what the worker had taken up already goes before it
+        told = next(number for number, word in enumerate(words) if not word & run)
+        assert told <= 1, [f'{word:04X}' for word in words]
 
 
 @ONE_MODEL
