@@ -48,6 +48,7 @@ from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
+from nfo_sinus_driver.node.overrides import overruled_parameters
 from nfo_sinus_driver.node.overrides import refuse_other_arguments
 from nfo_sinus_driver.node.overrides import take_out_end_with
 from nfo_sinus_driver.node.overrides import take_out_node_name
@@ -105,7 +106,11 @@ class DriverProcess:
     def _warn_of_unknown_names(self, arguments: list[str]) -> None:
         nodes = (self._bus_node, *self._drives)
         names = [node.get_name() for node in nodes]
-        for warning in (*unknown_nodes(arguments, names), *unknown_parameters(nodes)):
+        for warning in (
+            *unknown_nodes(arguments, names),
+            *unknown_parameters(nodes),
+            *overruled_parameters(arguments, nodes),
+        ):
             self._bus_node.get_logger().warning(warning)
 
     def start(self) -> None:

@@ -24,8 +24,11 @@ from pathlib import Path
 import re
 from typing import Any
 
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.parameter import get_parameter_value
+from rclpy.parameter import parameter_value_to_python
 from rclpy.utilities import remove_ros_args
 import yaml
 
@@ -108,6 +111,48 @@ def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
                     )
 
 
+def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterator[str]:
+    """
+    Return a warning for each ``-p name:=value`` that a node has another value for.
+
+    To ROS the more specific name counts, wherever it stands: that of a node in a parameter file
+    goes before one that is given to all on the command line.
+    """
+    given = dict(_given_to_all(arguments))
+    for node in nodes:
+        for name, text in given.items():
+            override = node._parameter_overrides.get(name)
+            if override is not None and not _is_value(override, text):
+                counts = parameter_value_to_python(override.get_parameter_value())
+                yield (
+                    f'parameter {name}:={text} of the command line does not count for '
+                    f'{node.get_name()}: a parameter file gives {counts!r} to a more specific '
+                    f'name. Change the file, or give -p {node.get_name()}:{name}:={text}'
+                )
+
+
+def _given_to_all(arguments: list[str]) -> Iterator[tuple[str, str]]:
+    """Return names and values of what the command line gives to every node."""
+    in_ros = False
+    for argument, following in itertools.pairwise([*arguments, '']):
+        in_ros = argument == _ROS_ARGS or (in_ros and argument != _END)
+        if in_ros and argument in _PARAM_FLAGS:
+            rule = _RULE.fullmatch(following)
+            if rule:
+                yield rule[1], rule[2]
+
+
+def _is_value(override: Parameter, text: str) -> bool:
+    """Tell whether a parameter has the value that was given as text, as ROS reads it."""
+    try:
+        given = Parameter.from_parameter_msg(
+            ParameterMessage(name=override.name, value=get_parameter_value(text))
+        ).value
+    except (ValueError, yaml.YAMLError):
+        return True
+    return bool(given == override.value or str(given) == str(override.value))
+
+
 def _load(path: str) -> Any:
     try:
         return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
@@ -135,6 +180,9 @@ def _did_you_mean(name: str, known: Iterable[str]) -> str:
 
 _ROS_ARGS = '--ros-args'
 _END = '--'
+_PARAM_FLAGS = ('-p', '--param')
+#: Of no node: its name would stand before the parameter's, and a colon.
+_RULE = re.compile(r'([^:]+):=(.*)', re.DOTALL)
 _REMAP_FLAGS = ('-r', '--remap')
 _NODE = re.compile(r'(?:__node|__name):=(.+)')
 
