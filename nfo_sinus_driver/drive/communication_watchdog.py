@@ -87,8 +87,7 @@ class CommunicationWatchdog:
         inverter = self._inverter
         if inverter.plc_time:
             raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=inverter.plc_time))
-        inverter.watched_by = await inverter.registers.watch(seconds, Priority.SERVICE)
-        inverter.watched_for = seconds if inverter.watched_by else 0.0
+        await inverter.watch(seconds)
         key = inverter.model.key
         wanted: dict[str, Value] = {}
         if not inverter.watched_by:
@@ -135,19 +134,14 @@ class CommunicationWatchdog:
 
     async def _end_watch(self) -> None:
         inverter = self._inverter
-        if not inverter.watched_by:
+        by, seconds = inverter.watched_by, inverter.watched_for
+        if not by:
             return
         try:
-            await inverter.registers.watch(0.0, Priority.SERVICE)
+            await inverter.watch(0.0)
         except LinkError as error:
-            inverter.tell(
-                Severity.WARNING,
-                Cause.WATCH_LEFT,
-                why=explain_failure(error, inverter),
-                by=inverter.watched_by,
-                seconds=inverter.watched_for,
-            )
-        inverter.watched_by, inverter.watched_for = '', 0.0
+            why = explain_failure(error, inverter)
+            inverter.tell(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(

@@ -376,6 +376,12 @@ class DriveState:
         """The speed as last polled, rpm."""
         return self.last_polled(Role.ACTUAL_SPEED).value
 
+    async def watch(self, seconds: float) -> None:
+        """Have the drive notice a silence of so long, s, by what lives on the line; 0: no more."""
+        self.watched_by, self.watched_for = '', 0.0
+        self.watched_by = await self.registers.watch(seconds, Priority.SERVICE)
+        self.watched_for = seconds if self.watched_by else 0.0
+
     @property
     def own_timeout(self) -> float:
         """After which silence the drive itself does something, s; 0: after none."""
