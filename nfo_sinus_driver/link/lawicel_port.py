@@ -28,6 +28,8 @@ from nfo_sinus_driver.link.port import Port
 
 #: How long an adapter may take to say that it has done something, s; some never say it.
 _REPLY_TIME = 0.1
+#: For how long at most it is waited that it has nothing more to say, s.
+_LONGEST_TALK = 1.0
 
 
 class LawicelPort:
@@ -57,7 +59,8 @@ class LawicelPort:
         try:
             # an earlier program may have left it on the bus, in the middle of a line
             self._port.write(lawicel.FLUSH)
-            self._ask(lawicel.CLOSE)
+            self._port.write(lawicel.CLOSE)
+            self._hear_out()
             if self._ask(self._set_rate).refused:
                 raise PortError(f'the adapter cannot do {self._rate} bit/s on the CAN bus')
             if self._ask(lawicel.OPEN).refused:
@@ -85,11 +88,16 @@ class LawicelPort:
             self.trouble = ''
         return heard.frames
 
+    def _hear_out(self) -> None:
+        """Wait until it says nothing more: a late answer would count for another command."""
+        now = time.monotonic()
+        end = now + _LONGEST_TALK
+        while now < end and self._port.read(min(now + _REPLY_TIME, end)):
+            now = time.monotonic()
+        self._reader = lawicel.Reader()
+
     def _ask(self, command: bytes) -> lawicel.Heard:
         """Return what the adapter says to a command that was given alone."""
-        while self._port.read(0.0):
-            # what was said before it
-            self._reader = lawicel.Reader()
         self._port.write(command)
         until = time.monotonic() + _REPLY_TIME
         heard = self._reader.feed(b'')

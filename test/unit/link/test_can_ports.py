@@ -65,6 +65,9 @@ class Adapter:
         self.coming = b''
         self.is_open = False
         self.now = 0.0
+        #: How long it takes to answer, s, and what comes of that when.
+        self.slow = 0.0
+        self.late: list[tuple[float, bytes]] = []
 
     def monotonic(self) -> float:
         return self.now
@@ -79,11 +82,18 @@ class Adapter:
         if not self.is_open:
             raise PortError('closed')
         self.told.append(data)
-        self.coming += self.says.get(data, b'')
+        answer = self.says.get(data, b'')
+        if self.slow and answer:
+            self.late.append((self.now + self.slow, answer))
+        else:
+            self.coming += answer
 
     def read(self, until: float) -> bytes:
         if not self.coming:
-            self.now = max(self.now, until)
+            at = min((one[0] for one in self.late), default=until)
+            self.now = max(self.now, min(at, until))
+            self.coming = b''.join(answer for at, answer in self.late if at <= self.now)
+            self.late = [one for one in self.late if one[0] > self.now]
         data, self.coming = self.coming[:3], self.coming[3:]
         return data
 
@@ -99,7 +109,7 @@ def test_an_adapter_goes_onto_the_bus_and_off_it(adapter: Adapter) -> None:
     port = LawicelPort(adapter, 125_000)
     port.open()
     assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
-    assert adapter.now == 0.0, 'nothing was waited for'
+    assert adapter.now == pytest.approx(0.1), 'it was heard out, and else nothing waited for'
     port.send(REQUEST)
     assert adapter.told[4:] == [b't60584013200000000000\r']
     port.close()
@@ -115,6 +125,30 @@ def test_an_adapter_that_was_left_on_the_bus(adapter: Adapter) -> None:
     port.open()
     assert port.receive(0.0) == []
     assert port.trouble == ''
+
+
+def test_late_answers_of_an_adapter_count_for_what_they_answer(adapter: Adapter) -> None:
+    adapter.says |= {b'\r\r\r': b'\r\r\a', b'C\r': b'\a'}
+    adapter.slow = 0.05
+    LawicelPort(adapter, 125_000).open()
+    # what it refused was not the bit rate
+    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    adapter.says[b'S4\r'] = b'\a'
+    with pytest.raises(PortError, match='cannot do 125000 bit/s'):
+        LawicelPort(adapter, 125_000).open()
+
+
+def test_an_adapter_that_never_ceases_to_talk_is_used_all_the_same(
+    adapter: Adapter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def talk(until: float) -> bytes:
+        adapter.now += 0.01
+        return b't'
+
+    monkeypatch.setattr(adapter, 'read', talk)
+    LawicelPort(adapter, 125_000).open()
+    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.now < 2.0
 
 
 def test_an_adapter_that_answers_no_command_is_used_all_the_same(adapter: Adapter) -> None:
@@ -329,7 +363,12 @@ def test_frames_of_a_socket(paper: PaperSocket) -> None:
     port.send(REQUEST)
     assert paper.sent == [raw(0x605, REQUEST.data)]
     assert port.receive(0.0) == []
-    paper.arrive(raw(0x585, ANSWER.data), raw(0x80000585, b''), raw(0x585, b'\1'), raw(1, b'', 9))
+    port.send(Frame(0x705, b'', remote=True))
+    assert paper.sent[1:] == [raw(0x40000705, b'')]
+    paper.arrive(
+        raw(0x585, ANSWER.data), raw(0x80000585, b''), raw(0x40000585, b''), raw(0x585, b'\1'),
+        raw(1, b'', 9),
+    )
     assert port.receive(0.0) == [ANSWER, Frame(0x585, b'\1')]
     assert port.receive(0.0) == []
     port.close()
