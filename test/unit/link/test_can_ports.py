@@ -84,7 +84,9 @@ class Adapter:
         self.told.append(data)
         answer = self.says.get(data, b'')
         if self.slow and answer:
-            self.late.append((self.now + self.slow, answer))
+            # one after the other
+            begun = max([self.now, *(at for at, _ in self.late)])
+            self.late.append((begun + self.slow, answer))
         else:
             self.coming += answer
 
@@ -129,7 +131,7 @@ def test_an_adapter_that_was_left_on_the_bus(adapter: Adapter) -> None:
 
 def test_late_answers_of_an_adapter_count_for_what_they_answer(adapter: Adapter) -> None:
     adapter.says |= {b'\r\r\r': b'\r\r\a', b'C\r': b'\a'}
-    adapter.slow = 0.05
+    adapter.slow = 0.04
     LawicelPort(adapter, 125_000).open()
     # what it refused was not the bit rate
     assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
