@@ -435,6 +435,10 @@ class Client(contextlib.ExitStack):
     def run_at(self, value: float) -> Iterator[None]:
         """Enable, and publish a set-point until the motor is there and all through the block."""
         response = self.enable()
+        while 'a stop is on its way' in response.message:
+            # what was found under control is being stopped
+            time.sleep(0.05)
+            response = self.enable()
         assert response.success, response.message
         with self.setpoints(value):
             self.wait_for('status', lambda status: abs(status.actual - value) < 1, f'{value}')

@@ -24,6 +24,7 @@ from bench import Bench
 import pytest
 from ways import DEFAULT
 from ways import EACH_KIND
+from ways import USUAL
 from ways import WAYS
 from ways import Way
 from ways import why_not
@@ -60,8 +61,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         # the option is not there where the folder above is given
         asked = metafunc.config.getoption('--way', DEFAULT)
         marked = metafunc.definition.get_closest_marker
-        if asked == _ALL or marked('every_way'):
+        if asked == _ALL:
             ways = [*WAYS]
+        elif marked('every_way'):
+            ways = [*dict.fromkeys((*USUAL, asked))]
         else:
             ways = [*EACH_KIND] if marked('each_kind') else [asked]
         metafunc.parametrize('way', ways, indirect=True, scope='module')

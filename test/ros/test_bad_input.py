@@ -200,6 +200,7 @@ def test_a_setpoint_that_is_no_number_is_ignored_with_one_warning(
     assert driver.text.count('not a finite number') == 1
 
 
+@needs('direct', 'reverse')
 def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver('-p', 'setpoint_max:=12.0')
@@ -217,6 +218,7 @@ def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -
     assert abs(drive.state()['setpoint']) == most
 
 
+@needs('direct')
 def test_a_setpoint_in_the_wrong_unit_does_not_race_the_motor(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver()
@@ -435,6 +437,7 @@ def test_a_name_for_the_whole_process_becomes_the_name_of_the_single_drive(bench
         ('/**/belt', ['-r', '__node:=belt', '-r', '__ns:=/line1'], '/line1'),
     ],
 )
+@needs('direct')
 def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     bench: Bench, section: str, renames: list[str], namespace: str
 ) -> None:

@@ -128,6 +128,7 @@ def test_no_set_point_for_all_without_a_broadcast(bench: Bench) -> None:
             wait_until(lambda: frequencies(simulator) == [0, 15, 0], 'its own does it')
 
 
+@needs('direct')
 def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
     simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     file = bench.folder / 'found.yaml'

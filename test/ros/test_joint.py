@@ -107,6 +107,7 @@ def test_a_joint_command_without_our_joint_is_told_once(bench: Bench) -> None:
     assert not simulator.state()['frequency']
 
 
+@needs('reverse')
 def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
     simulator, client = start(bench)
     assert client.enable().success

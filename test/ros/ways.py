@@ -52,7 +52,7 @@ WITHOUT = {
     'own': 'it goes the one way that its command goes',
     'canopen': 'it is about CANopen',
     'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
-    'direct': 'behind a PLC there are no terminals, and no time-out of the drive for its driver',
+    'direct': 'a PLC is between, and the telegram tells little: see test_telegram1_ros.py',
     'watched': 'its telegram tells its state to who commands it alone',
     'reverse': 'this model turns one way by its telegram',
     'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
@@ -242,6 +242,8 @@ WAYS = {
 }
 #: Through a PLC, which tells less than any line of the drives themselves, by their models.
 TELEGRAM1 = {way.model: way for way in WAYS.values() if way.method == 'telegram1'}
+#: Those of a normal run: the others behind a PLC have their share in test_telegram1_ros.py.
+USUAL = tuple(name for name in WAYS if name not in ('telegram1_optimal', 'telegram1_g2'))
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.
 EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii', 'movitrac')

@@ -315,6 +315,8 @@ DRIVES = {
             'down': '',
             'overload': Fault(11, **_SOME_FAULT),
             'overheating': Fault(11, **_SOME_FAULT),
+            'overvoltage': Fault(11, **_SOME_FAULT),
+            'hot_motor': Fault(11, **_SOME_FAULT),
         },
         run=0x0008, nominal=60.0,
     ),
