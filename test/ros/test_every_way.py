@@ -255,7 +255,7 @@ def _deactivate_and_clean_up(rig: Rig) -> None:
     [
         _fault,
         pytest.param(_run_input, marks=needs('direct')),
-        _keypad_stop,
+        pytest.param(_keypad_stop, marks=needs('keypad')),
         _dead_line,
         _lost_port,
         _power_cycle,

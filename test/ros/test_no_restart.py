@@ -154,7 +154,7 @@ def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
         _fault_and_acknowledgement,
         _fault_that_stands,
         pytest.param(_run_input_lost_and_back, marks=needs('direct')),
-        _keypad_stop,
+        pytest.param(_keypad_stop, marks=needs('keypad')),
         _power_cycle,
         _line_gone_for_five_seconds,
         _adapter_unplugged,

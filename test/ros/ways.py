@@ -54,6 +54,7 @@ WITHOUT = {
     'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
     'direct': 'a PLC is between, and the telegram tells little: see test_telegram1_ros.py',
     'watched': 'its telegram tells its state to who commands it alone',
+    'keypad': 'no manual tells how STW1 has control again after STOP at the keypad of this drive',
     'reverse': 'this model turns one way by its telegram',
     'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
 }
@@ -158,13 +159,13 @@ class Way:
 
 #: Of any firmware, and of the usual one.
 _OLD_G2 = frozenset((
-    'characters', 'local', 'delay', 'direct', 'format', 'nominal', 'parameters', 'reverse',
-    'timeout', 'watched',
+    'characters', 'local', 'delay', 'direct', 'format', 'keypad', 'nominal', 'parameters',
+    'reverse', 'timeout', 'watched',
 ))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
-    'bare', 'characters', 'delay', 'direct', 'fast', 'fine', 'format', 'later', 'local', 'modbus',
-    'newer', 'nominal', 'reverse', 'watched',
+    'bare', 'characters', 'delay', 'direct', 'fast', 'fine', 'format', 'keypad', 'later', 'local',
+    'modbus', 'newer', 'nominal', 'reverse', 'watched',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
 _ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {'characters', 'fast', 'format', 'local'}
@@ -218,8 +219,8 @@ WAYS = {
             'movitrac', 'movitrac',
             frozenset(
                 (
-                    'characters', 'direct', 'local', 'movitrac', 'nominal', 'reverse', 'serial',
-                    'states', 'timeout', 'watched',
+                    'characters', 'direct', 'keypad', 'local', 'movitrac', 'nominal', 'reverse',
+                    'serial', 'states', 'timeout', 'watched',
                 )
             ),
             'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
@@ -233,9 +234,9 @@ WAYS = {
                 f'telegram1_{name}', 'modbus_tcp', features, model, method='telegram1', block=7,
             )
             for name, model, features in (
-                ('h', 'sinus_h', frozenset(('watched',))),
+                ('h', 'sinus_h', frozenset(('keypad', 'watched'))),
                 ('optimal', 'sinus_optimal', frozenset(('reverse',))),
-                ('g2', 'sinus_g2', frozenset(('reverse',))),
+                ('g2', 'sinus_g2', frozenset(('keypad', 'reverse'))),
             )
         ),
     )
