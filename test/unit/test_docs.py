@@ -34,7 +34,9 @@ MESSAGES = ROOT / 'docs' / 'messages.md'
 DEVELOPMENT = ROOT / 'docs' / 'development.md'
 PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md')))
 PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
-CONFIGS = sorted((ROOT / 'config').glob('*.yaml'))
+#: Parameters of another node than the driver's; test/ros/test_config_names.py has those.
+OF_OTHERS = {'diagnostic_aggregator.yaml'}
+CONFIGS = sorted(path for path in (ROOT / 'config').glob('*.yaml') if path.name not in OF_OTHERS)
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
 #: Arguments of remapping that look like parameters.
 NO_PARAMETERS = {'__node', '__ns'}
@@ -200,7 +202,7 @@ def named_parameters(text: str) -> set[str]:
 
 def named_files(text: str) -> set[str]:
     """The files of the project that a page names with their folder."""
-    pattern = re.compile(r'[\w.-]+/[\w./-]*\.(?:py|md|yaml|rules|csv|rst)')
+    pattern = re.compile(r'[\w.-]+/[\w./-]*\.(?:py|md|yaml|rules|csv|rst|json|xml|service)')
     return {span for span in code_spans(text) if pattern.fullmatch(span)}
 
 

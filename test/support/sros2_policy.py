@@ -1,0 +1,55 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What ``config/sros2_policy.xml`` allows, read as SROS 2 reads it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from xml.etree import ElementTree
+
+#: What schema 0.2.0 lets an element of a profile say, and what its children are.
+RULES = {
+    'topics': ('topic', {'publish', 'subscribe'}),
+    'services': ('service', {'reply', 'request'}),
+    'actions': ('action', {'call', 'execute'}),
+}
+
+#: Enclave, then qualifier, then the full names that it is allowed for.
+Policy = dict[str, dict[str, set[str]]]
+
+
+def full_name(name: str, namespace: str, node: str) -> str:
+    """Return a name as the nodes of ROS have it."""
+    if name.startswith('/'):
+        return name
+    prefix = namespace.rstrip('/') + '/'
+    return f'{prefix}{node}{name[1:]}' if name.startswith('~') else prefix + name
+
+
+def allowed(path: Path) -> Policy:
+    """Return what each enclave is allowed."""
+    policy: Policy = {}
+    for enclave in ElementTree.parse(path).getroot().iter('enclave'):
+        rules = policy[enclave.attrib['path']] = defaultdict(set)
+        for profile in enclave.iter('profile'):
+            for rule in profile:
+                for qualifier, what in rule.attrib.items():
+                    assert what == 'ALLOW', f'{rule.tag} {qualifier}: {what}'
+                    rules[qualifier] |= {
+                        full_name(str(one.text), profile.attrib['ns'], profile.attrib['node'])
+                        for one in rule
+                    }
+    return policy

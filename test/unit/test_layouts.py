@@ -1,0 +1,119 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Layouts and groups in config/: of the form that their readers take; names are tested with ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+CONFIG = Path(__file__).resolve().parents[2] / 'config'
+FOXGLOVE = CONFIG / 'foxglove.json'
+PLOTJUGGLER = CONFIG / 'plotjuggler.xml'
+
+#: What each panel of the Foxglove layout has to say, by its type.
+PANELS = {
+    'Plot': {'paths'},
+    'StateTransitions': {'paths'},
+    'Indicator': {'path', 'rules', 'fallbackColor', 'fallbackLabel', 'style'},
+    'CallService': {'serviceName', 'requestPayload', 'editingMode', 'timeoutSeconds'},
+    'DiagnosticSummary': {'topicToRender'},
+}
+
+
+def leaves(layout: object) -> Iterator[str]:
+    """The panels of a layout, by their places."""
+    if isinstance(layout, str):
+        yield layout
+        return
+    assert isinstance(layout, dict)
+    assert layout['direction'] in ('row', 'column')
+    assert 0 < layout['splitPercentage'] < 100
+    for half in ('first', 'second'):
+        yield from leaves(layout[half])
+
+
+def test_foxglove_layout_has_a_place_for_each_panel() -> None:
+    layout = json.loads(FOXGLOVE.read_text())
+    assert {'configById', 'globalVariables', 'userNodes', 'playbackConfig', 'layout'} == set(layout)
+    places = list(leaves(layout['layout']))
+    assert sorted(places) == sorted(layout['configById'])
+
+
+def test_foxglove_panels_say_what_their_type_needs() -> None:
+    panels = json.loads(FOXGLOVE.read_text())['configById']
+    kinds = {name.partition('!')[0] for name in panels}
+    assert kinds == set(PANELS)
+    for name, panel in panels.items():
+        assert PANELS[name.partition('!')[0]] <= set(panel), name
+        if name.startswith('CallService!'):
+            # only so its answer is seen, which may be that the stop is not confirmed
+            assert panel['editingMode'] is True, name
+            json.loads(panel['requestPayload'])
+
+
+def test_plotjuggler_layout_is_whole() -> None:
+    root = ElementTree.parse(PLOTJUGGLER).getroot()
+    assert root.tag == 'root'
+    (window,) = root.findall('tabbed_widget')
+    assert window.attrib == {'name': 'Main Window', 'parent': 'main_window'}
+    for splitter in root.iter('DockSplitter'):
+        sizes = [float(size) for size in splitter.attrib['sizes'].split(';')]
+        assert len(splitter) == len(sizes) == int(splitter.attrib['count'])
+        assert sum(sizes) == pytest.approx(1.0)
+    for area in root.iter('DockArea'):
+        assert [plot.tag for plot in area] == ['plot']
+    (streamer,) = root.findall('previouslyLoaded_Streamer')
+    plugins = [plugin.attrib['ID'] for plugin in root.iter('plugin')]
+    assert streamer.attrib['name'] in plugins
+    # what it subscribes to is what it draws
+    (selected,) = root.iter('selected_topics')
+    drawn = [curve.attrib['name'] for curve in root.iter('curve')]
+    assert len(drawn) == len(set(drawn))
+    topics = {name.rpartition('/')[0] for name in drawn}
+    assert topics == set(selected.attrib['value'].split(';'))
+
+
+def test_aggregator_groups_have_what_an_analyzer_needs() -> None:
+    file = yaml.safe_load((CONFIG / 'diagnostic_aggregator.yaml').read_text())
+    # the name of the node that reads them
+    assert list(file) == ['analyzers']
+    found = dict(analyzers_of(file['analyzers']['ros__parameters']))
+    assert {'lines', 'drives'} < set(found)
+    for name, analyzer in found.items():
+        assert analyzer['path'], name
+        if analyzer['type'] == 'diagnostic_aggregator/GenericAnalyzer':
+            (how,) = {'regex', 'expected'} & set(analyzer)
+            # the reader takes lists and doubles, and no number of another type
+            assert isinstance(analyzer[how], list), name
+            assert isinstance(analyzer['timeout'], float), name
+        else:
+            assert analyzer['type'] == 'diagnostic_aggregator/AnalyzerGroup', name
+            assert analyzer['analyzers'], name
+
+
+def analyzers_of(group: dict[str, object]) -> Iterator[tuple[str, dict[str, object]]]:
+    """Every analyzer of a group and of the groups in it."""
+    for name, value in group.items():
+        if isinstance(value, dict) and 'type' in value:
+            yield name, value
+            nested = value.get('analyzers')
+            if isinstance(nested, dict):
+                yield from analyzers_of(nested)
