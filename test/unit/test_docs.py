@@ -36,8 +36,8 @@ PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').g
 PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 CONFIGS = sorted((ROOT / 'config').glob('*.yaml'))
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
-#: Arguments of remapping that look like parameters.
-NO_PARAMETERS = {'__node', '__ns'}
+#: Arguments of remapping, and the example of a message, that look like parameters.
+NO_PARAMETERS = {'__node', '__ns', 'name'}
 
 
 # --- what is public -------------------------------------------------------------------------------
