@@ -38,8 +38,8 @@ PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 OF_OTHERS = {'diagnostic_aggregator.yaml'}
 CONFIGS = sorted(path for path in (ROOT / 'config').glob('*.yaml') if path.name not in OF_OTHERS)
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
-#: Arguments of remapping that look like parameters.
-NO_PARAMETERS = {'__node', '__ns'}
+#: Arguments of remapping, and the example of a message, that look like parameters.
+NO_PARAMETERS = {'__node', '__ns', 'name'}
 
 
 # --- what is public -------------------------------------------------------------------------------
