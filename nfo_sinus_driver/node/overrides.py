@@ -115,19 +115,19 @@ def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterato
     """
     Return a warning for each ``-p name:=value`` that a node has another value for.
 
-    To ROS the more specific name counts, wherever it stands: that of a node in a parameter file
-    goes before one that is given to all on the command line.
+    To ROS the more specific name counts, wherever it stands, and of the same the later one: what a
+    parameter file gives to a node goes before what the command line gives to all.
     """
     given = dict(_given_to_all(arguments))
     for node in nodes:
         for name, text in given.items():
-            override = node._parameter_overrides.get(name)
+            override = node._parameter_overrides.get(name) if name in _declared(node) else None
             if override is not None and not _is_value(override, text):
                 counts = parameter_value_to_python(override.get_parameter_value())
                 yield (
                     f'parameter {name}:={text} of the command line does not count for '
-                    f'{node.get_name()}: a parameter file gives {counts!r} to a more specific '
-                    f'name. Change the file, or give -p {node.get_name()}:{name}:={text}'
+                    f'{node.get_name()}: a parameter file overrules it by {counts!r}. Change the '
+                    f'file, or give -p {node.get_name()}:{name}:={text} after --params-file'
                 )
 
 
