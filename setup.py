@@ -38,7 +38,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
-        *share('config', 'launch'),
+        *share('config', 'examples', 'launch'),
     ],
     python_requires='>=3.10',
     install_requires=['setuptools'],

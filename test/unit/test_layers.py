@@ -240,7 +240,7 @@ def package_sources() -> dict[str, str]:
 
 def own_files() -> list[str]:
     """Every Python file of the project, by its path; nothing that was built or installed."""
-    folders = (PACKAGE, 'test', 'benchmark', 'launch', 'tools', 'docs', 'msg_defs')
+    folders = (PACKAGE, 'test', 'benchmark', 'examples', 'launch', 'tools', 'docs', 'msg_defs')
     found = [path for folder in folders for path in (ROOT / folder).rglob('*.py')]
     return sorted(path.relative_to(ROOT).as_posix() for path in [*found, *ROOT.glob('*.py')])
 
