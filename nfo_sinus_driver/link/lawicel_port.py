@@ -28,6 +28,8 @@ from nfo_sinus_driver.link.port import Port
 
 #: How long an adapter may take to say that it has done something, s; some never say it.
 _REPLY_TIME = 0.1
+#: For how long it has to be silent before it is set up, s: longer when it seemed to refuse.
+_SILENCES = (0.1, 0.2, 0.4)
 #: For how long at most it is waited that it has nothing more to say, s.
 _LONGEST_TALK = 1.0
 
@@ -57,14 +59,11 @@ class LawicelPort:
         self._reader = lawicel.Reader()
         self.trouble = ''
         try:
-            # an earlier program may have left it on the bus, in the middle of a line
-            self._port.write(lawicel.FLUSH)
-            self._port.write(lawicel.CLOSE)
-            self._hear_out()
-            if self._ask(self._set_rate).refused:
-                raise PortError(f'the adapter cannot do {self._rate} bit/s on the CAN bus')
-            if self._ask(lawicel.OPEN).refused:
-                raise PortError('the adapter does not go onto the CAN bus: unplug it and try again')
+            for silence in _SILENCES:
+                refused = self._set_up(silence)
+                if not refused:
+                    return
+            raise PortError(refused)
         except PortError:
             self._port.close()
             raise
@@ -88,11 +87,23 @@ class LawicelPort:
             self.trouble = ''
         return heard.frames
 
-    def _hear_out(self) -> None:
+    def _set_up(self, silence: float) -> str:
+        """Take the adapter onto the bus after so long a silence, s; return what it refused."""
+        # an earlier program may have left it on the bus, in the middle of a line
+        self._port.write(lawicel.FLUSH)
+        self._port.write(lawicel.CLOSE)
+        self._hear_out(silence)
+        if self._ask(self._set_rate).refused:
+            return f'the adapter cannot do {self._rate} bit/s on the CAN bus'
+        if self._ask(lawicel.OPEN).refused:
+            return 'the adapter does not go onto the CAN bus: unplug it and try again'
+        return ''
+
+    def _hear_out(self, silence: float) -> None:
         """Wait until it says nothing more: a late answer would count for another command."""
         now = time.monotonic()
         end = now + _LONGEST_TALK
-        while now < end and self._port.read(min(now + _REPLY_TIME, end)):
+        while now < end and self._port.read(min(now + silence, end)):
             now = time.monotonic()
         self._reader = lawicel.Reader()
 

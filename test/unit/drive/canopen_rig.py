@@ -126,11 +126,21 @@ class CanopenRig(contextlib.ExitStack):
             while not ended.wait(0.02):
                 self.drive.set_setpoint(frequency)
 
-        self.drive.enable().result(PATIENCE)
+        def turns() -> bool:
+            if not self.drive.armed:
+                # the machine has rested for longer than the drive waits
+                with contextlib.suppress(DriveError):
+                    self.drive.acknowledge().result(PATIENCE)
+                with contextlib.suppress(DriveError):
+                    self.drive.enable().result(PATIENCE)
+            return abs(self.far.motor.frequency - frequency) < 0.2
+
+        with contextlib.suppress(DriveError):
+            self.drive.enable().result(PATIENCE)
         thread = threading.Thread(target=publish, daemon=True)
         thread.start()
         try:
-            wait_until(lambda: abs(self.far.motor.frequency - frequency) < 0.2)
+            wait_until(turns)
             yield
         finally:
             ended.set()

@@ -127,7 +127,15 @@ class TelegramRig:
             self.connect()
         self.enable()
         self.send(frequency)
-        wait_until(lambda: abs(self.far.motor.frequency - frequency) < 0.5)
+
+        def turns() -> bool:
+            if not self.drive.armed:
+                # the machine has rested for longer than the PLC waits
+                with contextlib.suppress(DriveError):
+                    self.enable()
+            return abs(self.far.motor.frequency - frequency) < 0.5
+
+        wait_until(turns)
 
     def answer(self, future: Future[Any]) -> str:
         """What a command answers, done or not."""

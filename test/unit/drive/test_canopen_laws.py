@@ -105,7 +105,7 @@ def test_the_drive_watches_before_the_motor_starts(tmp_path: Path, shape: str) -
 
 
 def test_the_watch_outlives_an_idle_driver(tmp_path: Path) -> None:
-    with CanopenRig(tmp_path, drive_timeout=1.5, poll_rate=0.2, telemetry_rate=0.0) as rig:
+    with CanopenRig(tmp_path, drive_timeout=8.0, poll_rate=0.2, telemetry_rate=0.0) as rig:
         rig.connect()
         asked = rig.drive.statistics.transactions
         wait_until(lambda: rig.drive.statistics.transactions > asked + 2)
@@ -129,7 +129,7 @@ def test_a_drive_that_started_anew_is_disarmed_at_once(tmp_path: Path) -> None:
 
 def test_a_long_ramp_leaves_no_fault_behind(tmp_path: Path) -> None:
     with CanopenRig(
-        tmp_path, drive_timeout=1.5, parameters={'control.retard': 30.0},
+        tmp_path, drive_timeout=4.0, parameters={'control.retard': 30.0},
         options=SHAPES['wide'],
     ) as rig:
         rig.connect()

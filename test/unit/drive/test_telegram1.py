@@ -116,13 +116,13 @@ def test_every_way_out_stops_the_motor(make: Make, model: str) -> None:
 
 @pytest.mark.parametrize('part', ['drive', 'program'])
 def test_old_or_invalid_data_stop_it_and_are_told(make: Make, model: str, part: str) -> None:
-    rig = make(lost_after=2.0, plc=PlcSetting(ros_time=10.0, drive_time=1.0))
+    rig = make(lost_after=3.0, plc=PlcSetting(ros_time=10.0, drive_time=2.0))
     rig.ride()
     if part == 'drive':
-        rig.simulator.inject('fieldbus-cut', seconds=5.0)
+        rig.simulator.inject('fieldbus-cut', seconds=6.0)
         wait_until(lambda: rig.notes.told('the PLC has no valid data from the drive'))
     else:
-        rig.simulator.inject('plc-stop', seconds=5.0)
+        rig.simulator.inject('plc-stop', seconds=6.0)
         wait_until(lambda: rig.notes.told('the data from the drive stand still in the PLC'))
     assert not rig.drive.armed
     wait_until(lambda: rig.words[-1] == STOPPED[model])
@@ -164,7 +164,7 @@ def test_a_release_is_needed(make: Make, model: str) -> None:
 
 @ONE_MODEL
 def test_the_driver_is_killed(make: Make, model: str) -> None:
-    rig = make(plc=PlcSetting(ros_time=0.5, drive_time=10.0))
+    rig = make(plc=PlcSetting(ros_time=1.5, drive_time=10.0))
     rig.ride()
     # nothing is said any more, not even that it ends
     rig.bus._stopping = True
@@ -175,11 +175,11 @@ def test_the_driver_is_killed(make: Make, model: str) -> None:
 @ONE_MODEL
 def test_a_line_that_is_dead_for_long(make: Make, model: str) -> None:
     rig = make(
-        plc=PlcSetting(ros_time=0.5, drive_time=10.0),
-        response_timeout=0.3, lost_after=5.0, plc_time=1.0,
+        plc=PlcSetting(ros_time=1.5, drive_time=10.0),
+        response_timeout=0.3, lost_after=10.0, plc_time=2.0,
     )
     rig.ride()
-    rig.simulator.inject('line-dead', seconds=1.6)
+    rig.simulator.inject('line-dead', seconds=4.0)
     wait_until(lambda: rig.notes.told('was not reached for'))
     rig.stands()
     wait_until(lambda: rig.drive.snapshot.connected)
