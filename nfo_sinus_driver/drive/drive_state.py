@@ -377,8 +377,11 @@ class DriveState:
         return self.last_polled(Role.ACTUAL_SPEED).value
 
     async def watch(self, seconds: float) -> None:
-        """Have the drive notice a silence of so long, s, by what lives on the line; 0: no more."""
-        self.watched_by, self.watched_for = '', 0.0
+        """
+        Have the drive notice a silence of so long, s, by what lives on the line; 0: no more.
+
+        Where that fails the drive may go on to watch as before, and that is what is known of it.
+        """
         self.watched_by = await self.registers.watch(seconds, Priority.SERVICE)
         self.watched_for = seconds if self.watched_by else 0.0
 

@@ -118,9 +118,14 @@ def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterato
     To ROS the more specific name counts, wherever it stands, and of the same the later one: what a
     parameter file gives to a node goes before what the command line gives to all.
     """
-    given = dict(_given_to_all(arguments))
+    rules = list(_rules(arguments))
+    given = {name: text for node_name, name, text in rules if not node_name}
+    # where the command line names the node, too, it overrules itself
+    specific = {(node_name.rsplit('/', 1)[-1], name) for node_name, name, _ in rules}
     for node in nodes:
         for name, text in given.items():
+            if (node.get_name(), name) in specific:
+                continue
             override = node._parameter_overrides.get(name) if name in _declared(node) else None
             if override is not None and not _is_value(override, text):
                 counts = parameter_value_to_python(override.get_parameter_value())
@@ -131,15 +136,15 @@ def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterato
                 )
 
 
-def _given_to_all(arguments: list[str]) -> Iterator[tuple[str, str]]:
-    """Return names and values of what the command line gives to every node."""
+def _rules(arguments: list[str]) -> Iterator[tuple[str, str, str]]:
+    """Return what the command line gives: to which node (empty: all), name and value."""
     in_ros = False
     for argument, following in itertools.pairwise([*arguments, '']):
         in_ros = argument == _ROS_ARGS or (in_ros and argument != _END)
         if in_ros and argument in _PARAM_FLAGS:
             rule = _RULE.fullmatch(following)
             if rule:
-                yield rule[1], rule[2]
+                yield rule[1] or '', rule[2], rule[3]
 
 
 def _is_value(override: Parameter, text: str) -> bool:
@@ -181,8 +186,8 @@ def _did_you_mean(name: str, known: Iterable[str]) -> str:
 _ROS_ARGS = '--ros-args'
 _END = '--'
 _PARAM_FLAGS = ('-p', '--param')
-#: Of no node: its name would stand before the parameter's, and a colon.
-_RULE = re.compile(r'([^:]+):=(.*)', re.DOTALL)
+#: Node, if one is named, parameter and value.
+_RULE = re.compile(r'(?:([^:=]+):)?([^:=]+):=(.*)', re.DOTALL)
 _REMAP_FLAGS = ('-r', '--remap')
 _NODE = re.compile(r'(?:__node|__name):=(.+)')
 

@@ -434,15 +434,16 @@ class Client(contextlib.ExitStack):
     @contextlib.contextmanager
     def run_at(self, value: float) -> Iterator[None]:
         """Enable, and publish a set-point until the motor is there and all through the block."""
-        response = self.enable()
-        while 'a stop is on its way' in response.message:
-            # what was found under control is being stopped
-            time.sleep(0.05)
-            response = self.enable()
+        response = wait_until(self._enable_unless_stopping, 'nothing is being stopped', period=0.05)
         assert response.success, response.message
         with self.setpoints(value):
             self.wait_for('status', lambda status: abs(status.actual - value) < 1, f'{value}')
             yield
+
+    def _enable_unless_stopping(self) -> Any:
+        """Enable; nothing while what a driver has found under control is being stopped."""
+        response = self.enable()
+        return None if 'a stop is on its way' in response.message else response
 
     def change_state(self, transition: int) -> bool:
         """Ask for a lifecycle transition."""

@@ -400,6 +400,7 @@ def test_what_a_file_overrules_of_the_command_line_is_warned_about(bench: Bench)
         *('-p', 'setpoint_timeout:=1.0'),
         *('-p', 'lost_after:=3'),
         *('-p', 'poll_rate:=12.0'),
+        *('-p', 'shutdown_timeout:=3.0'),
         *('-p', 'nfo_sinus:shutdown_timeout:=2.0'),
         *('--params-file', str(parameters)),
     )

@@ -127,7 +127,7 @@ class CanopenRig(contextlib.ExitStack):
                 self.drive.set_setpoint(frequency)
 
         def turns() -> bool:
-            if not self.drive.armed:
+            if not self.drive.armed and self.far.faults:
                 # the machine has rested for longer than the drive waits
                 with contextlib.suppress(DriveError):
                     self.drive.acknowledge().result(PATIENCE)
@@ -135,8 +135,11 @@ class CanopenRig(contextlib.ExitStack):
                     self.drive.enable().result(PATIENCE)
             return abs(self.far.motor.frequency - frequency) < 0.2
 
-        with contextlib.suppress(DriveError):
+        try:
             self.drive.enable().result(PATIENCE)
+        except DriveError:
+            if not self.far.faults:
+                raise
         thread = threading.Thread(target=publish, daemon=True)
         thread.start()
         try:

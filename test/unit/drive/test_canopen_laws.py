@@ -27,6 +27,7 @@ from support.examples import FULL
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.simulator.canopen import Server
 
 #: Each reading in one of them at least.
 SHAPES = {
@@ -110,6 +111,20 @@ def test_the_watch_outlives_an_idle_driver(tmp_path: Path) -> None:
         asked = rig.drive.statistics.transactions
         wait_until(lambda: rig.drive.statistics.transactions > asked + 2)
         assert not rig.far.faults.codes
+
+
+def test_a_watch_that_could_not_be_changed_is_ended_all_the_same(tmp_path: Path) -> None:
+    with CanopenRig(tmp_path, drive_timeout=5.0, response_timeout=0.3, retries=0) as rig:
+        rig.connect()
+        rig.simulator.inject('silence', seconds=3600.0)
+        assert 'did not answer' in rig.answer(rig.drive.set_drive_timeout(6.0))
+        rig.simulator.inject('silence', seconds=0.0)
+        server = rig.far.servers['canopen']
+        assert isinstance(server, Server)
+        # its consumer heartbeat, whose time is the low half
+        assert server.read(0x1016, 1)[:2] == (5000).to_bytes(2, 'little')
+        rig.answer(rig.drive.disconnect(PATIENCE))
+        assert server.read(0x1016, 1) == bytes(4)
 
 
 def test_a_drive_that_started_anew_is_disarmed_at_once(tmp_path: Path) -> None:

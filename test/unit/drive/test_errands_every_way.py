@@ -43,8 +43,8 @@ from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
-#: A MOVITRAC has other faults, and none of the procedures: test_movitrac_commands.py.
-#: Those to the parameters of a Sinus.
+#: To the parameters of a Sinus: a MOVITRAC has other faults, and none of the procedures
+#: (test_movitrac_commands.py), and a telegram carries neither.
 _WAYS = {
     name: way for name, way in WAYS.items() if way.model != 'movitrac31' and not way.method
 }
