@@ -48,6 +48,8 @@ _NOTHING = (
     ConditionReachedException, ExternalShutdownException, ShutdownException, TimeoutException
 )
 
+#: No request waits for its turn for longer, s: a start delay before it may last an hour.
+_LONGEST_WAIT = 4000.0
 _received: ContextVar[float] = ContextVar('received')
 
 
@@ -61,10 +63,10 @@ def received_at() -> float:
 
 
 def _received_at(received: int) -> float:
-    """Return the moment of a wall time in ns, s, monotonic; 0 ns is not known."""
-    # whoever sets the clock just now makes nothing come from the future
-    ago = max(0.0, (time.time_ns() - received) / 1e9) if received else 0.0
-    return time.monotonic() - ago
+    """Return the moment of a wall time in ns, s, monotonic; the present if it cannot be one."""
+    ago = (time.time_ns() - received) / 1e9
+    # a middleware may tell 0 or count from elsewhere, and somebody may set the clock just now
+    return time.monotonic() - (ago if 0.0 <= ago <= _LONGEST_WAIT else 0.0)
 
 
 class NodeExecutor(Executor):

@@ -42,6 +42,7 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.node import executor
 from nfo_sinus_driver.node.bus_node import BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
@@ -127,6 +128,17 @@ def test_an_enable_that_waits_behind_a_stop_is_refused_when_its_turn_comes(bench
         assert 'ask again' in late.result().message or 'on its way' in late.result().message
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         assert client.enable().success, 'asked for after the stop it is carried out'
+
+
+@pytest.mark.parametrize('told', [0, 5_000_000_000, 4_000_000_000_000_000_000])
+def test_a_time_of_reception_that_cannot_be_one_is_the_present(told: int) -> None:
+    now = time.monotonic()
+    assert executor._received_at(told) >= now
+
+
+def test_a_time_of_reception_counts() -> None:
+    received = executor._received_at(time.time_ns() - 600_000_000_000)
+    assert abs(time.monotonic() - 600.0 - received) < PATIENCE
 
 
 def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:
