@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
-import math
+import time
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
@@ -27,10 +27,8 @@ from nfo_sinus_msgs.msg import DriveStatus
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.msg import InvSt
 from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
-from rclpy.clock import Clock
-from rclpy.clock import ClockType
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNodeMixin
+from rclpy.time import Time as NodeTime
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
@@ -48,6 +46,8 @@ from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.qos import KEPT
 from nfo_sinus_driver.node.qos import LATCHED
 from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.stamps import Sequence
+from nfo_sinus_driver.node.stamps import Stamps
 from nfo_sinus_driver.node.wording import Wording
 
 #: How often diagnostics go out and, while the drive is not connected, the status, s.
@@ -81,7 +81,10 @@ class Reporter:
         self._managed = managed
         self._follow = follow
         self._log = node.get_logger()
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._stamps = Stamps(lambda: node.get_clock().now().nanoseconds)
+        # a drive that is not connected tells by the clock, a poll when it was answered
+        self._status_stamps = Sequence(self._stamps)
+        self._telemetry_stamps = Sequence(self._stamps)
         self._last_inv_st: tuple[int, Kind] | None = None
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
@@ -123,14 +126,7 @@ class Reporter:
 
     def stamp(self, at: float) -> Time:
         """Return the node's time of a moment of ``time.monotonic``, 0 for NaN."""
-        if math.isnan(at):
-            return Time()
-        age = self._steady.now().nanoseconds - round(at * 1e9)
-        now = self._node.get_clock().now()
-        # simulated time begins at zero, and times before it cannot be
-        age = min(age, now.nanoseconds)
-        stamp: Time = (now - Duration(nanoseconds=age)).to_msg()
-        return stamp
+        return _message(self._stamps.of(at))
 
     # --- on the queue's thread ----------------------------------------------------------------
 
@@ -149,7 +145,7 @@ class Reporter:
         return frame_id
 
     def _publish_snapshot(self, snapshot: Snapshot) -> None:
-        stamp = self.stamp(snapshot.at)
+        stamp = _message(self._status_stamps.next(snapshot.at))
         frame_id = self._frame_id()
         self._status.publish(messages.drive_status(snapshot, stamp, frame_id))
         self._diagnose(snapshot, on_change=True)
@@ -164,7 +160,7 @@ class Reporter:
             self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
 
     def _publish_telemetry(self, telemetry: Telemetry) -> None:
-        stamp = self.stamp(telemetry.at)
+        stamp = _message(self._telemetry_stamps.next(telemetry.at))
         self._telemetry.publish(messages.telemetry(telemetry, stamp, self._frame_id()))
 
     def _publish_log_entry(self, entry: LogEntry) -> None:
@@ -173,8 +169,7 @@ class Reporter:
     def _report_regularly(self) -> None:
         snapshot = self._managed().drive.snapshot
         if not snapshot.connected:
-            now = self._steady.now().nanoseconds / 1e9
-            stamp = self.stamp(now)
+            stamp = _message(self._status_stamps.next(time.monotonic()))
             self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id()))
         self._diagnose(snapshot, on_change=False)
         self._publish_statistics()
@@ -196,3 +191,8 @@ class Reporter:
         status = diagnostics.drive_status(name, managed, snapshot, diagnosis)
         stamp = self._node.get_clock().now().to_msg()
         self._diagnostics.publish(diagnostics.array(status, stamp))
+
+
+def _message(nanoseconds: int) -> Time:
+    stamp: Time = NodeTime(nanoseconds=nanoseconds).to_msg()
+    return stamp

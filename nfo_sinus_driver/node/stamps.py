@@ -1,0 +1,83 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Moments of the steady clock as times of a node's clock, in the order in which they are told.
+
+The bus measures by the steady clock, messages tell the node's time. A thread that is kept
+waiting between reading the one and the other would tell a time that is wrong by that wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import time
+
+#: Two readings of the steady clock with one of the node's between them are good enough, ns.
+_NEAR = 200_000
+_READINGS = 5
+
+
+class Stamps:
+    """What the node's clock showed at a moment of ``time.monotonic``.
+
+    :param now: the node's clock, in ns: the wall clock or simulated time.
+    :param steady: ``time.monotonic_ns``, or a test's.
+    """
+
+    def __init__(
+        self, now: Callable[[], int], steady: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._now = now
+        self._steady = steady
+
+    def of(self, moment: float) -> int:
+        """Return the node's time of a moment (s), in ns, 0 for NaN."""
+        if math.isnan(moment):
+            return 0
+        steady, now = self._together()
+        # simulated time begins at zero, and times before it cannot be
+        return max(0, now - (steady - round(moment * 1e9)))
+
+    def now(self) -> int:
+        """Return the node's time, in ns."""
+        return self._now()
+
+    def _together(self) -> tuple[int, int]:
+        """Return what both clocks show at once."""
+        nearest: tuple[int, int, int] | None = None
+        for _ in range(_READINGS):
+            before, now, after = self._steady(), self._now(), self._steady()
+            if nearest is None or after - before < nearest[0]:
+                nearest = after - before, (before + after) // 2, now
+            if nearest[0] <= _NEAR:
+                break
+        assert nearest is not None
+        return nearest[1], nearest[2]
+
+
+class Sequence:
+    """The stamps of one topic: none is before the last, unless the clock itself was set back."""
+
+    def __init__(self, stamps: Stamps) -> None:
+        self._stamps = stamps
+        self._last = 0
+
+    def next(self, moment: float) -> int:
+        """Return the stamp of the next message, about a moment of ``time.monotonic``, in ns."""
+        stamp = self._stamps.of(moment)
+        if self._last <= self._stamps.now():
+            stamp = max(stamp, self._last)
+        self._last = stamp
+        return stamp
