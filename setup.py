@@ -52,6 +52,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'driver = {NAME}.node.main:main',
+            f'monitor = {NAME}.node.monitor:main',
             f'nfo-sinus = {NAME}.cli.main:main',
             f'simulator = {NAME}.simulator.main:main',
         ],

@@ -18,45 +18,58 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from collections.abc import Sequence
-import dataclasses
 from datetime import datetime
+import importlib.util
 import itertools
 import json
 import math
+import os
 import shutil
 import sys
 import time
 
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.cli.console import UsageError
 from nfo_sinus_driver.cli.console import put
+from nfo_sinus_driver.cli.console import remark
 from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.live import live
+from nfo_sinus_driver.cli.measure import VALUES
+from nfo_sinus_driver.cli.measure import as_facts
+from nfo_sinus_driver.cli.measure import measure
+from nfo_sinus_driver.cli.measure import statistics_table
 from nfo_sinus_driver.cli.session import Remote
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.view import terminal
 
-#: What is measured: its name, as in the messages of the driver, its width and its decimals.
-_VALUES = {
-    Role.ACTUAL_FREQUENCY: ('frequency', 6, 1),
-    Role.ACTUAL_SPEED: ('speed', 5, 0),
-    Role.OUTPUT_CURRENT: ('output_current', 6, 2),
-    Role.OUTPUT_VOLTAGE: ('output_voltage', 4, 0),
-    Role.OUTPUT_POWER: ('output_power', 5, 0),
-    Role.ACTUAL_TORQUE: ('torque', 4, 0),
-    Role.DC_LINK_VOLTAGE: ('dc_link_voltage', 4, 0),
-}
 _CLEAR_LINE = '\r\x1b[K'
+
+
+#: The view of the running driver: only there ROS is known.
+_ROS_VIEW = 'nfo_sinus_driver.node.monitor'
 
 
 def monitor(options: argparse.Namespace) -> int:
     """Show what the drives do until somebody ends it, and then how the line was doing."""
+    if options.ros:
+        if importlib.util.find_spec('rclpy') is None:
+            raise UsageError('--ros needs ROS 2: source /opt/ros/jazzy/setup.bash first')
+        os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
+    on_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    if on_terminal and not (options.json or options.lines or options.count):
+        why_not = terminal.why_not()
+        if not why_not:
+            return live(options)
+        remark(f'{why_not}. What it would show comes line by line')
+    return _by_lines(options)
+
+
+def _by_lines(options: argparse.Namespace) -> int:
     addresses = options.addresses or (options.address,)
-    live = sys.stdout.isatty() and not options.json and len(addresses) == 1
+    one_line = sys.stdout.isatty() and not options.json and len(addresses) == 1
     answered = False
     with Session(options) as session:
         drives = [session.drive(address) for address in addresses]
@@ -66,7 +79,7 @@ def monitor(options: argparse.Namespace) -> int:
         try:
             for turn in itertools.count(1):
                 started = time.monotonic()
-                shown = [_show(drive, session, options, live=live) for drive in drives]
+                shown = [_show(drive, session, options, one_line=one_line) for drive in drives]
                 answered = all(shown)
                 if turn == options.count:
                     break
@@ -75,7 +88,7 @@ def monitor(options: argparse.Namespace) -> int:
             # this is how one ends it
             answered = True
         finally:
-            if live:
+            if one_line:
                 print()
         if not options.json:
             for line in statistics_table(session, addresses):
@@ -83,13 +96,15 @@ def monitor(options: argparse.Namespace) -> int:
     return int(not answered)
 
 
-def _show(drive: Remote, session: Session, options: argparse.Namespace, *, live: bool) -> bool:
+def _show(
+    drive: Remote, session: Session, options: argparse.Namespace, *, one_line: bool
+) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
         if drive.inverter.identity is None:
             drive.identify(thoroughly=False)
-        seen, values = drive.do(lambda: _measure(drive))
+        seen, values = drive.do(lambda: measure(drive))
     except DriveError as error:
         if isinstance(error.__cause__, PortError):
             raise
@@ -108,7 +123,7 @@ def _show(drive: Remote, session: Session, options: argparse.Namespace, *, live:
         return answered
     who = f'{drive.address:>3}  ' if options.addresses else ''
     text = f'{now:%H:%M:%S}  {who}{text}'
-    if live:
+    if one_line:
         width = shutil.get_terminal_size().columns - 1
         print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)
     else:
@@ -116,25 +131,10 @@ def _show(drive: Remote, session: Session, options: argparse.Namespace, *, live:
     return answered
 
 
-async def _measure(drive: Remote) -> tuple[InverterStatus, Mapping[Role, float]]:
-    seen = await drive.inverter.look(Priority.POLL, once=True)
-    values = dict.fromkeys(_VALUES, math.nan)
-    for role in _VALUES:
-        key = drive.model.key(role)
-        if not drive.registers.reaches(key):
-            continue
-        try:
-            values[role] = await drive.registers.read_number(key, Priority.POLL, once=True)
-        except Refused:
-            # it has none
-            continue
-    return seen, values
-
-
 def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) -> dict[str, object]:
     measured = {
         name: None if math.isnan(values[role]) else values[role]
-        for role, (name, _, _) in _VALUES.items()
+        for role, (name, _, _) in VALUES.items()
     }
     return {
         'connected': True,
@@ -148,72 +148,9 @@ def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) ->
 
 def _line(drive: Remote, values: Mapping[Role, float]) -> str:
     cells = [f'{drive.inverter.describe():<18}']
-    for role, (_, width, decimals) in _VALUES.items():
+    for role, (_, width, decimals) in VALUES.items():
         value, key = values[role], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'
         unit = drive.model[key].unit if key in drive.model else ''
         cells.append(f'{number:>{width}} {unit}')
     return '  '.join(cells)
-
-
-#: The columns: what stands above, and the width.
-_COLUMNS = (
-    ('', 7),
-    ('used', 5),
-    ('cycle', 8),
-    ('min', 7),
-    ('median', 7),
-    ('p99', 7),
-    ('max', 7),
-    ('requests', 8),
-    ('no answer', 9),
-    ('damaged', 7),
-    ('refused', 7),
-    ('repeated', 8),
-)
-
-
-def statistics_table(session: Session, addresses: Sequence[int]) -> list[str]:
-    """Return the lines of a table: the line, and each drive; round trips and cycle in ms."""
-    rows = [('line', session.statistics())]
-    if len(addresses) > 1:
-        rows += [(f'drive {address}', session.statistics(address)) for address in addresses]
-    cells = [[name for name, _ in _COLUMNS], *(_cells(name, figures) for name, figures in rows)]
-    return [_row(row) for row in cells]
-
-
-def as_facts(figures: Statistics) -> dict[str, float | int | None]:
-    """Return figures for JSON, which has no NaN; the names are those of BusStatistics."""
-    return {
-        name: None if math.isnan(value) else value
-        for name, value in dataclasses.asdict(figures).items()
-    }
-
-
-def _cells(name: str, figures: Statistics) -> list[str]:
-    times = (
-        figures.cycle_time,
-        figures.round_trip_min,
-        figures.round_trip_median,
-        figures.round_trip_p99,
-        figures.round_trip_max,
-    )
-    counts = (
-        figures.transactions,
-        figures.timeouts,
-        figures.damaged,
-        figures.refused,
-        figures.retries,
-    )
-    share = f'{100 * figures.utilisation:.0f} %'
-    return [name, share, *map(_milliseconds, times), *map(str, counts)]
-
-
-def _milliseconds(seconds: float) -> str:
-    return '-' if math.isnan(seconds) else f'{1000 * seconds:.1f}'
-
-
-def _row(cells: list[str]) -> str:
-    first, *others = zip(cells, _COLUMNS, strict=True)
-    left = f'{first[0]:<{first[1][1]}}'
-    return '  '.join((left, *(f'{cell:>{width}}' for cell, (_, width) in others)))

@@ -252,7 +252,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_yes(errors)
     errors.add_argument('--erase', action='store_true', help='erase it, after it was shown')
     monitor = verb(
-        'monitor', 'show what the drive does, until Ctrl-C; then how the line was doing', json=True
+        'monitor',
+        'show what the drive does, until q or Ctrl-C; then how the line was doing',
+        json=True,
     )
     monitor.add_argument(
         '--period',
@@ -262,6 +264,16 @@ def _parser() -> argparse.ArgumentParser:
         help='from one line to the next (default: 0.5)',
     )
     monitor.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+    monitor.add_argument(
+        '--lines',
+        action='store_true',
+        help='a line each time, where a terminal would show the view; so does --count',
+    )
+    monitor.add_argument(
+        '--ros',
+        action='store_true',
+        help='show the drives of running drivers, on the graph of ROS, instead of a line',
+    )
     monitor.add_argument(
         '--addresses',
         type=_addresses,

@@ -43,19 +43,26 @@ MAY_IMPORT = {
     'launch_arguments': set(),
     'signals': set(),
     'version': set(),
+    # what it shows comes to it
+    'view': set(),
     'drive': {'bus', 'catalog', 'link'},
     # of drive/ only events.py, which has no code
     'wording': {'catalog', 'drive'},
     # its folder of a family, the words of that one, and no profile: a mistake in that must not hide
     'simulator': {'catalog', 'families', 'version'},
-    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'wording'},
+    'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'view', 'wording'},
     'demo': {'node'},
-    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'wording'},
+    'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'view', 'wording'},
 }
 #: Rooms that may import ROS, and anything else.
 WITH_ROS = {'demo', 'node'}
 #: What the others may import beside the standard library.
-MAY_USE = {'cli': {'tqdm', 'yaml'}, 'link': {'serial'}, 'simulator': {'pymodbus'}}
+MAY_USE = {
+    'cli': {'tqdm', 'yaml'},
+    'link': {'serial'},
+    'simulator': {'pymodbus'},
+    'view': {'rich', 'textual'},
+}
 #: What opens by number, and nothing but /dev/null.
 OPENS_NO_PORT = frozenset({'node/nonblocking_stdio.py'})
 #: Rooms that are about families and name them.

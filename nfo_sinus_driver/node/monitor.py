@@ -1,0 +1,440 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The view beside the running driver: ``ros2 run nfo_sinus_driver monitor``.
+
+It listens to every drive on the graph and can stop them; nothing here starts a motor.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import fields
+import math
+import os
+import sys
+import threading
+import time
+from typing import Any
+
+from nfo_sinus_msgs.msg import BusStatistics
+from nfo_sinus_msgs.msg import DriveStatus
+from nfo_sinus_msgs.msg import ErrorLogEntry
+from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import Telemetry
+from rcl_interfaces.msg import Log
+import rclpy
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from rclpy.utilities import get_default_context
+from std_srvs.srv import Trigger
+
+from nfo_sinus_driver.node.qos import KEPT
+from nfo_sinus_driver.node.qos import LATCHED
+from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.version import VERSION
+from nfo_sinus_driver.view import terminal
+from nfo_sinus_driver.view.picture import Condition
+from nfo_sinus_driver.view.picture import DriveView
+from nfo_sinus_driver.view.picture import Level
+from nfo_sinus_driver.view.picture import LineView
+from nfo_sinus_driver.view.picture import Measured
+from nfo_sinus_driver.view.picture import Note
+from nfo_sinus_driver.view.picture import Picture
+
+#: How often it is looked who is on the graph, s.
+_DISCOVERY_PERIOD = 1.0
+#: A driver tells of every drive at least once a second: after so long without it has ended, s.
+_GONE_AFTER = 3.5
+#: After so long without an answer a stop is said not to be confirmed, s.
+_ANSWER_TIME = 5.0
+
+_LEVELS = {
+    Log.INFO: Level.INFO,
+    Log.WARN: Level.WARNING,
+    Log.ERROR: Level.ERROR,
+    Log.FATAL: Level.ERROR,
+}
+_QOS = {
+    DriveStatus: RELIABLE,
+    InvSt: LATCHED,
+    Telemetry: RELIABLE,
+    BusStatistics: RELIABLE,
+    ErrorLogEntry: KEPT,
+}
+_TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
+_TRIGGER = 'std_srvs/srv/Trigger'
+#: What the log has said before somebody listened, a little of it.
+_ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: For how long a line of the log waits for its node to be found, s.
+_WAITS_FOR_NODE = 15.0
+
+
+class _Topics:
+    """Topics of one node, read when it is time to draw: no executor is woken by them."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._subscriptions: list[Subscription] = []
+
+    def add(self, type_: type, topic: str, qos: QoSProfile) -> None:
+        """Listen to a topic from now on."""
+        self._subscriptions.append(self._node.create_subscription(type_, topic, _nothing, qos))
+
+    def take(self) -> Iterator[Any]:
+        """Return what has come since, oldest of each topic first."""
+        for subscription in self._subscriptions:
+            while True:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(subscription.msg_type, False)
+                if taken is None:
+                    break
+                yield taken[0]
+
+
+def _nothing(_: object) -> None:
+    """Never called: nobody spins the node."""
+
+
+@dataclass
+class _Teller:
+    """A node that tells of a drive, or of a line: what it said last."""
+
+    name: str
+    topics: _Topics
+    is_drive: bool
+    heard_at: float
+    #: The service by which it, or all that it has, is stopped; None: it offers none yet.
+    stop: Client | None = None
+    status: DriveStatus = field(default_factory=DriveStatus)
+    inv_st: InvSt = field(default_factory=InvSt)
+    telemetry: Telemetry | None = None
+    telemetry_at: float = -math.inf
+    statistics: BusStatistics | None = None
+
+
+@dataclass
+class _Call:
+    """A stop that was asked for."""
+
+    who: str
+    service: str
+    future: Future
+    asked_at: float
+    told_late: bool = False
+
+
+class GraphSource:
+    """
+    Every drive on the graph, by what their nodes publish.
+
+    :param spaces: only what is in these namespaces; none: all.
+    """
+
+    only_looks = ''
+
+    def __init__(self, context: Context, spaces: Sequence[str] = ()) -> None:
+        options: dict[str, Any] = {
+            'context': context,
+            'enable_rosout': False,
+            'start_parameter_services': False,
+        }
+        self._spaces = tuple(f'/{space.strip("/")}' for space in spaces)
+        self._node = Node(f'monitor_{os.getpid()}', **options)
+        self._caller = Node(f'monitor_{os.getpid()}_calls', **options)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self._caller)
+        self._thread = threading.Thread(target=self._spin, name='answers', daemon=True)
+        self._thread.start()
+        self._tellers: dict[str, _Teller] = {}
+        self._rosout = _Topics(self._node)
+        self._rosout.add(Log, '/rosout', _ROSOUT)
+        self._said: list[tuple[float, Log]] = []
+        self._calls: list[_Call] = []
+        self._notes: list[Note] = []
+        self._looked_around_at = -math.inf
+        self.title = f'ROS domain {context.get_domain_id()}'
+        where = f' in {" ".join(self._spaces)}' if self._spaces else ''
+        self.advice = (
+            f'no drive{where} yet. Start one: ros2 run nfo_sinus_driver driver. If one runs: '
+            'ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE have to be the same there and here'
+        )
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._executor.shutdown(timeout_sec=1.0)
+        self._thread.join(1.0)
+        self._caller.destroy_node()
+        self._node.destroy_node()
+
+    def _spin(self) -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    # --- as a source of pictures --------------------------------------------------------------
+
+    def look(self) -> Picture:
+        """Return what the nodes have told."""
+        now = time.monotonic()
+        if now - self._looked_around_at >= _DISCOVERY_PERIOD:
+            self._looked_around_at = now
+            self._look_around(now)
+        for teller in self._tellers.values():
+            for message in teller.topics.take():
+                self._hear(teller, message, now)
+        self._read_log(now)
+        self._look_after_calls(now)
+        notes, self._notes = self._notes, []
+        tellers = self._tellers.values()
+        return Picture(
+            [_drive_view(teller, now) for teller in tellers if teller.is_drive],
+            [
+                _line_view(teller.name, teller.statistics)
+                for teller in tellers
+                if not teller.is_drive and teller.statistics and not _is_gone(teller, now)
+            ],
+            sorted(notes, key=lambda note: note.at),
+        )
+
+    def stop(self, name: str) -> None:
+        """Call ``~/stop`` of a drive."""
+        self._call(self._tellers[name])
+
+    def stop_all(self) -> None:
+        """Call ``~/stop_all`` of every line, and ``~/stop`` of drives that no line answers for."""
+        now = time.monotonic()
+        present = [teller for teller in self._tellers.values() if not _is_gone(teller, now)]
+        lines = [teller for teller in present if not teller.is_drive]
+        for teller in lines or present:
+            self._call(teller)
+        if not present:
+            self._note(Level.ERROR, '', 'there is nobody to be stopped')
+
+    # --- what comes in ------------------------------------------------------------------------
+
+    def _look_around(self, now: float) -> None:
+        for topic, types in self._node.get_topic_names_and_types():
+            if not any(type_ in _TYPES for type_ in types):
+                continue
+            for publisher in self._node.get_publishers_info_by_topic(topic):
+                space = publisher.node_namespace
+                name = f'{space.rstrip("/")}/{publisher.node_name}'
+                if name not in self._tellers and self._wanted(name):
+                    self._meet(name, publisher.node_name, space, now)
+        for teller in self._tellers.values():
+            if teller.stop is None:
+                self._find_stop(teller)
+
+    def _wanted(self, name: str) -> bool:
+        return not self._spaces or any(
+            name == space or name.startswith(f'{space.rstrip("/")}/') for space in self._spaces
+        )
+
+    def _meet(self, full_name: str, name: str, space: str, now: float) -> None:
+        # by its types: whatever the topics have been remapped to
+        found = [
+            (_TYPES[type_], topic)
+            for topic, types in self._node.get_publisher_names_and_types_by_node(name, space)
+            for type_ in types
+            if type_ in _TYPES
+        ]
+        types = {type_ for type_, _ in found}
+        if not types & {DriveStatus, BusStatistics}:
+            # not all of it is known yet
+            return
+        is_drive = DriveStatus in types
+        topics = _Topics(self._node)
+        for type_, topic in found:
+            topics.add(type_, topic, _QOS[type_])
+        self._tellers[full_name] = _Teller(full_name, topics, is_drive, now)
+
+    def _find_stop(self, teller: _Teller) -> None:
+        space, _, name = teller.name.rpartition('/')
+        verb = 'stop' if teller.is_drive else 'stop_all'
+        for service, types in self._node.get_service_names_and_types_by_node(name, space or '/'):
+            if _TRIGGER in types and service.rpartition('/')[2] == verb:
+                # now, so that both ends know each other when somebody is in a hurry
+                teller.stop = self._caller.create_client(Trigger, service)
+                return
+
+    def _hear(self, teller: _Teller, message: object, now: float) -> None:
+        if isinstance(message, DriveStatus):
+            teller.status, teller.heard_at = message, now
+        elif isinstance(message, InvSt):
+            teller.inv_st = message
+        elif isinstance(message, Telemetry):
+            teller.telemetry, teller.telemetry_at = message, now
+        elif isinstance(message, BusStatistics):
+            teller.statistics, teller.heard_at = message, now
+        elif isinstance(message, ErrorLogEntry):
+            stamp = message.stamp.sec + message.stamp.nanosec / 1e9
+            text = f'error log: {message.code} {message.text}'
+            if not math.isnan(message.operating_time):
+                text += f', at {message.operating_time:.1f} h of operation'
+            self._note(Level.WARNING, teller.name, text, stamp or time.time())
+
+    def _read_log(self, now: float) -> None:
+        self._said += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
+        names = {name.lstrip('/').replace('/', '.'): name for name in self._tellers}
+        waiting = []
+        for came_at, line in self._said:
+            name = names.get(line.name)
+            if name is not None:
+                at = line.stamp.sec + line.stamp.nanosec / 1e9
+                self._note(_LEVELS[line.level], name, line.msg, at)
+            elif now - came_at < _WAITS_FOR_NODE:
+                waiting.append((came_at, line))
+        self._said = waiting
+
+    # --- what goes out ------------------------------------------------------------------------
+
+    def _call(self, teller: _Teller) -> None:
+        client = teller.stop
+        if client is None or not client.service_is_ready():
+            text = 'NOT stopped: it offers no service for it (any more); has its driver ended?'
+            self._note(Level.ERROR, teller.name, text)
+            return
+        service = client.srv_name
+        future = client.call_async(Trigger.Request())
+        self._calls.append(_Call(teller.name, service, future, time.monotonic()))
+        self._note(Level.INFO, teller.name, f'{service} called')
+
+    def _look_after_calls(self, now: float) -> None:
+        waiting = []
+        for call in self._calls:
+            if call.future.done():
+                answer = call.future.result()
+                level = Level.INFO if answer.success else Level.ERROR
+                self._note(level, call.who, f'{call.service}: {answer.message}')
+                continue
+            if not call.told_late and now - call.asked_at > _ANSWER_TIME:
+                call.told_late = True
+                text = (
+                    f'{call.service} has not answered for {_ANSWER_TIME:.0f} s: the stop is NOT '
+                    'confirmed. Stop the motor by other means'
+                )
+                self._note(Level.ERROR, call.who, text)
+            waiting.append(call)
+        self._calls = waiting
+
+    def _note(self, level: Level, who: str, text: str, at: float | None = None) -> None:
+        self._notes.append(Note(time.time() if at is None else at, level, who, text))
+
+
+def _is_gone(teller: _Teller, now: float) -> bool:
+    return now - teller.heard_at > _GONE_AFTER
+
+
+def _drive_view(teller: _Teller, now: float) -> DriveView:
+    status, inv_st = teller.status, teller.inv_st
+    condition = _condition(teller, now)
+    if condition is Condition.GONE:
+        return DriveView(teller.name, condition, 'its driver is gone', age=now - teller.heard_at)
+    statistics = teller.statistics and _line_view(teller.name, teller.statistics)
+    if condition is Condition.SILENT:
+        return DriveView(teller.name, condition, 'not connected', line=statistics)
+    measured = Measured()
+    if teller.telemetry is not None and now - teller.telemetry_at <= _GONE_AFTER:
+        values = {one.name: getattr(teller.telemetry, one.name) for one in fields(Measured)}
+        measured = Measured(**values)
+    return DriveView(
+        teller.name,
+        condition,
+        f'{inv_st.code} {inv_st.text}',
+        # what is well needs no explanation
+        inv_st.description if inv_st.kind != InvSt.STATUS else '',
+        inv_st.remedy,
+        inv_st.requires_ack,
+        status.enabled,
+        status.setpoint,
+        status.actual,
+        status.unit,
+        now - teller.heard_at,
+        measured,
+        statistics,
+    )
+
+
+def _condition(teller: _Teller, now: float) -> Condition:
+    status, inv_st = teller.status, teller.inv_st
+    if _is_gone(teller, now):
+        return Condition.GONE
+    if not status.connected:
+        return Condition.SILENT
+    if status.fault or inv_st.kind == InvSt.FAULT:
+        return Condition.FAULT
+    if status.alarm or inv_st.kind == InvSt.ALARM:
+        return Condition.ALARM
+    runs = (DriveStatus.OPERATION_ENABLED, DriveStatus.STOPPING, DriveStatus.QUICK_STOP)
+    return Condition.RUNS if status.state in runs else Condition.STANDS
+
+
+def _line_view(name: str, told: BusStatistics) -> LineView:
+    names = [one.name for one in fields(LineView) if one.name != 'name']
+    return LineView(name, **{one: getattr(told, one) for one in names})
+
+
+# --- the program ----------------------------------------------------------------------------------
+
+
+def main(args: list[str] | None = None) -> int:
+    """Show the view until somebody ends it; return the exit status."""
+    given = sys.argv[1:] if args is None else args
+    options = _parser().parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
+    why_not = terminal.why_not()
+    if why_not:
+        print(f'monitor: {why_not}', file=sys.stderr)
+        return 2
+    # what ROS prints would be printed across the view
+    logging = ['--ros-args', '--disable-stdout-logs', '--']
+    rclpy.init(args=[*given, *logging], signal_handler_options=SignalHandlerOptions.NO)
+    source = GraphSource(get_default_context(), options.namespaces)
+    try:
+        terminal.show(source)
+    finally:
+        source.close()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='monitor',
+        description='Shows every drive on the graph, in a terminal, and can stop them.',
+        epilog='Keys: s stops the drive that is chosen, a stops all, n goes to the next trouble, '
+        'p plots another quantity, q quits. None of it is a safety function.',
+    )
+    parser.add_argument(
+        'namespaces', nargs='*', metavar='NAMESPACE', help='only drives in these (default: all)'
+    )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

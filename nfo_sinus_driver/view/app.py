@@ -1,0 +1,416 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The view as a program for a whole terminal: every drive in a table, one of them in full."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Iterable
+from collections.abc import Sequence
+from datetime import datetime
+import itertools
+import math
+import re
+import signal
+import textwrap
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import App
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.binding import BindingType
+from textual.containers import Container
+from textual.containers import Vertical
+from textual.events import Resize
+from textual.widgets import DataTable
+from textual.widgets import Footer
+from textual.widgets import RichLog
+from textual.widgets import Static
+
+from nfo_sinus_driver.view.picture import Condition
+from nfo_sinus_driver.view.picture import DriveView
+from nfo_sinus_driver.view.picture import Level
+from nfo_sinus_driver.view.picture import LineView
+from nfo_sinus_driver.view.picture import Measured
+from nfo_sinus_driver.view.picture import Note
+from nfo_sinus_driver.view.picture import Picture
+from nfo_sinus_driver.view.picture import Source
+from nfo_sinus_driver.view.plot import plot
+from nfo_sinus_driver.view.plot import span
+
+#: How often it is looked, s.
+_PERIOD = 0.25
+#: How many looks a column of a plot stands for, and how many columns are remembered.
+_LOOKS_A_COLUMN = 4
+_REMEMBERED = 600
+#: From this width on the drive in full stands beside the table.
+_WIDE = 120
+_PLOT_HEIGHT = 3
+
+#: What stands before a status, so that nobody depends on colours, and its style.
+_MARKS = {
+    Condition.GONE: ('·', 'dim'),
+    Condition.SILENT: ('?', 'bold magenta'),
+    Condition.FAULT: ('✗', 'bold red'),
+    Condition.ALARM: ('▲', 'bold yellow'),
+    Condition.RUNS: ('►', 'bold green'),
+    Condition.STANDS: ('■', ''),
+}
+_TROUBLE = (Condition.SILENT, Condition.FAULT, Condition.ALARM, Condition.GONE)
+_LEVELS = {Level.INFO: '', Level.WARNING: 'yellow', Level.ERROR: 'bold red'}
+
+#: What can be plotted: its name, its unit, its decimals, and the least that the axis shows.
+_QUANTITIES: dict[str, tuple[str, str, int, float]] = {
+    'output_current': ('current', 'A', 2, 1.0),
+    'frequency': ('frequency', 'Hz', 1, 10.0),
+    'speed': ('speed', 'rpm', 0, 100.0),
+    'torque': ('torque', '%', 0, 20.0),
+}
+
+
+def _number(value: float, decimals: int, unit: str = '') -> str:
+    text = '-' if math.isnan(value) else f'{value:.{decimals}f}'
+    return f'{text} {unit}'.rstrip()
+
+
+def _status(drive: DriveView) -> Text:
+    mark, style = _MARKS[drive.condition]
+    return Text(f'{mark} {drive.status}', style, no_wrap=True, overflow='ellipsis')
+
+
+def short_names(names: Sequence[str], width: int) -> dict[str, str]:
+    """Return names without the namespace that all of them are in, and cut at the left."""
+    spaces = {name[: name.rfind('/') + 1] for name in names}
+    common = len(spaces.pop()) if len(names) > 1 and len(spaces) == 1 else 0
+    return {
+        name: text if len(text) <= width else f'…{text[len(text) - width + 1 :]}'
+        for name, text in ((name, name[common:]) for name in names)
+    }
+
+
+_NAME_WIDTH = 16
+#: The columns: heading, width, what stands in it, and whether it is to the right.
+_Cell = Callable[[DriveView], 'str | Text']
+_Column = tuple[str, int, _Cell, bool]
+_COLUMNS: tuple[_Column, ...] = (
+    ('status', 18, _status, False),
+    ('set', 10, lambda drive: _number(drive.setpoint, 1, drive.unit), True),
+    ('actual', 10, lambda drive: _number(drive.actual, 1, drive.unit), True),
+    ('rpm', 6, lambda drive: _number(drive.measured.speed, 0), True),
+    ('A', 6, lambda drive: _number(drive.measured.output_current, 2), True),
+)
+
+
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """Return what sorts ``drive_2`` before ``drive_10``."""
+    parts = re.findall(r'\d+|\D+', name)
+    return [(0, int(part), '') if part.isdigit() else (1, 0, part) for part in parts]
+
+
+class MonitorApp(App[None]):
+    """
+    Shows what a source tells, four times a second, until somebody ends it.
+
+    :param source: asked by the thread that draws.
+    """
+
+    TITLE = 'nfo_sinus monitor'
+    ENABLE_COMMAND_PALETTE = False
+    CSS = """
+    * { scrollbar-size-vertical: 1; overflow-x: hidden; }
+    #head {
+        height: auto; max-height: 3; background: $panel; padding: 0 1;
+        text-wrap: nowrap; text-overflow: ellipsis;
+    }
+    #body { layout: vertical; height: 1fr; }
+    #drives { height: auto; max-height: 45%; }
+    #full { height: 1fr; border-top: solid $panel-lighten-2; padding: 0 1; }
+    #drive, #plots, #line { height: auto; }
+    #log { height: 7; border-top: solid $panel-lighten-2; padding: 0 1; }
+    .wide #body { layout: horizontal; }
+    .wide #drives { width: 80; height: 100%; max-height: 100%; }
+    .wide #full {
+        width: 1fr; height: 100%;
+        border-top: none; border-left: solid $panel-lighten-2;
+    }
+    .low #head { max-height: 2; }
+    .low #log { height: 3; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding('s', 'stop', 'stop this drive'),
+        Binding('a', 'stop_all', 'stop ALL'),
+        Binding('n', 'next_trouble', 'next trouble'),
+        Binding('p', 'next_quantity', 'plot'),
+        Binding('q', 'quit', 'quit'),
+        Binding('ctrl+c', 'quit', show=False, priority=True),
+    ]
+
+    def __init__(self, source: Source) -> None:
+        super().__init__()
+        self._source = source
+        self._picture = Picture((), (), ())
+        self._history: dict[str, deque[Measured]] = {}
+        self._looks = 0
+        self._rows: list[str] = []
+        self._cells: dict[tuple[str, str], str | Text] = {}
+        self._quantity = next(iter(_QUANTITIES))
+
+    def compose(self) -> ComposeResult:
+        """Return what there is to see, from top to bottom."""
+        yield Static(id='head')
+        with Container(id='body'):
+            yield DataTable(id='drives', cursor_type='row', zebra_stripes=True)
+            with Vertical(id='full'):
+                yield Static(id='drive')
+                yield Static(id='plots')
+                yield Static(id='line')
+        yield RichLog(id='log', max_lines=500, min_width=20, wrap=True)
+        yield Footer()
+
+    def on_mount(self) -> None:
+        """Begin."""
+        self.query_one('#log', RichLog).can_focus = False
+        table = self._table
+        table.add_column('drive', width=_NAME_WIDTH, key='drive')
+        for heading, width, _, right in _COLUMNS:
+            table.add_column(Text(heading, justify='right' if right else 'left'), width=width,
+                             key=heading)
+        table.focus()
+        # however it is ended, the terminal is put back
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            loop.add_signal_handler(number, self.exit)
+        self.set_interval(_PERIOD, self._look)
+        self._look()
+
+    def on_resize(self, event: Resize) -> None:
+        """Put the drive in full where there is room for it."""
+        self.screen.set_class(event.size.width >= _WIDE, 'wide')
+        self.screen.set_class(event.size.height < 30, 'low')
+        self._show_drive()
+
+    def on_data_table_row_highlighted(self) -> None:
+        """Show the drive that was chosen."""
+        self._show_drive()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Offer no stop where the source has none."""
+        return not (action in ('stop', 'stop_all') and self._source.only_looks)
+
+    # --- keys ---------------------------------------------------------------------------------
+
+    def action_stop(self) -> None:
+        """Stop the drive that is chosen."""
+        drive = self._chosen()
+        if drive is not None:
+            self._source.stop(drive.name)
+            self._look()
+
+    def action_stop_all(self) -> None:
+        """Stop all drives."""
+        self._source.stop_all()
+        self._look()
+
+    def action_next_trouble(self) -> None:
+        """Choose the next drive that needs a person."""
+        table, drives = self._table, {drive.name: drive for drive in self._picture.drives}
+        for step in range(1, len(self._rows) + 1):
+            row = (table.cursor_row + step) % len(self._rows)
+            if drives[self._rows[row]].condition in _TROUBLE:
+                table.move_cursor(row=row)
+                return
+
+    def action_next_quantity(self) -> None:
+        """Plot the next quantity."""
+        names = list(_QUANTITIES)
+        self._quantity = names[(names.index(self._quantity) + 1) % len(names)]
+        self._show_drive()
+
+    # --- what is shown ------------------------------------------------------------------------
+
+    @property
+    def _table(self) -> DataTable[str | Text]:
+        return self.query_one('#drives', DataTable)
+
+    def _look(self) -> None:
+        if not self.query('#log'):
+            # it is being taken down
+            return
+        self._picture = picture = self._source.look()
+        for drive in picture.drives:
+            past = self._history.setdefault(drive.name, deque(maxlen=_REMEMBERED))
+            if past and self._looks % _LOOKS_A_COLUMN:
+                past.pop()
+            past.append(drive.measured)
+        self._looks += 1
+        self.query_one('#head', Static).update(self._head(picture))
+        self._show_table(sorted(picture.drives, key=lambda drive: natural(drive.name)))
+        self._show_drive()
+        log = self.query_one('#log', RichLog)
+        for note in picture.notes:
+            log.write(_line_of(note))
+
+    def _head(self, picture: Picture) -> Text:
+        head = Text(f'{self._source.title}: ')
+        if not picture.drives:
+            return head.append(self._source.advice)
+        number = len(picture.drives)
+        head.append(f'{number} drive{"s" * (number != 1)}')
+        for condition, (mark, style) in reversed(_MARKS.items()):
+            count = sum(drive.condition is condition for drive in picture.drives)
+            if count:
+                head.append(f'  {mark} {count} {condition.value}', style)
+        if self._source.only_looks:
+            head.append(f'  {self._source.only_looks}', 'dim')
+        for line in picture.lines:
+            head.append(f'\n{line.name}: {_told(line)}', 'dim')
+        return head
+
+    def _show_table(self, drives: Iterable[DriveView]) -> None:
+        table = self._table
+        shown = list(drives)
+        names = [drive.name for drive in shown]
+        if names != self._rows:
+            chosen = self._chosen()
+            table.clear()
+            self._cells.clear()
+            for name, short in short_names(names, _NAME_WIDTH).items():
+                table.add_row(short, *('' for _ in _COLUMNS), key=name)
+            self._rows = names
+            if chosen is not None and chosen.name in names:
+                table.move_cursor(row=names.index(chosen.name))
+        for drive in shown:
+            for heading, width, cell, right in _COLUMNS:
+                text = cell(drive)
+                if right and isinstance(text, str):
+                    text = text.rjust(width)
+                if self._cells.get((drive.name, heading)) != text:
+                    self._cells[drive.name, heading] = text
+                    table.update_cell(drive.name, heading, text)
+
+    def _chosen(self) -> DriveView | None:
+        row = self._table.cursor_row
+        name = self._rows[row] if 0 <= row < len(self._rows) else None
+        return next((drive for drive in self._picture.drives if drive.name == name), None)
+
+    def _show_drive(self) -> None:
+        drive = self._chosen()
+        told, plots, line = (self.query_one(name, Static) for name in ('#drive', '#plots', '#line'))
+        if drive is None:
+            for widget in (told, plots, line):
+                widget.update('')
+            return
+        text = _in_full(drive, told.size.width)
+        told.update(Text('\n').join(text))
+        line.update('' if drive.line is None else Text(f'line: {_told(drive.line)}', 'dim'))
+        # what the text leaves, the line of figures in two rows
+        free = self.query_one('#full').content_size.height - len(text) - 2
+        plots.update(Text('\n').join(self._plots(drive, free // (_PLOT_HEIGHT + 1))))
+
+    def _plots(self, drive: DriveView, room: int) -> list[Text]:
+        """Return the plot that was chosen, and the next ones where there is room for them."""
+        names = list(_QUANTITIES)
+        chosen = names.index(self._quantity)
+        drawn = (self._plot(drive, name) for name in (*names[chosen:], *names[:chosen]))
+        return list(itertools.chain.from_iterable([one for one in drawn if one][: max(1, room)]))
+
+    def _plot(self, drive: DriveView, quantity: str) -> list[Text]:
+        name, unit, decimals, least = _QUANTITIES[quantity]
+        width = self.query_one('#full').content_size.width - 10
+        values = [getattr(measured, quantity) for measured in self._history[drive.name]]
+        values = values[-max(width, 0) :]
+        if width < 10 or all(math.isnan(value) for value in values):
+            return []
+        low, high = axis = span(values, least)
+        lines = plot(values, width, _PLOT_HEIGHT, axis)
+        labels = [_number(high, decimals), *[''] * (_PLOT_HEIGHT - 2), _number(low, decimals)]
+        shown = [
+            Text.assemble((f'{label:>8} ', 'dim'), (line, 'cyan'))
+            for label, line in zip(labels, lines, strict=True)
+        ]
+        now = _number(values[-1], decimals, unit)
+        seconds = f'{len(values) * _LOOKS_A_COLUMN * _PERIOD:.0f} s'
+        return [Text.assemble((f'{name} {now}', 'bold'), (f', the last {seconds}', 'dim')), *shown]
+
+
+def _in_full(drive: DriveView, width: int) -> list[Text]:
+    """Return who the drive is, how it is, why, what to do, and what is measured."""
+    _, style = _MARKS[drive.condition]
+    first = Text.assemble((drive.name, 'bold'), '  ', _status(drive))
+    if drive.enabled:
+        first.append('  enabled', 'green')
+    if drive.requires_ack:
+        first.append('  to be acknowledged', style)
+    lines = [first]
+    if drive.cause:
+        lines.append(Text.assemble(('why: ', 'dim'), drive.cause))
+    if drive.remedy:
+        lines.append(Text.assemble(('do: ', 'dim'), (drive.remedy, 'bold')))
+    measured = drive.measured
+    frequency = measured.frequency if drive.unit != 'Hz' else math.nan
+    cells = (
+        ('set ', drive.setpoint, 1, drive.unit),
+        ('actual ', drive.actual, 1, drive.unit),
+        ('', frequency, 1, 'Hz'),
+        ('', measured.speed, 0, 'rpm'),
+        ('', measured.output_current, 2, 'A'),
+        ('', measured.output_voltage, 0, 'V'),
+        ('', measured.output_power, 0, 'W'),
+        ('torque ', measured.torque, 0, '%'),
+        ('DC link ', measured.dc_link_voltage, 0, 'V'),
+        ('motor ', measured.motor_temperature, 0, '%'),
+    )
+    told = [
+        f'{name}{_number(value, decimals, unit)}'.replace(' ', '\N{NO-BREAK SPACE}')
+        for name, value, decimals, unit in cells
+        if not math.isnan(value)
+    ]
+    # only where a value ends
+    lines += map(Text, textwrap.wrap('  '.join(told), max(width, 20)))
+    return lines
+
+
+def _told(line: LineView) -> str:
+    """Return how a line is doing, the worst first."""
+    parts = [
+        f'{count} {what}'
+        for count, what in (
+            (line.timeouts, 'without answer'),
+            (line.damaged, 'damaged'),
+            (line.refused, 'refused'),
+            (line.retries, 'repeated'),
+            (line.reconnects, 'reconnected'),
+        )
+        if count
+    ]
+    if not math.isnan(line.utilisation):
+        parts.append(f'{100 * line.utilisation:.0f} % used')
+    if not math.isnan(line.cycle_time):
+        parts.append(f'cycle {1000 * line.cycle_time:.0f} ms')
+    if not math.isnan(line.round_trip_median):
+        times = (line.round_trip_median, line.round_trip_p99, line.round_trip_max)
+        median, p99, most = (_number(1000 * seconds, 1) for seconds in times)
+        parts.append(f'round trip {median} ms, 99 % {p99}, max {most}')
+    parts.append(f'{line.transactions} requests')
+    return ', '.join(parts)
+
+
+def _line_of(note: Note) -> Text:
+    when = datetime.fromtimestamp(note.at).strftime('%H:%M:%S')
+    style = _LEVELS[note.level]
+    return Text.assemble((when, 'dim'), ' ', (note.who, 'bold'), ' ', (note.text, style))

@@ -1,0 +1,147 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the view shows, wherever it comes from: the graph of ROS, or the line itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field
+from enum import Enum
+import math
+from typing import Protocol
+
+NAN = math.nan
+
+
+class Condition(Enum):
+    """How a drive is, in one word; the first that is true counts."""
+
+    #: Nobody tells of it any more: its driver has ended, or the graph is torn.
+    GONE = 'gone'
+    #: The drive does not answer.
+    SILENT = 'silent'
+    FAULT = 'fault'
+    ALARM = 'alarm'
+    #: The motor turns, or may.
+    RUNS = 'running'
+    STANDS = 'standing'
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is measured, in the units of the message Telemetry; NaN: not known."""
+
+    frequency: float = NAN
+    speed: float = NAN
+    output_current: float = NAN
+    output_voltage: float = NAN
+    output_power: float = NAN
+    torque: float = NAN
+    dc_link_voltage: float = NAN
+    motor_temperature: float = NAN
+
+
+@dataclass(frozen=True)
+class LineView:
+    """How a line is doing, or one drive on it; times in s, as in the message BusStatistics."""
+
+    name: str
+    utilisation: float = NAN
+    cycle_time: float = NAN
+    transactions: int = 0
+    timeouts: int = 0
+    damaged: int = 0
+    refused: int = 0
+    retries: int = 0
+    reconnects: int = 0
+    round_trip_median: float = NAN
+    round_trip_p99: float = NAN
+    round_trip_max: float = NAN
+
+
+@dataclass(frozen=True)
+class DriveView:
+    """
+    One drive.
+
+    :ivar name: as one would type it: a node, or an address.
+    :ivar status: code and text, as on the display.
+    :ivar cause: what the status means, where there is more to say than its text.
+    :ivar remedy: what to do about it.
+    :ivar age: s since somebody told of it.
+    :ivar line: how the line does with this drive; None: not known.
+    """
+
+    name: str
+    condition: Condition
+    status: str = ''
+    cause: str = ''
+    remedy: str = ''
+    requires_ack: bool = False
+    enabled: bool = False
+    setpoint: float = NAN
+    actual: float = NAN
+    unit: str = ''
+    age: float = 0.0
+    measured: Measured = field(default_factory=Measured)
+    line: LineView | None = None
+
+
+class Level(Enum):
+    """How much a note matters."""
+
+    INFO = 'info'
+    WARNING = 'warning'
+    ERROR = 'error'
+
+
+@dataclass(frozen=True)
+class Note:
+    """A line of the log: when (s of ``time.time``), who, what."""
+
+    at: float
+    level: Level
+    who: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """All there is to show; ``notes`` only those that are new."""
+
+    drives: Sequence[DriveView]
+    lines: Sequence[LineView]
+    notes: Sequence[Note]
+
+
+class Source(Protocol):
+    """Where pictures come from; used by one thread, and nothing here waits."""
+
+    #: What is looked at, such as a domain or a port.
+    title: str
+    #: What to do while there is no drive.
+    advice: str
+    #: Why nothing can be stopped from here; empty: it can.
+    only_looks: str
+
+    def look(self) -> Picture:
+        """Return what is so now."""
+
+    def stop(self, name: str) -> None:
+        """Ask that a drive be stopped; a note tells what came of it."""
+
+    def stop_all(self) -> None:
+        """Ask that all be stopped; a note tells what came of it."""

@@ -1,0 +1,46 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether there is a terminal for the view, and the view in it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import sys
+
+from nfo_sinus_driver.view.picture import Source
+
+
+def why_not() -> str:
+    """Return why the view cannot be shown here, and what to do; empty: it can."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return 'the view needs a terminal, at both its input and its output'
+    encoding = (sys.stdout.encoding or '').lower()
+    if encoding not in ('utf-8', 'utf8'):
+        return f'the view needs a terminal with UTF-8, not {encoding}: export LC_ALL=C.UTF-8'
+    try:
+        version = importlib.metadata.version('textual')
+    except importlib.metadata.PackageNotFoundError:
+        return 'the view needs the library textual: pip install "textual>=3"'
+    if int(version.split('.')[0]) < 3:
+        return f'the view needs textual 3 or newer, not {version}: pip install "textual>=3"'
+    return ''
+
+
+def show(source: Source) -> None:
+    """Show the view until somebody ends it; ask :func:`why_not` before."""
+    # only here: who does not look needs no textual
+    from nfo_sinus_driver.view.app import MonitorApp
+
+    MonitorApp(source).run()

@@ -1,0 +1,113 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``nfo-sinus monitor`` on a terminal: the view of a line, which only reads."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+from cli_bench import COMMAND
+from cli_bench import Bench
+import pytest
+from support.terminal import Terminal
+
+
+def view(bench: Bench, *arguments: object) -> Terminal:
+    return Terminal([*COMMAND, *bench.options, 'monitor', *map(str, arguments)])
+
+
+def test_a_fault_and_a_lost_drive_are_shown_and_nothing_is_written(bench: Bench) -> None:
+    inject = bench.simulator.inject
+    with view(bench, '--addresses', '1,2', '--period', 0.05) as terminal:
+        text = terminal.wait_for('2 drives', '■ 2 standing', 'drive 1', 'drive 2', 'cycle')
+        assert 'only looks' in text and 'nfo-sinus stop' in text and 'stop ALL' not in text
+        inject('fault', 4, address=2)
+        terminal.wait_for('✗ 1 fault', '4 PTC Temp')
+        terminal.press('n')
+        terminal.wait_for('to be acknowledged', 'why: Motor overheating', 'do: Let the motor cool')
+        # keys that stop elsewhere
+        terminal.press('sa')
+        inject('silence', 3600.0, address=2)
+        terminal.wait_for('? 1 silent', 'not connected', gone=['✗ 1 fault'])
+        inject('silence', 0.0, address=2)
+        terminal.wait_for('✗ 1 fault', gone=['silent'])
+        terminal.press('q')
+        assert terminal.wait() == 0
+        assert terminal.settings == terminal.before, 'the terminal is as it was'
+        terminal.wait_for('median', 'drive 2')
+    assert bench.writes() == []
+
+
+@pytest.mark.parametrize('end', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, 'ctrl-c'])
+def test_however_it_is_ended_the_terminal_is_as_it_was(bench: Bench, end: int | str) -> None:
+    with view(bench) as terminal:
+        terminal.wait_for('■ 1 standing')
+        if isinstance(end, str):
+            terminal.press('\x03')
+        else:
+            terminal.signal(end)
+        assert terminal.wait() == 0
+        assert terminal.settings == terminal.before
+        terminal.wait_for('median')
+
+
+def test_one_that_is_not_there_is_told_without_a_view(bench: Bench) -> None:
+    with view(bench, '--address', 7, '--response-timeout', 0.05, '--retries', 0) as terminal:
+        assert terminal.wait() == 1
+        terminal.wait_for('no response')
+
+
+def test_lines_where_they_are_asked_for(bench: Bench) -> None:
+    with view(bench, '--lines', '--period', 0.05) as terminal:
+        terminal.wait_for('24 Stop', 'rpm', gone=['standing'])
+        terminal.press('\x03')
+        assert terminal.wait() == 0
+
+
+def test_without_its_library_it_goes_on_line_by_line(bench: Bench) -> None:
+    program = """
+import importlib.metadata as metadata, sys
+known = metadata.version
+def version(name):
+    if name == 'textual':
+        raise metadata.PackageNotFoundError(name)
+    return known(name)
+metadata.version = version
+from nfo_sinus_driver.cli.main import main
+sys.exit(main())
+"""
+    command = [sys.executable, '-c', program, *bench.options, 'monitor', '--period', '0.05']
+    with Terminal(command) as terminal:
+        terminal.wait_for('the view needs the library textual', 'pip install', '24 Stop')
+        terminal.press('\x03')
+        assert terminal.wait() == 0
+
+
+def test_beside_ros_it_needs_ros(bench: Bench) -> None:
+    program = """
+import importlib.util, sys
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name: None if name == 'rclpy' else found(name)
+from nfo_sinus_driver.cli.main import main
+sys.exit(main())
+"""
+    done = subprocess.run(
+        [sys.executable, '-c', program, 'monitor', '--ros'],
+        capture_output=True, text=True, timeout=60, check=False,
+    )
+    assert done.returncode == 2
+    assert 'source /opt/ros/jazzy/setup.bash' in done.stderr
