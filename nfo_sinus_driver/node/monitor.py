@@ -181,8 +181,9 @@ class GraphSource:
         self.title = f'ROS domain {context.get_domain_id()}'
         where = f' in {" ".join(self._spaces)}' if self._spaces else ''
         self.advice = (
-            f'no drive{where} yet. Start one: ros2 run nfo_sinus_driver driver. If one runs: '
-            'ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE have to be the same there and here'
+            f'No drive{where} yet. Start one:\n\n    ros2 run nfo_sinus_driver driver\n\n'
+            'If one runs, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE have to be the same for '
+            'it and here.'
         )
 
     def close(self) -> None:

@@ -267,10 +267,8 @@ class MonitorApp(App[None]):
 
     def _head(self, picture: Picture) -> Text:
         head = Text(f'{self._source.title}: ')
-        if not picture.drives:
-            return head.append(self._source.advice)
         number = len(picture.drives)
-        head.append(f'{number} drive{"s" * (number != 1)}')
+        head.append(f'{number or "no"} drive{"s" * (number != 1)}')
         for condition, (mark, style) in reversed(_MARKS.items()):
             count = sum(drive.condition is condition for drive in picture.drives)
             if count:
@@ -312,8 +310,9 @@ class MonitorApp(App[None]):
         drive = self._chosen()
         told, plots, line = (self.query_one(name, Static) for name in ('#drive', '#plots', '#line'))
         if drive is None:
-            for widget in (told, plots, line):
-                widget.update('')
+            told.update(Text('' if self._picture.drives else self._source.advice))
+            plots.update('')
+            line.update('')
             return
         text = _in_full(drive, told.size.width)
         told.update(Text('\n').join(text))

@@ -28,6 +28,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
 from typing import Any
@@ -60,6 +61,7 @@ from std_srvs.srv import Trigger
 from support import telegram_laws
 from support import trace_laws
 from support.drives import Drives
+from support.terminal import Terminal
 from ways import UNFRAMED
 from ways import Way
 
@@ -267,6 +269,11 @@ class Bench(contextlib.ExitStack):
         self.callback(_no_traceback, process)
         self.callback(process.end)
         return process
+
+    def view(self, *arguments: str, columns: int = 80, rows: int = 24) -> Terminal:
+        """Start the view of all drives on a terminal of its own."""
+        command = [sys.executable, '-m', 'nfo_sinus_driver.node.monitor', *arguments]
+        return self.enter_context(Terminal(command, columns, rows, self._environment))
 
     @property
     def log(self) -> str:

@@ -51,7 +51,7 @@ class Hand:
     """A source whose pictures a test changes."""
 
     title = 'ROS domain 7'
-    advice = 'no drive yet'
+    advice = 'start one'
 
     def __init__(self, *drives: DriveView, only_looks: str = '') -> None:
         self.only_looks = only_looks
@@ -189,11 +189,11 @@ def test_a_source_that_only_looks_has_no_keys_that_stop() -> None:
 
 def test_without_drives_it_says_what_to_do() -> None:
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
-        assert 'ROS domain 7: no drive yet' in seen(app)
+        assert 'ROS domain 7: no drives' in seen(app) and 'start one' in seen(app)
         # and no key makes it fall
         await pilot.press('s', 'n', 'p', 'down')
         await pilot.pause()
-        assert 'no drive yet' in seen(app)
+        assert 'start one' in seen(app)
 
     through(Hand(), steps)
 

@@ -1,0 +1,142 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The view beside the running driver, on a terminal: what it shows, and the keys that stop."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+from bench import PATIENCE
+from bench import Bench
+from bench import wait_until
+import pytest
+from ways import needs
+
+_TWO = """
+/**/nfo_sinus_bus: {ros__parameters: {drives: [drive_2, drive_10]}}
+/**/drive_2: {ros__parameters: {address: 1}}
+/**/drive_10: {ros__parameters: {address: 2}}
+"""
+
+
+def start(bench: Bench) -> object:
+    """Start a driver with two drives in a namespace; return the simulated line."""
+    simulator = bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(_TWO)
+    bench.driver('--params-file', str(parameters), '-r', '__ns:=/conveyor')
+    for name in ('/conveyor/drive_2', '/conveyor/drive_10'):
+        bench.client(name).connected()
+    return simulator
+
+
+@pytest.mark.parametrize('columns', [80, 160])
+@needs('watched', 'states')
+def test_a_fault_a_lost_line_and_stops_by_keys(bench: Bench, columns: int) -> None:
+    simulator = start(bench)
+    first = bench.client('/conveyor/drive_2').connected()
+    second = bench.client('/conveyor/drive_10').connected()
+    view = bench.view(columns=columns)
+    text = view.wait_for('2 drives', '■ 2 standing', 'drive_2', 'drive_10', '% used')
+    assert text.index('drive_2') < text.index('drive_10'), 'by their numbers'
+
+    assert first.enable().success and second.enable().success
+    with first.setpoints(20.0), second.setpoints(25.0):
+        # no standstill before this: with its message it is taken for what was asked for
+        view.wait_for('► 2 running', '20.0 Hz', '25.0 Hz', 'enabled')
+        view.press('s')
+        view.wait_for('/conveyor/drive_2/stop: ')
+        wait_until(lambda: not simulator.state(1)['turning'], 'the one that was chosen stands')
+        view.wait_for('■ 1 standing', '► 1 running')
+        assert simulator.state(2)['turning'], 'the other one runs on'
+        view.press('a')
+        view.wait_for('/conveyor/nfo_sinus_bus/stop_all: ')
+        wait_until(lambda: not simulator.state(2)['turning'], 'all stand')
+        view.wait_for('■ 2 standing')
+
+    simulator.inject('fault', bench.drives.overload.code, address=2)
+    view.wait_for('✗ 1 fault')
+    view.press('n')
+    view.wait_for('/conveyor/drive_10  ✗', 'do: ')
+    simulator.inject('silence', 3600.0, address=1)
+    view.wait_for('? 1 silent', '✗ 1 fault')
+    simulator.inject('silence', 0.0, address=1)
+    view.wait_for('■ 1 standing', gone=['silent'])
+    view.press('q')
+    assert view.wait() == 0
+    assert view.settings == view.before, 'the terminal is as it was'
+
+
+def test_a_driver_that_is_gone_is_not_shown_as_if_it_were_there(bench: Bench) -> None:
+    bench.simulator()
+    driver = bench.driver()
+    bench.client().connected()
+    view = bench.view()
+    view.wait_for('1 drive ', '/nfo_sinus', gone=['not connected'])
+    driver.signal(signal.SIGKILL)
+    view.wait_for('· 1 gone', 'its driver is gone')
+    view.press('sa')
+    view.wait_for('there is nobody to be stopped')
+    bench.driver()
+    view.wait_for('■ 1 standing', gone=['gone'])
+    # the new one is known by its services, too
+    bench.client().connected()
+    wait_until(lambda: _stopped(view), 'it is stopped by the key')
+
+
+def _stopped(view) -> bool:
+    view.press('s')
+    return '/nfo_sinus/stop: ' in view.text
+
+
+def test_before_there_is_a_driver_it_says_how_one_is_started(bench: Bench) -> None:
+    view = bench.view()
+    view.wait_for('no drives', 'ros2 run nfo_sinus_driver driver', 'ROS_DOMAIN_ID')
+    bench.simulator()
+    bench.driver()
+    view.wait_for('1 drive ')
+
+
+@needs('watched')
+def test_only_the_namespaces_that_were_asked_for(bench: Bench) -> None:
+    start(bench)
+    bench.view('/robot').wait_for('No drive in /robot yet')
+    bench.view('conveyor').wait_for('2 drives')
+    bench.view('/conveyor/drive_2').wait_for('1 drive ')
+
+
+@pytest.mark.parametrize('end', [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_however_it_is_ended_the_terminal_is_as_it_was(bench: Bench, end: int) -> None:
+    view = bench.view()
+    view.wait_for('No drive yet')
+    view.signal(end)
+    assert view.wait() == 0
+    assert view.settings == view.before
+
+
+@pytest.mark.parametrize('arguments', [(), ('--ros',)], ids=['monitor', 'nfo-sinus'])
+def test_without_a_terminal_it_says_so(arguments: tuple[str, ...]) -> None:
+    command = [sys.executable, '-m', 'nfo_sinus_driver.node.monitor']
+    if arguments:
+        start = 'import sys; from nfo_sinus_driver.cli.main import main; sys.exit(main())'
+        command = [sys.executable, '-c', start, 'monitor', *arguments]
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        timeout=PATIENCE, check=False,
+    )
+    assert done.returncode == 2
+    assert 'the view needs a terminal' in done.stderr
