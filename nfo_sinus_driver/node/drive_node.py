@@ -48,6 +48,8 @@ from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.reporter import Reporter
+from nfo_sinus_driver.node.scale import Scale
+from nfo_sinus_driver.node.scale import require_scale
 from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.settings import coerce
@@ -95,6 +97,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.lifecycle = Lifecycle(self)
         values = declare(self, DRIVE_SETTINGS)
         _require_gear_ratio(values)
+        require_scale(values)
         joint = Joint(
             lambda: self.get_parameter('joint_name').value or self.get_name(),
             lambda: self.get_parameter('gear_ratio').value,
@@ -107,6 +110,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.managed = ManagedDrive(
             self.get_name(),
             wording,
+            Scale(
+                lambda: self.get_parameter('scale').value, lambda: self.get_parameter('unit').value
+            ),
             context.bus,
             self._drive_settings(values),
             reporter,
@@ -282,6 +288,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']
         _require_gear_ratio(changed)
+        require_scale(changed)
+        self._require_same_scale(changed)
         # not read_only for rclpy, so that what was dumped can be loaded
         autostart = self.get_parameter('autostart').value
         if changed.get('autostart', autostart) != autostart:
@@ -293,6 +301,13 @@ class DriveNode(LifecycleNodeMixin, Node):
                     'deactivate it and clean it up first'
                 )
         return self._drive_settings({**values, **changed})
+
+    def _require_same_scale(self, changed: Mapping[str, object]) -> None:
+        # a set-point that goes on arriving would mean another speed
+        for name in ('scale', 'unit'):
+            now = self.get_parameter(name).value
+            if changed.get(name, now) != now and self.managed.drive.armed:
+                raise ValueError(f'{name} can only be changed while the drive is not enabled')
 
     def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
         """Set the drive's own time-out if it is there, or undo changes; else configure does it."""

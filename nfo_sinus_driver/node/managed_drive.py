@@ -27,6 +27,7 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.lifecycle import Lifecycle
+from nfo_sinus_driver.node.scale import Scale
 from nfo_sinus_driver.node.wording import NodeError
 from nfo_sinus_driver.node.wording import Wording
 
@@ -46,12 +47,14 @@ class ManagedDrive:
     :param name: the node's.
     :param listener: told about every poll and event, on the worker of the bus.
     :ivar wording: what it reports, as its node says it.
+    :ivar scale: what set-points for it are counted in.
     """
 
     def __init__(
         self,
         name: str,
         wording: Wording,
+        scale: Scale,
         bus: Bus,
         settings: DriveSettings,
         listener: Listener,
@@ -59,6 +62,7 @@ class ManagedDrive:
     ) -> None:
         self.name = name
         self.wording = wording
+        self.scale = scale
         self._bus = bus
         self._settings = settings
         self._listener = listener

@@ -38,6 +38,7 @@ from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import LogEntry
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.node.scale import Scale
 
 _CONTROL_MODES = {
     'Freque': DriveStatus.FREQUE,
@@ -71,19 +72,19 @@ _TELEMETRY = {
 }
 
 
-def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str) -> DriveStatus:
-    """Return the DriveStatus of a poll."""
+def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -> DriveStatus:
+    """Return the DriveStatus of a poll, in the unit of a scale."""
     message = DriveStatus(
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
         enabled=snapshot.enabled,
         control_method=getattr(DriveStatus, snapshot.control_method.upper()),
         control_mode=_CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
-        unit=snapshot.unit,
-        setpoint=snapshot.setpoint,
+        unit=scale.unit(snapshot.unit),
+        setpoint=scale.shown(snapshot.setpoint),
         setpoint_age=snapshot.setpoint_age,
         setpoint_clamped=snapshot.setpoint_clamped,
-        actual=snapshot.actual,
+        actual=scale.shown(snapshot.actual),
         state=DriveStatus.UNKNOWN,
     )
     if snapshot.status is not None:

@@ -74,7 +74,7 @@ class Setpoints:
         self._logged_idle = quiet
 
     def _on_setpoint(self, message: Float32) -> None:
-        self._take(message.data)
+        self._take(self._managed.scale.of_drive(message.data))
 
     def _on_stamped(self, message: Setpoint) -> None:
         mode = self._managed.drive.snapshot.control_mode
@@ -153,11 +153,20 @@ class SetpointsForAll:
         context.setpoint_subscriber.subscribe(node, Float32, '~/setpoint_all', self._on_setpoint)
 
     def _on_setpoint(self, message: Float32) -> None:
-        if math.isfinite(message.data):
-            self._all.request(message.data)
+        factors = {managed.scale.factor: managed for managed in self._context.drives}
+        if len(factors) > 1:
+            told = ', '.join(f'{one.name}: {factor:g}' for factor, one in factors.items())
+            self._ignore(f'setpoint_all refused: the drives differ in scale ({told})')
+            return
+        (managed,) = factors.values()
+        value = managed.scale.of_drive(message.data)
+        if math.isfinite(value):
+            self._all.request(value)
         else:
-            text = f'setpoint_all {message.data} ignored: it is not a finite number'
-            self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
+            self._ignore(f'setpoint_all {message.data} ignored: it is not a finite number')
+
+    def _ignore(self, text: str) -> None:
+        self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
 
     def _on_told(self, told: Told) -> None:
         """Say on the bus what has changed; a refusal again and again, but not with each request."""

@@ -269,6 +269,18 @@ DRIVE_SETTINGS = (
         'Motor turns per turn of the output shaft; negative inverts the direction of joint_states '
         'and joint_command',
     ),
+    Setting(
+        'scale',
+        1.0,
+        'How much of `unit` 1 Hz of the drive is (1 rpm, 1 %, as its control mode has it), such as '
+        'm/s of a belt, in ~/setpoint and ~/status; negative turns the direction',
+        constraints='not 0; not while the drive is enabled',
+    ),
+    Setting(
+        'unit',
+        '',
+        "What ~/setpoint and ~/status are in, such as m/s; '': the unit of the control mode",
+    ),
     Setting('joint_name', '', "Name of the output shaft in joint_states; '': the node's name"),
     Setting(
         'apply_parameters',

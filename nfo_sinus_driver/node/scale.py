@@ -1,0 +1,60 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What set-points and actual values are counted in: the drive's unit, or that of a belt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+import math
+
+
+class Scale:
+    """
+    A unit of the user's, such as m/s, for what the drive has in Hz or rpm.
+
+    :param factor: how much of it one unit of the drive is, not 0; negative turns the direction.
+    :param unit: its name; empty: that of the drive.
+    """
+
+    def __init__(self, factor: Callable[[], float], unit: Callable[[], str]) -> None:
+        self._factor = factor
+        self._unit = unit
+
+    @property
+    def factor(self) -> float:
+        """How much one unit of the drive is."""
+        return self._factor()
+
+    def of_drive(self, value: float) -> float:
+        """Return a set-point of the user's in the unit of the drive."""
+        return value / self._factor()
+
+    def shown(self, value: float) -> float:
+        """Return a value of the drive's in the unit of the user."""
+        return value * self._factor()
+
+    def unit(self, unit_of_drive: str) -> str:
+        """Return the name of the unit."""
+        return self._unit() or unit_of_drive
+
+
+def require_scale(values: Mapping[str, object]) -> None:
+    """See to it that these settings, as far as they are there, have a scale that is one."""
+    factor = values.get('scale')
+    if isinstance(factor, float) and (factor == 0 or not math.isfinite(factor)):
+        raise ValueError(
+            f'scale {factor:g}: how much of the unit 1 Hz (1 rpm, 1 %) of the drive is, never 0'
+        )

@@ -1,0 +1,125 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Set-points and status in the unit of a belt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bench import Bench
+from bench import wait_until
+import pytest
+from std_msgs.msg import Float32
+from ways import needs
+
+_BELT = ('-p', 'scale:=0.02', '-p', 'unit:=m/s')
+
+
+@needs('reverse')
+@pytest.mark.parametrize('sign', [1, -1])
+def test_a_belt_is_commanded_and_told_in_its_own_unit(bench: Bench, sign: int) -> None:
+    simulator = bench.simulator()
+    bench.driver('-p', f'scale:={sign * 0.02}', '-p', 'unit:=m/s')
+    client = bench.client().connected()
+    assert client.enable().success
+    with client.setpoints(-0.4):
+        # 0.02 m/s a hertz
+        wait_until(lambda: abs(simulator.state()['frequency'] + sign * 20.0) < 0.2, '20 Hz')
+        status = wait_until(
+            lambda: (one := client.messages['status'][-1]).actual < -0.39 and one, 'it is told'
+        )
+    assert status.unit == 'm/s'
+    assert status.setpoint == pytest.approx(-0.4)
+    assert status.actual == pytest.approx(-0.4, abs=0.005)
+    assert status.reverse == (sign > 0), 'what the motor does is told as it is'
+    assert abs(client.messages['actual_frequency'][-1].data) == pytest.approx(20.0, abs=0.5)
+
+
+@needs('reverse')
+def test_the_limit_is_in_the_unit_of_the_drive(bench: Bench) -> None:
+    simulator = bench.simulator()
+    bench.driver(*_BELT, '-p', 'setpoint_max:=15.0')
+    client = bench.client().connected()
+    assert client.enable().success
+    with client.setpoints(1.0):
+        wait_until(lambda: simulator.state()['frequency'] > 14.8, 'it is at the limit')
+        status = wait_until(
+            lambda: (one := client.messages['status'][-1]).setpoint_clamped and one, 'it is told'
+        )
+        assert status.setpoint == pytest.approx(0.3)
+    assert simulator.state()['frequency'] < 15.2
+
+
+def test_it_is_not_changed_under_a_motor_that_follows_set_points(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver(*_BELT)
+    client = bench.client().connected()
+    assert client.enable().success
+    for name, value in (('scale', 0.01), ('unit', 'mm/s')):
+        refused = client.set_parameters(**{name: value})
+        assert not refused.successful
+        assert refused.reason == f'{name} can only be changed while the drive is not enabled'
+    # the same again is no change: what was dumped can be loaded
+    assert client.set_parameters(scale=0.02).successful
+    assert client.call('stop').success
+    assert client.set_parameters(scale=0.01).successful
+    assert client.set_parameters(unit='').successful
+    wait_until(lambda: client.messages['status'][-1].unit == 'Hz', "the drive's own unit")
+    refused = client.set_parameters(scale=0.0)
+    assert not refused.successful and 'never 0' in refused.reason
+
+
+def test_a_scale_that_is_none_is_refused_at_the_start(bench: Bench) -> None:
+    bench.simulator()
+    driver = bench.driver('-p', 'scale:=0.0')
+    assert driver.wait() == 2
+    assert 'scale 0' in driver.text and 'never 0' in driver.text
+
+
+@pytest.mark.every_way
+@needs('classic')
+def test_one_set_point_for_all_needs_one_scale(bench: Bench) -> None:
+    simulator = bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text("""
+nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}
+left: {ros__parameters: {address: 1, scale: 0.02, unit: m/s}}
+right: {ros__parameters: {address: 2, scale: 0.02, unit: m/s}}
+""")
+    bench.driver('--params-file', str(parameters))
+    left, right = (bench.client(name).connected() for name in ('/left', '/right'))
+    everybody = bench.client('/nfo_sinus_bus')
+    publisher = everybody.node.create_publisher(Float32, '/nfo_sinus_bus/setpoint_all', 1)
+
+    def publishing(condition: Callable[[], object], what: str) -> None:
+        def published() -> object:
+            publisher.publish(Float32(data=0.4))
+            return condition()
+
+        wait_until(published, what, period=0.05)
+
+    assert everybody.call('enable_all').success
+    publishing(
+        lambda: all(abs(simulator.state(one)['frequency'] - 20.0) < 0.2 for one in (1, 2)),
+        'both have 20 Hz',
+    )
+    assert left.messages['status'][-1].unit == 'm/s'
+    assert everybody.call('stop_all').success
+    wait_until(lambda: not any(simulator.state(one)['turning'] for one in (1, 2)), 'both stand')
+    assert right.set_parameters(scale=0.03).successful
+    assert everybody.call('enable_all').success
+    told = 'setpoint_all refused: the drives differ in scale (left: 0.02, right: 0.03)'
+    publishing(lambda: told in bench.log, 'it is refused')
+    assert not any(simulator.state(one)['frequency'] for one in (1, 2))
