@@ -28,7 +28,8 @@ USES_PYMODBUS = $(shell grep -lE 'pymodbus|virtual_wire|simulator\.(line|modbus|
 	test/unit/link/test_*.py test/unit/simulator/test_*.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench parameters build clean
+.PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
+.PHONY: build clean
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -87,6 +88,17 @@ bench: setup ## measure its speed, and that of others (two hours; BENCH=--quick:
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)
+
+# An environment of its own: what it needs and what colcon needs exclude each other.
+.venv/docs/installed: docs/requirements.txt | setup
+	@.venv/bin/python -m venv .venv/docs
+	@.venv/docs/bin/python -m pip install --quiet --no-input --no-cache-dir \
+		--disable-pip-version-check --requirement=docs/requirements.txt
+	@touch $@
+
+docs: .venv/docs/installed ## the documentation as a site, in site/; every link is checked
+	@.venv/docs/bin/sphinx-build -q -W --keep-going -b html -c docs . site
+	@echo 'site/docs/README.html'
 
 parameters: setup ## write docs/parameters.md from the tables of the drives
 	@.venv/bin/python -m nfo_sinus_driver.catalog.page > docs/parameters.md.new

@@ -1,0 +1,55 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How `make docs` makes a site of README.md and docs/ with Sphinx."""
+
+from pathlib import Path
+import re
+
+project = 'nfo_sinus_driver'
+copyright = 'the nfo_sinus_driver authors, Apache License 2.0'
+extensions = ['myst_parser', 'sphinxcontrib.mermaid']
+include_patterns = ['README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md']
+exclude_patterns = ['.*', 'build', 'install', 'log', 'site']
+root_doc = 'docs/README'
+html_theme = 'furo'
+html_title = 'nfo_sinus_driver'
+# what a link may point to inside a page: every heading that there is
+myst_heading_anchors = 6
+# as GitHub shows it
+myst_fence_as_directive = ['mermaid']
+
+_INDEX = 'docs/README'
+_ROOT = Path(__file__).resolve().parents[1]
+
+
+def _prepare(app, name, source):
+    """Give the index a table of contents, in the order of its own table, and no page a folder."""
+    folder = (_ROOT / name).parent
+
+    def without_folder(link):
+        text, target = link.groups()
+        return text if (folder / target).is_dir() else link[0]
+
+    source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_folder, source[0])
+    if name != _INDEX:
+        return
+    pages = re.findall(r'^\| \[[^]]+\]\(([\w.]+)\.md\)', source[0], re.MULTILINE)
+    entries = '\n'.join(['/README', *pages, '/CONTRIBUTING', '/CHANGELOG'])
+    source[0] += f'\n```{{toctree}}\n:hidden:\n\n{entries}\n```\n'
+
+
+def setup(app):
+    """Have Sphinx call it."""
+    app.connect('source-read', _prepare)

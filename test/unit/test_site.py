@@ -1,0 +1,40 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The site of the documentation, where ``make docs`` has installed what makes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import subprocess
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+_SPHINX = ROOT / '.venv' / 'docs' / 'bin' / 'sphinx-build'
+
+
+@pytest.mark.skipif(not _SPHINX.exists(), reason='Sphinx is not installed: make docs')
+def test_every_page_is_made_and_no_link_leads_nowhere(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [_SPHINX, '-q', '-W', '--keep-going', '-b', 'html', '-c', 'docs', '.', tmp_path],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    pages = [*(ROOT / 'docs').glob('*.md'), ROOT / 'README.md', ROOT / 'CHANGELOG.rst']
+    index = (tmp_path / 'docs' / 'README.html').read_text()
+    for page in pages:
+        made = tmp_path / page.relative_to(ROOT).with_suffix('.html')
+        assert made.is_file(), page
+        assert page.name == 'README.md' or made.name in index, f'{page} is in the contents'
