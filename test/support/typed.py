@@ -1,0 +1,69 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands that the documentation shows, as they are typed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md')))
+
+
+@dataclass(frozen=True)
+class Typed:
+    """
+    A command.
+
+    :ivar place: page and line.
+    :ivar text: what is typed, in one line.
+    """
+
+    place: str
+    text: str
+
+    @property
+    def page(self) -> str:
+        """The page that it stands on."""
+        return self.place.partition(':')[0]
+
+    def __str__(self) -> str:
+        return f'{self.place} {self.text}'
+
+
+def typed(program: str) -> list[Typed]:
+    """Return all commands of the pages that begin with a program, in their order."""
+    return [one for page in PAGES for one in _of(page) if one.text.split()[0] == program]
+
+
+def _of(page: Path) -> Iterator[Typed]:
+    name = str(page.relative_to(ROOT))
+    whole, began = '', 0
+    for number, line in enumerate(page.read_text(encoding='utf-8').splitlines(), 1):
+        if not (line.startswith('    ') or whole):
+            continue
+        text = re.sub(r'^(\$|tools/run) ', '', line.strip())
+        if not text:
+            continue
+        began = began if whole else number
+        whole = f'{whole} {text}' if whole else text
+        if whole.endswith('\\'):
+            whole = whole.rstrip('\\').rstrip()
+            continue
+        yield Typed(f'{name}:{began}', whole)
+        whole = ''
