@@ -265,6 +265,8 @@ class StopSequence:
                 await self._inverter.look(Priority.STOP, once=True)
             raise
         seen = await self._inverter.look(Priority.STOP, once=True)
+        if refusal is None:
+            seen = await self._newer(seen)
         if refusal and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
@@ -275,6 +277,16 @@ class StopSequence:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
         return _Outcome.UNCONFIRMED
+
+    async def _newer(self, seen: InverterStatus) -> InverterStatus:
+        """Look until a status is from after the stop: a PLC shows for a while what was before."""
+        told, reasons = time.monotonic(), self._reasons
+        while seen.at <= self._told_at and self._reasons == reasons:
+            if time.monotonic() > told + _RETRY_PERIOD:
+                break
+            await self._bus.sleep(drive_state.LOOK_PERIOD)
+            seen = await self._inverter.look(Priority.STOP, once=True)
+        return seen
 
     def _why_not(self, seen: InverterStatus, refusal: Refused | None) -> Report | None:
         """Return what keeps a stop from being confirmed; ``None`` if nothing does."""

@@ -24,7 +24,9 @@ import contextlib
 from pathlib import Path
 import time
 from typing import Any
+from unittest import mock
 
+from drive_rig import PATIENCE
 from drive_rig import wait_until
 import pytest
 from support import telegram_laws
@@ -36,6 +38,7 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import sequences
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.plc import PlcSetting
@@ -189,6 +192,30 @@ def test_a_line_that_is_dead_for_long(make: Make, model: str) -> None:
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.stays()
     rig.ride(10.0)
+
+
+def test_a_stop_is_confirmed_by_the_first_status_after_it(make: Make, model: str) -> None:
+    rig = make()
+    rig.ride()
+    rig.answer(rig.drive.stop())
+    rig.stands()
+    attempts = []
+    try_once = sequences.StopSequence._try_once
+
+    async def counted(sequence: sequences.StopSequence) -> Any:
+        attempts.append(await try_once(sequence))
+        return attempts[-1]
+
+    def each_at_the_first_attempt() -> bool:
+        attempts.clear()
+        for _ in range(10):
+            rig.drive.stop().result(PATIENCE)
+        return len(attempts) == 10
+
+    # what the PLC shows at first is from before the stop, and none is written twice for that; a
+    # machine that rests is given another chance
+    with mock.patch.object(sequences.StopSequence, '_try_once', counted):
+        wait_until(each_at_the_first_attempt)
 
 
 @ONE_MODEL
