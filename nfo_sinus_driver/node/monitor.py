@@ -45,6 +45,7 @@ from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
@@ -89,6 +90,8 @@ _QOS = {
 }
 _TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
+#: Of a publisher it can be known before, or after, which node it belongs to.
+_NOT_KNOWN_YET = rclpy_implementation.RCLError
 #: What the log has said before somebody listened, a little of it.
 _ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: For how long a line of the log waits for its node to be found, s.
@@ -246,10 +249,12 @@ class GraphSource:
                 space = publisher.node_namespace
                 name = f'{space.rstrip("/")}/{publisher.node_name}'
                 if name not in self._tellers and self._wanted(name):
-                    self._meet(name, publisher.node_name, space, now)
+                    with contextlib.suppress(_NOT_KNOWN_YET):
+                        self._meet(name, publisher.node_name, space, now)
         for teller in self._tellers.values():
             if teller.stop is None:
-                self._find_stop(teller)
+                with contextlib.suppress(_NOT_KNOWN_YET):
+                    self._find_stop(teller)
 
     def _wanted(self, name: str) -> bool:
         return not self._spaces or any(

@@ -46,7 +46,7 @@ def running(simulator) -> list[bool]:
     return [simulator.state(address)['turning'] for address in (1, 2, 3)]
 
 
-@needs('watched')
+@needs('watched', 'reverse')
 def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(bench: Bench) -> None:
     simulator, everybody = start(bench)
     answer = everybody.call('enable_all')

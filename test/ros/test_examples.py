@@ -100,6 +100,10 @@ def stands(drive: Any, address: int | None = None) -> dict[str, Any]:
     )
 
 
+def _tells(fault: Any) -> Callable[[Any], bool]:
+    return lambda inv_st: inv_st.code == (fault.told or fault.code)
+
+
 def runs(drive: Any, frequency: float, address: int | None = None) -> None:
     """Wait until a motor follows a set-point, Hz."""
     drive.wait_for(
@@ -115,6 +119,7 @@ def ride(bench: Bench, *arguments: str) -> Process:
     return start(bench, 'ride', '--rate', '100', '--hold', '3600', *_PATIENT, *arguments)
 
 
+@needs('reverse')
 def test_a_ride_goes_up_and_down_and_stops(bench: Bench) -> None:
     drive = one(bench)
     process = ride(bench, '--frequency', '-20', '--hold', '1.5')
@@ -163,7 +168,7 @@ def test_a_fault_is_told_and_acknowledged_only_where_that_is_wanted(bench: Bench
     runs(drive, 20.0)
     drive.inject('fault', overload.code)
     assert process.wait() == 1, process.text
-    shown = bench.client().wait_for('inv_st', lambda inv_st: inv_st.code == overload.code, 'fault')
+    shown = bench.client().wait_for('inv_st', _tells(overload), 'fault')
     told = f'{overload}: {shown.description}. {shown.remedy}'
     assert shown.remedy and told in process.text
     assert '--acknowledge' in process.text

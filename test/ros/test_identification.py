@@ -27,7 +27,7 @@ from lifecycle_msgs.msg import Transition
 import pytest
 from ways import needs
 
-pytestmark = needs('identity')
+pytestmark = needs('identity', 'modbus')
 
 _QUICK = ('--set', 'control.accel=1', '--set', 'control.retard=1')
 _SERIAL = '0123456789ABCDEF'

@@ -28,6 +28,7 @@ from bench import wait_until
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
+from ways import needs
 import yaml
 
 _CONFIG = Path(__file__).parents[2] / 'config'
@@ -113,6 +114,7 @@ def test_start_pause_resume_reset_and_shutdown(bench: Bench) -> None:
     assert left.state() == right.state() == 'finalized'
 
 
+@needs('direct')
 def test_start_that_finds_a_drive_silent_fails_and_can_be_repeated(bench: Bench) -> None:
     simulator, manager, _ = start(bench)
     simulator.inject('silence', 3600.0, address=2)

@@ -151,7 +151,7 @@ def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(benc
     # so late that the first answer has not come when the driver begins to end
     for late in (0.0, 0.6):
         assert drive.state()['turning']
-        asked = len(bench.frames())
+        asked = _frames_of_before(bench)
         drive.inject('delay', 1, late)
         second = bench.driver('-p', 'response_timeout:=1.0')
         wait_until(lambda before=asked: len(bench.frames()) > before, 'the first request')
@@ -162,6 +162,18 @@ def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(benc
         assert status == 0, second.text
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         _run_by_another(bench)
+
+
+def _frames_of_before(bench: Bench) -> int:
+    """Return how many there are when what the driver that was killed has sent has arrived."""
+    counts: list[int] = []
+
+    def still() -> bool:
+        counts.append(len(bench.frames()))
+        return len(counts) > 5 and len(set(counts[-5:])) == 1
+
+    wait_until(still, 'the line is quiet', period=0.05)
+    return counts[-1]
 
 
 def _run_by_another(bench: Bench) -> None:

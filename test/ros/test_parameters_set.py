@@ -284,6 +284,7 @@ def test_several_with_one_that_cannot_be_are_none(
     assert rig.both() == before
 
 
+@needs('sio_tot')
 def test_drive_timeout_goes_with_parameters_of_the_drive(rig: Rig) -> None:
     result = rig.client.set_parameters(**{'control.accel': 6.0, 'drive_timeout': 12.5})
     assert result.successful, result.reason

@@ -108,6 +108,7 @@ def test_what_was_written_before_a_refusal_is_put_back(
     assert set_one(client, 'control.accel', 6.0).successful, 'the others can be set'
 
 
+@needs('sio_tot')
 def test_drive_timeout_that_is_refused_takes_the_parameters_back(
     stubborn: Stubborn, client: Client
 ) -> None:

@@ -41,6 +41,7 @@ WITHOUT = {
     'fast': 'this dialect knows no more than 9600 bit/s',
     'parameters': 'this model has not the settings that it names',
     'timeout': 'this model has no time-out of its own',
+    'sio_tot': 'its time-out is no setting of the drive',
     'bare': 'this model has drive parameters',
     'states': 'there is no state machine that the words of the test are about',
     'scmd': 'it is about the run commands of a G2',
@@ -56,6 +57,7 @@ WITHOUT = {
     'watched': 'its telegram tells its state to who commands it alone',
     'keypad': 'no manual tells how STW1 has control again after STOP at the keypad of this drive',
     'reverse': 'this model turns one way by its telegram',
+    'run_input': 'no manual tells whether its terminal counts beside the enable of the bus',
     'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
 }
 
@@ -160,15 +162,17 @@ class Way:
 #: Of any firmware, and of the usual one.
 _OLD_G2 = frozenset((
     'characters', 'local', 'delay', 'direct', 'format', 'keypad', 'nominal', 'parameters',
-    'reverse', 'timeout', 'watched',
+    'reverse', 'run_input', 'sio_tot', 'timeout', 'watched',
 ))
 _G2 = _OLD_G2 | {'fast', 'later', 'newer', 'scmd', 'states'}
 _OPTIMAL = frozenset((
     'bare', 'characters', 'delay', 'direct', 'fast', 'fine', 'format', 'keypad', 'later', 'local',
-    'modbus', 'newer', 'nominal', 'reverse', 'watched',
+    'modbus', 'newer', 'nominal', 'reverse', 'run_input', 'watched',
 ))
 _MODBUS = frozenset(('fine', 'identity', 'modbus'))
-_ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {'characters', 'fast', 'format', 'local'}
+_ON_CANOPEN = (_G2 | {'canopen', 'fine', 'identity'}) - {
+    'characters', 'fast', 'format', 'local', 'sio_tot'
+}
 _CLASSIC = frozenset(('classic', 'serial'))
 _RTU = frozenset(('eight', 'serial'))
 _ASCII = frozenset(('seven', 'serial'))
