@@ -319,16 +319,18 @@ class MonitorApp(App[None]):
         line.update('' if drive.line is None else Text(f'line: {_told(drive.line)}', 'dim'))
         # what the text leaves, the line of figures in two rows
         free = self.query_one('#full').content_size.height - len(text) - 2
-        plots.update(Text('\n').join(self._plots(drive, free // (_PLOT_HEIGHT + 1))))
+        plots.update(Text('\n').join(self._plots(drive, free)))
 
-    def _plots(self, drive: DriveView, room: int) -> list[Text]:
+    def _plots(self, drive: DriveView, rows: int) -> list[Text]:
         """Return the plot that was chosen, and the next ones where there is room for them."""
+        height = max(1, min(_PLOT_HEIGHT, rows - 1))
+        room = max(1, rows // (height + 1))
         names = list(_QUANTITIES)
         chosen = names.index(self._quantity)
-        drawn = (self._plot(drive, name) for name in (*names[chosen:], *names[:chosen]))
-        return list(itertools.chain.from_iterable([one for one in drawn if one][: max(1, room)]))
+        drawn = (self._plot(drive, name, height) for name in (*names[chosen:], *names[:chosen]))
+        return list(itertools.chain.from_iterable([one for one in drawn if one][:room]))
 
-    def _plot(self, drive: DriveView, quantity: str) -> list[Text]:
+    def _plot(self, drive: DriveView, quantity: str, height: int) -> list[Text]:
         name, unit, decimals, least = _QUANTITIES[quantity]
         width = self.query_one('#full').content_size.width - 10
         values = [getattr(measured, quantity) for measured in self._history[drive.name]]
@@ -336,8 +338,8 @@ class MonitorApp(App[None]):
         if width < 10 or all(math.isnan(value) for value in values):
             return []
         low, high = axis = span(values, least)
-        lines = plot(values, width, _PLOT_HEIGHT, axis)
-        labels = [_number(high, decimals), *[''] * (_PLOT_HEIGHT - 2), _number(low, decimals)]
+        lines = plot(values, width, height, axis)
+        labels = [_number(high, decimals), *[''] * (height - 2), _number(low, decimals)][:height]
         shown = [
             Text.assemble((f'{label:>8} ', 'dim'), (line, 'cyan'))
             for label, line in zip(labels, lines, strict=True)

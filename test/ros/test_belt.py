@@ -42,7 +42,7 @@ def test_a_belt_is_commanded_and_told_in_its_own_unit(bench: Bench, sign: int) -
             'it is told',
         )
     assert status.unit == 'm/s'
-    assert status.setpoint == pytest.approx(-0.4)
+    assert status.setpoint == pytest.approx(-0.4, abs=0.001)
     assert status.reverse == (sign > 0), 'what the motor does is told as it is'
     assert abs(client.messages['actual_frequency'][-1].data) == pytest.approx(20.0, abs=0.5)
 
@@ -58,7 +58,7 @@ def test_the_limit_is_in_the_unit_of_the_drive(bench: Bench) -> None:
         status = wait_until(
             lambda: (one := client.messages['status'][-1]).setpoint_clamped and one, 'it is told'
         )
-        assert status.setpoint == pytest.approx(0.3)
+        assert status.setpoint == pytest.approx(0.3, abs=0.001)
     assert simulator.state()['frequency'] < 15.2
 
 

@@ -307,7 +307,8 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
     with client.setpoints(30.0):
         assert client.enable().success
         status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
-        assert status.setpoint == 10.0
+        # a telegram counts in steps
+        assert status.setpoint == pytest.approx(10.0, abs=0.01)
     if not bench.way.tells or bench.way.method == 'telegram1':
         # nothing is set at the drive
         return
