@@ -94,6 +94,8 @@ _TRIGGER = 'std_srvs/srv/Trigger'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
 #: What the log has said before somebody listened, a little of it.
 _ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: What lines about new entries of the error log begin with.
+_ERROR_LOG = 'error log: '
 #: For how long a line of the log waits for its node to be found, s.
 _WAITS_FOR_NODE = 15.0
 
@@ -299,7 +301,7 @@ class GraphSource:
             teller.statistics, teller.heard_at = message, now
         elif isinstance(message, ErrorLogEntry):
             stamp = message.stamp.sec + message.stamp.nanosec / 1e9
-            text = f'error log: {message.code} {message.text}'
+            text = f'{_ERROR_LOG}{message.code} {message.text}'
             if not math.isnan(message.operating_time):
                 text += f', at {message.operating_time:.1f} h of operation'
             self._note(Level.WARNING, teller.name, text, stamp or time.time())
@@ -310,6 +312,9 @@ class GraphSource:
         waiting = []
         for came_at, line in self._said:
             name = names.get(line.name)
+            if name is not None and line.msg.startswith(_ERROR_LOG):
+                # its topic has told it
+                continue
             if name is not None:
                 at = line.stamp.sec + line.stamp.nanosec / 1e9
                 self._note(_LEVELS[line.level], name, line.msg, at)

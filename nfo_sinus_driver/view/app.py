@@ -263,7 +263,7 @@ class MonitorApp(App[None]):
         self._show_drive()
         log = self.query_one('#log', RichLog)
         for note in picture.notes:
-            log.write(_line_of(note))
+            log.write(_line_of(note), expand=True)
 
     def _head(self, picture: Picture) -> Text:
         head = Text(f'{self._source.title}: ')

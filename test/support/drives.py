@@ -227,9 +227,11 @@ class BehindPlc(Drives):
     Those that a PLC commands for the driver, by STW1 of telegram 1.
 
     :ivar run: the bits of STW1 that are there for no other reason than a run command.
+    :ivar control: the bit by which the PLC has control, or one that always comes with it.
     """
 
     run: int = 0
+    control: int = 1 << 10
 
     def ramps(self, up: float, down: float | None = None) -> tuple[str, ...]:
         return super().ramps(up, down) if self.up else ()
@@ -238,7 +240,7 @@ class BehindPlc(Drives):
         return bool(state['plc']['stw1'] & self.run)
 
     def taken(self, state: State) -> bool:
-        return bool(state['plc']['stw1'] & 1 << 10)
+        return bool(state['plc']['stw1'] & self.control)
 
     def left(self, state: State) -> bool:
         # what is left is that the PLC commands it
@@ -306,7 +308,7 @@ DRIVES = {
         coasts=False,
     ),
     'sinus_optimal telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0, coasts=False),
-    'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x2009, nominal=150.0),
+    'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x2009, control=1 << 14, nominal=150.0),
     # its ramps are set at its keypad alone
     'sinus_h': BehindPlc(
         **{

@@ -35,6 +35,7 @@ from telegram_rig import MODELS
 from telegram_rig import TelegramRig
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
@@ -192,6 +193,22 @@ def test_a_line_that_is_dead_for_long(make: Make, model: str) -> None:
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.stays()
     rig.ride(10.0)
+
+
+def test_a_direction_that_is_told_is_the_one_in_which_it_turns(make: Make, model: str) -> None:
+    rig = make()
+    rig.connect()
+    rig.enable()
+    for wanted in (15.0, -15.0):
+        if rig.drive.model.profile.setpoints['Freque'].forward_only and wanted < 0:
+            continue
+        rig.send(wanted)
+        wait_until(lambda wanted=wanted: abs(rig.far.motor.frequency - wanted) < 0.5)
+        wait_until(lambda wanted=wanted: abs(rig.drive.snapshot.frequency - wanted) < 0.5)
+        status = rig.drive.snapshot.status
+        assert status is not None
+        if Fact.REVERSE in status.valid:
+            assert (Fact.REVERSE in status.facts) == (wanted < 0)
 
 
 def test_a_stop_is_confirmed_by_the_first_status_after_it(make: Make, model: str) -> None:

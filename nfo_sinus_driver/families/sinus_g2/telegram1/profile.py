@@ -26,6 +26,7 @@ from __future__ import annotations
 from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.families._telegram1 import method
@@ -81,7 +82,9 @@ PROFILE = Profile(
     title='NFO Sinus G2',
     status_word=Words(
         state=lambda word: state_of(word & 0xFFFF),
-        by_bit=STATUS_WORD.by_bit,
+        # by the sign of the set-point it reverses under the forward run command, so that the bit
+        # of the reverse one tells no direction
+        by_bit={bit: fact & ~Fact.REVERSE for bit, fact in STATUS_WORD.by_bit.items()},
         by_state=STATUS_WORD.by_state,
         code=lambda word: method.code_of(word, state_of(word & 0xFFFF), fault=Status.FAULTED),
     ),
