@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import fields
+from dataclasses import replace
 import itertools
 import queue
 import sys
@@ -82,8 +83,11 @@ class LineSource:
         self._period: float = options.period
         self._session = session
         self._drives = drives
+        #: What was read of each drive, and when (s of ``time.monotonic``).
         self._views = {
-            drive.address: DriveView(_name(drive), Condition.SILENT, 'being asked')
+            drive.address: (
+                DriveView(_name(drive), Condition.SILENT, 'being asked'), time.monotonic()
+            )
             for drive in drives
         }
         self._line: LineView | None = None
@@ -105,7 +109,9 @@ class LineSource:
         notes = []
         while not self._notes.empty():
             notes.append(self._notes.get())
-        return Picture(list(self._views.values()), [self._line] if self._line else [], notes)
+        now = time.monotonic()
+        views = [replace(view, age=now - at) for view, at in self._views.values()]
+        return Picture(views, [self._line] if self._line else [], notes)
 
     def stop(self, name: str) -> None:
         """Nothing: it only looks."""
@@ -116,12 +122,22 @@ class LineSource:
     # --- on the thread that reads -------------------------------------------------------------
 
     def _work(self) -> None:
+        try:
+            self._read_all()
+        except Exception as error:
+            # what stands there would be taken for what is so
+            for drive in self._drives:
+                self._tell(drive, Level.ERROR, f'error in the view, nothing is read: {error!r}')
+                lost = DriveView(_name(drive), Condition.SILENT, 'not read any more')
+                self._views[drive.address] = lost, time.monotonic()
+
+    def _read_all(self) -> None:
         started = time.monotonic()
         for turn in itertools.count(1):
             for drive in self._drives:
                 if self._closing.is_set():
                     return
-                self._views[drive.address] = self._read(drive)
+                self._views[drive.address] = self._read(drive), time.monotonic()
             self._line = _line_view('line', self._session.statistics())
             self._closing.wait(max(0.0, started + turn * self._period - time.monotonic()))
             # a line that is slower than that is read without a pause, and catches up with nothing
@@ -141,10 +157,11 @@ class LineSource:
         level = Level.WARNING if grave else Level.INFO
         self._tell(drive, level, described)
         named = {name: values[role] for role, (name, _, _) in VALUES.items()}
-        runs = Condition.RUNS if seen.state in _RUNS else Condition.STANDS
+        runs = seen.runs or seen.tuning or seen.state in _RUNS or abs(named['frequency']) > 0
+        usual = Condition.RUNS if runs else Condition.STANDS
         return DriveView(
             _name(drive),
-            _CONDITIONS.get(seen.kind, runs),
+            _CONDITIONS.get(seen.kind, usual),
             described,
             seen.listed.description if grave else '',
             seen.listed.remedy,

@@ -57,9 +57,10 @@ def monitor(options: argparse.Namespace) -> int:
     if options.ros:
         if importlib.util.find_spec('rclpy') is None:
             raise UsageError('--ros needs ROS 2: source /opt/ros/jazzy/setup.bash first')
+        if options.json or options.lines or options.count or options.addresses:
+            raise UsageError('--ros shows the drives of running drivers, with no other option')
         os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
-    on_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    if on_terminal and not (options.json or options.lines or options.count):
+    if terminal.is_terminal() and not (options.json or options.lines or options.count):
         why_not = terminal.why_not()
         if not why_not:
             return live(options)

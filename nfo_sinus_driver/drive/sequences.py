@@ -250,6 +250,7 @@ class StopSequence:
 
     async def _try_once(self) -> _Outcome:
         control_mode = self._inverter.control_mode
+        reasons = self._reasons
         refusal: Refused | None = None
         try:
             await self._method.stop(control_mode)
@@ -266,7 +267,7 @@ class StopSequence:
             raise
         seen = await self._inverter.look(Priority.STOP, once=True)
         if refusal is None:
-            seen = await self._newer(seen)
+            seen = await self._newer(seen, reasons)
         if refusal and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
@@ -278,11 +279,15 @@ class StopSequence:
         self._unconfirmed = unconfirmed
         return _Outcome.UNCONFIRMED
 
-    async def _newer(self, seen: InverterStatus) -> InverterStatus:
-        """Look until a status is from after the stop: a PLC shows for a while what was before."""
-        told, reasons = time.monotonic(), self._reasons
-        while seen.at <= self._told_at and self._reasons == reasons:
-            if time.monotonic() > told + _RETRY_PERIOD:
+    async def _newer(self, seen: InverterStatus, reasons: int) -> InverterStatus:
+        """
+        Look until a status is from after the stop: a PLC shows for a while what was before.
+
+        :param reasons: those that the stop was for; with a new one it has to be written again.
+        """
+        until = time.monotonic() + _RETRY_PERIOD
+        while self._reasons == reasons and seen.at <= self._told_at:
+            if time.monotonic() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
             seen = await self._inverter.look(Priority.STOP, once=True)

@@ -72,8 +72,12 @@ from nfo_sinus_driver.view.picture import Picture
 _DISCOVERY_PERIOD = 1.0
 #: A driver tells of every drive at least once a second: after so long without it has ended, s.
 _GONE_AFTER = 3.5
+#: The slowest `telemetry_rate` that is taken for one, s.
+_LONGEST_TELEMETRY = 30.0
 #: After so long without an answer a stop is said not to be confirmed, s.
 _ANSWER_TIME = 5.0
+#: Before that nobody misses one, s.
+_SOON = 1.0
 
 _LEVELS = {
     Log.INFO: Level.INFO,
@@ -81,6 +85,7 @@ _LEVELS = {
     Log.ERROR: Level.ERROR,
     Log.FATAL: Level.ERROR,
 }
+_RUNS = (DriveStatus.OPERATION_ENABLED, DriveStatus.STOPPING, DriveStatus.QUICK_STOP)
 _QOS = {
     DriveStatus: RELIABLE,
     InvSt: LATCHED,
@@ -91,6 +96,7 @@ _QOS = {
 _TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
 #: Of a publisher it can be known before, or after, which node it belongs to.
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
 #: What the log has said before somebody listened, a little of it.
 _ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -105,15 +111,21 @@ class _Topics:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: dict[tuple[type, str], Subscription] = {}
 
     def add(self, type_: type, topic: str, qos: QoSProfile) -> None:
-        """Listen to a topic from now on."""
-        self._subscriptions.append(self._node.create_subscription(type_, topic, _nothing, qos))
+        """Listen to a topic from now on, whatever it has been remapped to."""
+        if (type_, topic) not in self._subscriptions:
+            subscription = self._node.create_subscription(type_, topic, _nothing, qos)
+            self._subscriptions[type_, topic] = subscription
+
+    def has(self, type_: type) -> bool:
+        """Tell whether there is a topic of a type."""
+        return any(known is type_ for known, _ in self._subscriptions)
 
     def take(self) -> Iterator[Any]:
         """Return what has come since, oldest of each topic first."""
-        for subscription in self._subscriptions:
+        for subscription in self._subscriptions.values():
             while True:
                 with subscription.handle:
                     taken = subscription.handle.take_message(subscription.msg_type, False)
@@ -132,7 +144,6 @@ class _Teller:
 
     name: str
     topics: _Topics
-    is_drive: bool
     heard_at: float
     #: The service by which it, or all that it has, is stopped; None: it offers none yet.
     stop: Client | None = None
@@ -140,7 +151,19 @@ class _Teller:
     inv_st: InvSt = field(default_factory=InvSt)
     telemetry: Telemetry | None = None
     telemetry_at: float = -math.inf
+    #: How long the one before it was ago then, s.
+    telemetry_gap: float = 0.0
     statistics: BusStatistics | None = None
+
+    @property
+    def is_drive(self) -> bool:
+        """It is the node of a drive, and not that of a line."""
+        return self.topics.has(DriveStatus)
+
+    @property
+    def is_line(self) -> bool:
+        """It is the node of a line."""
+        return self.topics.has(BusStatistics) and not self.is_drive
 
 
 @dataclass
@@ -181,6 +204,8 @@ class GraphSource:
         self._rosout.add(Log, '/rosout', _ROSOUT)
         self._said: list[tuple[float, Log]] = []
         self._calls: list[_Call] = []
+        #: Why the last stop of a node is not confirmed, by its name.
+        self._failed: dict[str, str] = {}
         self._notes: list[Note] = []
         self._looked_around_at = -math.inf
         self.title = f'ROS domain {context.get_domain_id()}'
@@ -222,9 +247,10 @@ class GraphSource:
             [
                 _line_view(teller.name, teller.statistics)
                 for teller in tellers
-                if not teller.is_drive and teller.statistics and not _is_gone(teller, now)
+                if teller.is_line and teller.statistics and not _is_gone(teller, now)
             ],
-            sorted(notes, key=lambda note: note.at),
+            sorted(notes, key=lambda note: -math.inf if math.isnan(note.at) else note.at),
+            self.stops(now),
         )
 
     def stop(self, name: str) -> None:
@@ -232,27 +258,39 @@ class GraphSource:
         self._call(self._tellers[name])
 
     def stop_all(self) -> None:
-        """Call ``~/stop_all`` of every line, and ``~/stop`` of drives that no line answers for."""
-        now = time.monotonic()
-        present = [teller for teller in self._tellers.values() if not _is_gone(teller, now)]
-        lines = [teller for teller in present if not teller.is_drive]
-        for teller in lines or present:
+        """Call ``~/stop_all`` of every line, and ``~/stop`` of every drive, whoever tells of it."""
+        # the lines first: they know in which order
+        known = [teller for teller in self._tellers.values() if teller.is_drive or teller.is_line]
+        for teller in sorted(known, key=lambda teller: teller.is_drive):
             self._call(teller)
-        if not present:
+        if not known:
             self._note(Level.ERROR, '', 'there is nobody to be stopped')
+
+    def stops(self, now: float) -> list[str]:
+        """Return what is to be known of stops that are not confirmed, failures first."""
+        waiting = [
+            f'{call.service} called {now - call.asked_at:.0f} s ago, not answered yet'
+            for call in self._calls
+            if now - call.asked_at > _SOON
+        ]
+        return [f'{who}: {why}' for who, why in self._failed.items()] + waiting
 
     # --- what comes in ------------------------------------------------------------------------
 
     def _look_around(self, now: float) -> None:
         for topic, types in self._node.get_topic_names_and_types():
-            if not any(type_ in _TYPES for type_ in types):
+            type_ = next((_TYPES[one] for one in types if one in _TYPES), None)
+            if type_ is None:
                 continue
             for publisher in self._node.get_publishers_info_by_topic(topic):
-                space = publisher.node_namespace
-                name = f'{space.rstrip("/")}/{publisher.node_name}'
-                if name not in self._tellers and self._wanted(name):
-                    with contextlib.suppress(_NOT_KNOWN_YET):
-                        self._meet(name, publisher.node_name, space, now)
+                name = f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
+                if publisher.node_name == _UNKNOWN or not self._wanted(name):
+                    continue
+                # a node that is just being made shows one topic after the other
+                teller = self._tellers.get(name) or self._tellers.setdefault(
+                    name, _Teller(name, _Topics(self._node), now)
+                )
+                teller.topics.add(type_, topic, _QOS[type_])
         for teller in self._tellers.values():
             if teller.stop is None:
                 with contextlib.suppress(_NOT_KNOWN_YET):
@@ -262,24 +300,6 @@ class GraphSource:
         return not self._spaces or any(
             name == space or name.startswith(f'{space.rstrip("/")}/') for space in self._spaces
         )
-
-    def _meet(self, full_name: str, name: str, space: str, now: float) -> None:
-        # by its types: whatever the topics have been remapped to
-        found = [
-            (_TYPES[type_], topic)
-            for topic, types in self._node.get_publisher_names_and_types_by_node(name, space)
-            for type_ in types
-            if type_ in _TYPES
-        ]
-        types = {type_ for type_, _ in found}
-        if not types & {DriveStatus, BusStatistics}:
-            # not all of it is known yet
-            return
-        is_drive = DriveStatus in types
-        topics = _Topics(self._node)
-        for type_, topic in found:
-            topics.add(type_, topic, _QOS[type_])
-        self._tellers[full_name] = _Teller(full_name, topics, is_drive, now)
 
     def _find_stop(self, teller: _Teller) -> None:
         space, _, name = teller.name.rpartition('/')
@@ -291,11 +311,15 @@ class GraphSource:
                 return
 
     def _hear(self, teller: _Teller, message: object, now: float) -> None:
+        if _is_gone(teller, now):
+            # it is another driver that has come: what the one before said is over
+            teller.status, teller.telemetry, teller.statistics = DriveStatus(), None, None
         if isinstance(message, DriveStatus):
             teller.status, teller.heard_at = message, now
         elif isinstance(message, InvSt):
             teller.inv_st = message
         elif isinstance(message, Telemetry):
+            teller.telemetry_gap = min(now - teller.telemetry_at, _LONGEST_TELEMETRY)
             teller.telemetry, teller.telemetry_at = message, now
         elif isinstance(message, BusStatistics):
             teller.statistics, teller.heard_at = message, now
@@ -304,7 +328,7 @@ class GraphSource:
             text = f'{_ERROR_LOG}{message.code} {message.text}'
             if not math.isnan(message.operating_time):
                 text += f', at {message.operating_time:.1f} h of operation'
-            self._note(Level.WARNING, teller.name, text, stamp or time.time())
+            self._note(Level.WARNING, teller.name, text, stamp or math.nan)
 
     def _read_log(self, now: float) -> None:
         self._said += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
@@ -327,21 +351,21 @@ class GraphSource:
     def _call(self, teller: _Teller) -> None:
         client = teller.stop
         if client is None or not client.service_is_ready():
-            text = 'NOT stopped: it offers no service for it (any more); has its driver ended?'
-            self._note(Level.ERROR, teller.name, text)
+            self._fail(teller.name, 'NOT stopped: it offers no such service. Has its driver ended?')
             return
-        service = client.srv_name
         future = client.call_async(Trigger.Request())
-        self._calls.append(_Call(teller.name, service, future, time.monotonic()))
-        self._note(Level.INFO, teller.name, f'{service} called')
+        self._calls.append(_Call(teller.name, client.srv_name, future, time.monotonic()))
 
     def _look_after_calls(self, now: float) -> None:
         waiting = []
         for call in self._calls:
             if call.future.done():
                 answer = call.future.result()
-                level = Level.INFO if answer.success else Level.ERROR
-                self._note(level, call.who, f'{call.service}: {answer.message}')
+                if answer.success:
+                    self._failed.pop(call.who, None)
+                    self._note(Level.INFO, call.who, f'{call.service}: {answer.message}')
+                else:
+                    self._fail(call.who, f'{call.service}: {answer.message}')
                 continue
             if not call.told_late and now - call.asked_at > _ANSWER_TIME:
                 call.told_late = True
@@ -349,9 +373,13 @@ class GraphSource:
                     f'{call.service} has not answered for {_ANSWER_TIME:.0f} s: the stop is NOT '
                     'confirmed. Stop the motor by other means'
                 )
-                self._note(Level.ERROR, call.who, text)
+                self._fail(call.who, text)
             waiting.append(call)
         self._calls = waiting
+
+    def _fail(self, who: str, why: str) -> None:
+        self._failed[who] = why
+        self._note(Level.ERROR, who, why)
 
     def _note(self, level: Level, who: str, text: str, at: float | None = None) -> None:
         self._notes.append(Note(time.time() if at is None else at, level, who, text))
@@ -370,13 +398,14 @@ def _drive_view(teller: _Teller, now: float) -> DriveView:
     if condition is Condition.SILENT:
         return DriveView(teller.name, condition, 'not connected', line=statistics)
     measured = Measured()
-    if teller.telemetry is not None and now - teller.telemetry_at <= _GONE_AFTER:
+    fresh = max(_GONE_AFTER, 2 * teller.telemetry_gap)
+    if teller.telemetry is not None and now - teller.telemetry_at <= fresh:
         values = {one.name: getattr(teller.telemetry, one.name) for one in fields(Measured)}
         measured = Measured(**values)
     return DriveView(
         teller.name,
         condition,
-        f'{inv_st.code} {inv_st.text}',
+        f'{inv_st.code} {inv_st.text}' if inv_st.text else 'connected',
         # what is well needs no explanation
         inv_st.description if inv_st.kind != InvSt.STATUS else '',
         inv_st.remedy,
@@ -401,8 +430,10 @@ def _condition(teller: _Teller, now: float) -> Condition:
         return Condition.FAULT
     if status.alarm or inv_st.kind == InvSt.ALARM:
         return Condition.ALARM
-    runs = (DriveStatus.OPERATION_ENABLED, DriveStatus.STOPPING, DriveStatus.QUICK_STOP)
-    return Condition.RUNS if status.state in runs else Condition.STANDS
+    # without a status word there is no state, but what it comes to
+    turns = teller.telemetry is not None and abs(teller.telemetry.frequency) > 0
+    runs = status.operation_enabled or status.stopping or status.state in _RUNS or turns
+    return Condition.RUNS if runs else Condition.STANDS
 
 
 def _line_view(name: str, told: BusStatistics) -> LineView:
@@ -428,8 +459,12 @@ def main(args: list[str] | None = None) -> int:
     try:
         terminal.show(source)
     finally:
+        left = source.stops(time.monotonic())
         source.close()
         rclpy.try_shutdown()
+    for text in left:
+        # the view is gone, and its log with it
+        print(f'monitor: {text}', file=sys.stderr)
     return 0
 
 

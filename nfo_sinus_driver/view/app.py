@@ -61,6 +61,8 @@ _REMEMBERED = 600
 #: From this width on the drive in full stands beside the table.
 _WIDE = 120
 _PLOT_HEIGHT = 3
+#: What is older is shown as old, s.
+_FRESH = 4.0
 
 #: What stands before a status, so that nobody depends on colours, and its style.
 _MARKS = {
@@ -84,12 +86,28 @@ _QUANTITIES: dict[str, tuple[str, str, int, float]] = {
 
 
 def _number(value: float, decimals: int, unit: str = '') -> str:
-    text = '-' if math.isnan(value) else f'{value:.{decimals}f}'
+    # no minus before a zero
+    text = f'{round(value, decimals) + 0.0:.{decimals}f}' if math.isfinite(value) else '-'
     return f'{text} {unit}'.rstrip()
+
+
+#: Units in which a tenth is fine enough; of others, such as m/s, three digits are shown.
+_COARSE = ('Hz', 'rpm', '%', '')
+_MOST_DECIMALS = 4
+
+
+def _in_unit(value: float, unit: str, width: int = 1000) -> str:
+    """Return a value in a unit that may be a person's own, without it where it does not fit."""
+    decimals = 1
+    if unit not in _COARSE and math.isfinite(value) and value:
+        decimals = min(_MOST_DECIMALS, max(0, 2 - math.floor(math.log10(abs(value)))))
+    text = _number(value, decimals, unit)
+    return text if len(text) <= width else _number(value, decimals)
 
 
 def _status(drive: DriveView) -> Text:
     mark, style = _MARKS[drive.condition]
+    style = 'dim' if drive.age > _FRESH else style
     return Text(f'{mark} {drive.status}', style, no_wrap=True, overflow='ellipsis')
 
 
@@ -109,8 +127,8 @@ _Cell = Callable[[DriveView], 'str | Text']
 _Column = tuple[str, int, _Cell, bool]
 _COLUMNS: tuple[_Column, ...] = (
     ('status', 18, _status, False),
-    ('set', 10, lambda drive: _number(drive.setpoint, 1, drive.unit), True),
-    ('actual', 10, lambda drive: _number(drive.actual, 1, drive.unit), True),
+    ('set', 10, lambda drive: _in_unit(drive.setpoint, drive.unit, 10), True),
+    ('actual', 10, lambda drive: _in_unit(drive.actual, drive.unit, 10), True),
     ('rpm', 6, lambda drive: _number(drive.measured.speed, 0), True),
     ('A', 6, lambda drive: _number(drive.measured.output_current, 2), True),
 )
@@ -149,7 +167,8 @@ class MonitorApp(App[None]):
         border-top: none; border-left: solid $panel-lighten-2;
     }
     .low #head { max-height: 2; }
-    .low #log { height: 3; }
+    .low #log { height: 5; }
+    #stops { height: auto; max-height: 4; padding: 0 1; background: $error; color: $text; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding('s', 'stop', 'stop this drive'),
@@ -167,7 +186,7 @@ class MonitorApp(App[None]):
         self._history: dict[str, deque[Measured]] = {}
         self._looks = 0
         self._rows: list[str] = []
-        self._cells: dict[tuple[str, str], str | Text] = {}
+        self._cells: dict[tuple[str, str], tuple[str, str]] = {}
         self._quantity = next(iter(_QUANTITIES))
 
     def compose(self) -> ComposeResult:
@@ -179,6 +198,7 @@ class MonitorApp(App[None]):
                 yield Static(id='drive')
                 yield Static(id='plots')
                 yield Static(id='line')
+        yield Static(id='stops')
         yield RichLog(id='log', max_lines=500, min_width=20, wrap=True)
         yield Footer()
 
@@ -261,21 +281,25 @@ class MonitorApp(App[None]):
         self.query_one('#head', Static).update(self._head(picture))
         self._show_table(sorted(picture.drives, key=lambda drive: natural(drive.name)))
         self._show_drive()
+        stops = self.query_one('#stops', Static)
+        stops.display = bool(picture.stops)
+        stops.update(Text('\n'.join(picture.stops), 'bold'))
         log = self.query_one('#log', RichLog)
         for note in picture.notes:
             log.write(_line_of(note), expand=True)
 
     def _head(self, picture: Picture) -> Text:
-        head = Text(f'{self._source.title}: ')
         number = len(picture.drives)
-        head.append(f'{number or "no"} drive{"s" * (number != 1)}')
-        for condition, (mark, style) in reversed(_MARKS.items()):
+        head = Text(f'{number or "no"} drive{"s" * (number != 1)}')
+        # the worst first: what there is no room for is cut off
+        for condition, (mark, style) in _MARKS.items():
             count = sum(drive.condition is condition for drive in picture.drives)
             if count:
                 head.append(f'  {mark} {count} {condition.value}', style)
         if self._source.only_looks:
             head.append(f'  {self._source.only_looks}', 'dim')
-        for line in picture.lines:
+        head.append(f'  {self._source.title}', 'dim')
+        for line in sorted(picture.lines, key=lambda line: -(line.timeouts + line.damaged)):
             head.append(f'\n{line.name}: {_told(line)}', 'dim')
         return head
 
@@ -288,17 +312,20 @@ class MonitorApp(App[None]):
             table.clear()
             self._cells.clear()
             for name, short in short_names(names, _NAME_WIDTH).items():
-                table.add_row(short, *('' for _ in _COLUMNS), key=name)
+                table.add_row(Text(short), *('' for _ in _COLUMNS), key=name)
             self._rows = names
             if chosen is not None and chosen.name in names:
                 table.move_cursor(row=names.index(chosen.name))
         for drive in shown:
             for heading, width, cell, right in _COLUMNS:
-                text = cell(drive)
-                if right and isinstance(text, str):
-                    text = text.rjust(width)
-                if self._cells.get((drive.name, heading)) != text:
-                    self._cells[drive.name, heading] = text
+                # nothing that a drive or a person has named is markup
+                told = cell(drive)
+                text = told if isinstance(told, Text) else Text(told, no_wrap=True)
+                if right:
+                    text.align('right', width)
+                shown_text = text.plain, str(text.style)
+                if self._cells.get((drive.name, heading)) != shown_text:
+                    self._cells[drive.name, heading] = shown_text
                     table.update_cell(drive.name, heading, text)
 
     def _chosen(self) -> DriveView | None:
@@ -353,6 +380,8 @@ def _in_full(drive: DriveView, width: int) -> list[Text]:
     """Return who the drive is, how it is, why, what to do, and what is measured."""
     _, style = _MARKS[drive.condition]
     first = Text.assemble((drive.name, 'bold'), '  ', _status(drive))
+    if drive.age > _FRESH:
+        first.append(f'  as of {drive.age:.0f} s ago', 'yellow')
     if drive.enabled:
         first.append('  enabled', 'green')
     if drive.requires_ack:
@@ -365,8 +394,6 @@ def _in_full(drive: DriveView, width: int) -> list[Text]:
     measured = drive.measured
     frequency = measured.frequency if drive.unit != 'Hz' else math.nan
     cells = (
-        ('set ', drive.setpoint, 1, drive.unit),
-        ('actual ', drive.actual, 1, drive.unit),
         ('', frequency, 1, 'Hz'),
         ('', measured.speed, 0, 'rpm'),
         ('', measured.output_current, 2, 'A'),
@@ -377,10 +404,18 @@ def _in_full(drive: DriveView, width: int) -> list[Text]:
         ('motor ', measured.motor_temperature, 0, '%'),
     )
     told = [
-        f'{name}{_number(value, decimals, unit)}'.replace(' ', '\N{NO-BREAK SPACE}')
-        for name, value, decimals, unit in cells
-        if not math.isnan(value)
+        *(
+            f'{name} {_in_unit(value, drive.unit)}'
+            for name, value in (('set', drive.setpoint), ('actual', drive.actual))
+            if not math.isnan(value)
+        ),
+        *(
+            f'{name}{_number(value, decimals, unit)}'
+            for name, value, decimals, unit in cells
+            if not math.isnan(value)
+        ),
     ]
+    told = [cell.replace(' ', '\N{NO-BREAK SPACE}') for cell in told]
     # only where a value ends
     lines += map(Text, textwrap.wrap('  '.join(told), max(width, 20)))
     return lines
@@ -411,7 +446,15 @@ def _told(line: LineView) -> str:
     return ', '.join(parts)
 
 
+def _when(at: float) -> str:
+    if math.isnan(at):
+        return '--:--:--'
+    moment = datetime.fromtimestamp(at)
+    today = moment.date() == datetime.now().date()
+    return moment.strftime('%H:%M:%S' if today else '%Y-%m-%d %H:%M')
+
+
 def _line_of(note: Note) -> Text:
-    when = datetime.fromtimestamp(note.at).strftime('%H:%M:%S')
+    when = _when(note.at)
     style = _LEVELS[note.level]
     return Text.assemble((when, 'dim'), ' ', (note.who, 'bold'), ' ', (note.text, style))

@@ -110,7 +110,7 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Note:
-    """A line of the log: when (s of ``time.time``), who, what."""
+    """A line of the log: when (s of ``time.time``, NaN: nobody knows), who, what."""
 
     at: float
     level: Level
@@ -120,11 +120,17 @@ class Note:
 
 @dataclass(frozen=True)
 class Picture:
-    """All there is to show; ``notes`` only those that are new."""
+    """
+    All there is to show.
+
+    :ivar notes: only those that are new.
+    :ivar stops: what is to be known of stops that were asked for here and are not confirmed.
+    """
 
     drives: Sequence[DriveView]
     lines: Sequence[LineView]
     notes: Sequence[Note]
+    stops: Sequence[str] = ()
 
 
 class Source(Protocol):

@@ -22,10 +22,15 @@ import sys
 from nfo_sinus_driver.view.picture import Source
 
 
+def is_terminal() -> bool:
+    """Tell whether there is one; what draws the view writes to the standard error."""
+    return all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
+
+
 def why_not() -> str:
     """Return why the view cannot be shown here, and what to do; empty: it can."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return 'the view needs a terminal, at both its input and its output'
+    if not is_terminal():
+        return 'the view needs a terminal for its input, its output and its errors'
     encoding = (sys.stdout.encoding or '').lower()
     if encoding not in ('utf-8', 'utf8'):
         return f'the view needs a terminal with UTF-8, not {encoding}: export LC_ALL=C.UTF-8'

@@ -112,7 +112,7 @@ def test_every_drive_is_in_the_table_and_the_chosen_one_in_full(
 
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
         text = seen(app)
-        assert f'ROS domain 7: {count} drive' in text
+        assert f'{count} drive' in text and 'ROS domain 7' in text
         assert '/bus: 2 without answer, 25 % used, cycle 52 ms' in text
         assert '► 38 Bus Run' in text and '30.0 Hz' in text and '29.9 Hz' in text
         assert '881 rpm' in text and '1.87 A' in text and 'DC link' in text
@@ -189,7 +189,7 @@ def test_a_source_that_only_looks_has_no_keys_that_stop() -> None:
 
 def test_without_drives_it_says_what_to_do() -> None:
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
-        assert 'ROS domain 7: no drives' in seen(app) and 'start one' in seen(app)
+        assert 'no drives  ROS domain 7' in seen(app) and 'start one' in seen(app)
         # and no key makes it fall
         await pilot.press('s', 'n', 'p', 'down')
         await pilot.pause()
@@ -241,3 +241,62 @@ def test_names_are_shortened_where_that_tells_nothing() -> None:
     assert list(short_names(names, 16).values()) == ['infeed', '…too_long_for_it']
     assert short_names(['/conveyor/infeed'], 16) == {'/conveyor/infeed': '/conveyor/infeed'}
     assert short_names(['/a/x', '/b/x'], 16) == {'/a/x': '/a/x', '/b/x': '/b/x'}
+
+
+def test_a_unit_of_a_person_s_own_is_no_markup_and_small_values_are_seen() -> None:
+    belt = replace(_RUNS, unit='[m/s]', setpoint=0.0432, actual=-0.00001)
+
+    async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
+        text = seen(app)
+        assert 'set 0.0432 [m/s]' in text and 'actual 0.0000 [m/s]' in text
+        # without the unit where both have no room
+        assert ' 0.0432 ' in text
+
+    through(Hand(belt, replace(belt, name='/other', unit='[/]')), steps)
+
+
+def test_stops_that_are_not_confirmed_stay_in_sight() -> None:
+    source = Hand(*conveyor(8))
+    source.picture = replace(
+        source.picture,
+        notes=[Note(1.8e9, Level.INFO, '/drive', 'much ' * 40)] * 9,
+        stops=['/drive: NOT stopped: nobody answers'],
+    )
+
+    async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
+        assert '/drive: NOT stopped: nobody answers' in seen(app)
+        source.picture = replace(source.picture, stops=[])
+        app._look()
+        await pilot.pause()
+        assert 'NOT stopped' not in seen(app)
+
+    through(source, steps)
+
+
+def test_what_is_old_is_shown_as_old() -> None:
+    async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
+        assert 'as of 75 s ago' in seen(app)
+
+    through(Hand(replace(_RUNS, age=75.0)), steps)
+
+
+def test_the_worst_stands_first_in_a_narrow_head() -> None:
+    drives = conveyor(32)
+    drives[4] = replace(drives[4], condition=Condition.GONE)
+
+    async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
+        first = seen(app).splitlines()[0]
+        assert first.index('1 gone') < first.index('1 silent') < first.index('1 fault')
+
+    through(Hand(*drives), steps)
+
+
+def test_the_date_is_told_of_what_was_not_today() -> None:
+    source = Hand(_RUNS)
+    notes = [Note(1.0e9, Level.WARNING, '/drive', 'old'), Note(math.nan, Level.INFO, '/drive', 'x')]
+    source.picture = replace(source.picture, notes=notes)
+
+    async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
+        assert '2001-09-0' in seen(app) and '--:--:-- /drive x' in seen(app)
+
+    through(source, steps)
