@@ -174,9 +174,13 @@ def test_a_quick_stop_lets_go_where_there_is_one(rig: Rig, frequency: float) -> 
     with rig.client.run_at(frequency):
         answer = rig.client.call('quick_stop')
         assert answer.success
-        assert answer.message == rig.drives.quick_stopped()
         if rig.drives.coasts:
+            assert answer.message == rig.drives.quick_stopped()
             assert not rig.drive.state()['driven']
+        else:
+            # so short a ramp may be over by then
+            assert answer.message.startswith(('stopping: it ramps down', 'stopped'))
+            assert answer.message.endswith('(this drive has no quick stop)')
         rig.stays_still()
 
 
