@@ -21,6 +21,7 @@ from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterable
 from collections.abc import Sequence
+import contextlib
 from datetime import datetime
 import itertools
 import math
@@ -36,6 +37,7 @@ from textual.binding import Binding
 from textual.binding import BindingType
 from textual.containers import Container
 from textual.containers import Vertical
+from textual.css.query import NoMatches
 from textual.events import Resize
 from textual.widgets import DataTable
 from textual.widgets import Footer
@@ -222,11 +224,13 @@ class MonitorApp(App[None]):
         """Put the drive in full where there is room for it."""
         self.screen.set_class(event.size.width >= _WIDE, 'wide')
         self.screen.set_class(event.size.height < 30, 'low')
-        self._show_drive()
+        with contextlib.suppress(NoMatches):
+            self._show_drive()
 
     def on_data_table_row_highlighted(self) -> None:
         """Show the drive that was chosen."""
-        self._show_drive()
+        with contextlib.suppress(NoMatches):
+            self._show_drive()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Offer no stop where the source has none."""
@@ -268,9 +272,11 @@ class MonitorApp(App[None]):
         return self.query_one('#drives', DataTable)
 
     def _look(self) -> None:
-        if not self.query('#log'):
-            # it is being taken down
-            return
+        # while it is being taken down what it draws on goes part by part
+        with contextlib.suppress(NoMatches):
+            self._draw()
+
+    def _draw(self) -> None:
         self._picture = picture = self._source.look()
         for drive in picture.drives:
             past = self._history.setdefault(drive.name, deque(maxlen=_REMEMBERED))
