@@ -72,6 +72,8 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 PATIENCE = 90.0
 #: All settings of a drive are read before its node is active, of some over 9600 bit/s.
 _STARTING = 3 * PATIENCE
+#: After how long a question is asked anew, s.
+_ASK_ANEW = 10.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
 
@@ -434,6 +436,22 @@ class Client(contextlib.ExitStack):
         wait_until(future.done, f'{service} answers')
         return future.result()
 
+    def ask(self, service: str, type_: type, **fields: Any) -> Any:
+        """
+        Call a service that only tells something, anew if need be, and return its response.
+
+        Who has just come may be unknown to the other end yet, and then the middleware drops what
+        is answered to him.
+        """
+        futures = []
+
+        def answered() -> Any:
+            if not futures or time.monotonic() > futures[-1][0] + _ASK_ANEW:
+                futures.append((time.monotonic(), self.call_async(service, type_, **fields)))
+            return next((future for _, future in futures if future.done()), None)
+
+        return wait_until(answered, f'{service} answers').result()
+
     def enable(self, on: bool = True) -> Any:
         """Call ``~/enable``."""
         return self.call('enable', SetBool, data=on)
@@ -460,21 +478,21 @@ class Client(contextlib.ExitStack):
 
     def state(self) -> str:
         """Return the label of the lifecycle state."""
-        label: str = self.call('get_state', GetState).current_state.label
+        label: str = self.ask('get_state', GetState).current_state.label
         return label
 
     def parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
-        values = self.call('get_parameters', GetParameters, names=[name]).values
+        values = self.ask('get_parameters', GetParameters, names=[name]).values
         return parameter_value_to_python(values[0])
 
     def parameter_names(self) -> set[str]:
         """Return the names of all parameters."""
-        return set(self.call('list_parameters', ListParameters).result.names)
+        return set(self.ask('list_parameters', ListParameters).result.names)
 
     def descriptor(self, name: str) -> Any:
         """Return the descriptor of a parameter."""
-        return self.call('describe_parameters', DescribeParameters, names=[name]).descriptors[0]
+        return self.ask('describe_parameters', DescribeParameters, names=[name]).descriptors[0]
 
     def set_parameters(self, **values: Any) -> Any:
         """Set parameters atomically; return the result."""
