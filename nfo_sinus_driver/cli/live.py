@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import fields
 from dataclasses import replace
 import itertools
 import queue
@@ -26,7 +25,6 @@ import sys
 import threading
 import time
 
-from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.cli.console import say
@@ -44,6 +42,7 @@ from nfo_sinus_driver.view.picture import LineView
 from nfo_sinus_driver.view.picture import Measured
 from nfo_sinus_driver.view.picture import Note
 from nfo_sinus_driver.view.picture import Picture
+from nfo_sinus_driver.view.picture import line_view
 
 #: How long the present reading may take at the end, s.
 _LAST_READING = 2.0
@@ -138,7 +137,7 @@ class LineSource:
                 if self._closing.is_set():
                     return
                 self._views[drive.address] = self._read(drive), time.monotonic()
-            self._line = _line_view('line', self._session.statistics())
+            self._line = line_view('line', self._session.statistics())
             self._closing.wait(max(0.0, started + turn * self._period - time.monotonic()))
             # a line that is slower than that is read without a pause, and catches up with nothing
             started = max(started, time.monotonic() - turn * self._period)
@@ -169,7 +168,7 @@ class LineSource:
             unit='Hz',
             actual=named['frequency'],
             measured=Measured(**named),
-            line=_line_view(_name(drive), self._session.statistics(drive.address)),
+            line=line_view(_name(drive), self._session.statistics(drive.address)),
         )
 
     def _tell(self, drive: Remote, level: Level, text: str) -> None:
@@ -181,8 +180,3 @@ class LineSource:
 
 def _name(drive: Remote) -> str:
     return f'drive {drive.address}'
-
-
-def _line_view(name: str, figures: Statistics) -> LineView:
-    names = [one.name for one in fields(LineView) if one.name != 'name']
-    return LineView(name, **{one: getattr(figures, one) for one in names})

@@ -301,6 +301,9 @@ class StopSequence:
             return self._inverter.report(Cause.TUNING_ENERGISES)
         if refusal and not seen.local:
             return report_of(refusal)
+        if refusal is None and seen.at < self._told_at:
+            # a PLC whose data stand still goes on showing what was before
+            return _NO_ANSWER_YET
         keeps_running = seen.keeps_running_since(self._told_at)
         return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None
 

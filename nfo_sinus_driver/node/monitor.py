@@ -63,10 +63,10 @@ from nfo_sinus_driver.view import terminal
 from nfo_sinus_driver.view.picture import Condition
 from nfo_sinus_driver.view.picture import DriveView
 from nfo_sinus_driver.view.picture import Level
-from nfo_sinus_driver.view.picture import LineView
 from nfo_sinus_driver.view.picture import Measured
 from nfo_sinus_driver.view.picture import Note
 from nfo_sinus_driver.view.picture import Picture
+from nfo_sinus_driver.view.picture import line_view
 
 #: How often it is looked who is on the graph, s.
 _DISCOVERY_PERIOD = 1.0
@@ -245,7 +245,7 @@ class GraphSource:
         return Picture(
             [_drive_view(teller, now) for teller in tellers if teller.is_drive],
             [
-                _line_view(teller.name, teller.statistics)
+                line_view(teller.name, teller.statistics)
                 for teller in tellers
                 if teller.is_line and teller.statistics and not _is_gone(teller, now)
             ],
@@ -357,12 +357,14 @@ class GraphSource:
         self._calls.append(_Call(teller.name, client.srv_name, future, time.monotonic()))
 
     def _look_after_calls(self, now: float) -> None:
-        waiting = []
+        waiting: list[_Call] = []
         for call in self._calls:
             if call.future.done():
                 answer = call.future.result()
                 if answer.success:
+                    # what was asked before, and will perhaps never be answered, is settled by it
                     self._failed.pop(call.who, None)
+                    waiting = [one for one in waiting if one.who != call.who]
                     self._note(Level.INFO, call.who, f'{call.service}: {answer.message}')
                 else:
                     self._fail(call.who, f'{call.service}: {answer.message}')
@@ -394,7 +396,7 @@ def _drive_view(teller: _Teller, now: float) -> DriveView:
     condition = _condition(teller, now)
     if condition is Condition.GONE:
         return DriveView(teller.name, condition, 'its driver is gone', age=now - teller.heard_at)
-    statistics = teller.statistics and _line_view(teller.name, teller.statistics)
+    statistics = teller.statistics and line_view(teller.name, teller.statistics)
     if condition is Condition.SILENT:
         return DriveView(teller.name, condition, 'not connected', line=statistics)
     measured = Measured()
@@ -435,10 +437,6 @@ def _condition(teller: _Teller, now: float) -> Condition:
     runs = status.operation_enabled or status.stopping or status.state in _RUNS or turns
     return Condition.RUNS if runs else Condition.STANDS
 
-
-def _line_view(name: str, told: BusStatistics) -> LineView:
-    names = [one.name for one in fields(LineView) if one.name != 'name']
-    return LineView(name, **{one: getattr(told, one) for one in names})
 
 
 # --- the program ----------------------------------------------------------------------------------

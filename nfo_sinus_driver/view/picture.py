@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import fields
 from enum import Enum
 import math
 from typing import Protocol
@@ -70,6 +71,12 @@ class LineView:
     round_trip_median: float = NAN
     round_trip_p99: float = NAN
     round_trip_max: float = NAN
+
+
+def line_view(name: str, figures: object) -> LineView:
+    """Return what statistics tell, whose fields have the names of those of BusStatistics."""
+    names = [one.name for one in fields(LineView) if one.name != 'name']
+    return LineView(name, **{one: getattr(figures, one) for one in names})
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ def test_a_driver_that_is_gone_is_not_shown_as_if_it_were_there(bench: Bench) ->
     driver.signal(signal.SIGKILL)
     view.wait_for('· 1 gone', 'its driver is gone')
     view.press('sa')
-    # by a service that is there no more, or one that nobody answers any more
+    # by a service that is there no more, or by one without a response
     view.wait_for('/nfo_sinus: ', 'NOT')
     bench.driver()
     view.wait_for('■ 1 standing', gone=['gone'])
@@ -116,7 +116,21 @@ def test_a_driver_that_is_gone_is_not_shown_as_if_it_were_there(bench: Bench) ->
 def _stopped(view) -> bool:
     # what is known of the stops before is known until one is confirmed
     view.press('sa')
-    return 'NOT' not in view.text
+    return 'NOT' not in view.text and 'not answered' not in view.text
+
+
+@needs('watched')
+def test_stop_all_leaves_out_no_drive_whose_line_is_not_looked_at(bench: Bench) -> None:
+    simulator = start(bench)
+    client = bench.client('/conveyor/drive_2').connected()
+    # the line of another driver, which has no port
+    bench.bare_driver('-r', '__ns:=/other', '-p', f'port:={bench.folder / "nowhere"}')
+    view = bench.view('/conveyor/drive_2', '/other')
+    view.wait_for('1 standing', '/other/nfo_sinus_bus')
+    with client.run_at(20.0):
+        view.wait_for('► 1 running')
+        view.press('a')
+        wait_until(lambda: not simulator.state(1)['turning'], 'it stands')
 
 
 def test_before_there_is_a_driver_it_says_how_one_is_started(bench: Bench) -> None:

@@ -235,6 +235,21 @@ def test_a_stop_is_confirmed_by_the_first_status_after_it(make: Make, model: str
         wait_until(each_at_the_first_attempt)
 
 
+def test_what_a_plc_goes_on_showing_confirms_no_stop(make: Make, model: str) -> None:
+    rig = make()
+    rig.connect()
+    rig.ride()
+    rig.answer(rig.drive.stop())
+    rig.stands()
+    wait_until(lambda: not rig.drive.stop_unconfirmed)
+    # its registers are answered, and show a drive that stands
+    rig.simulator.inject('plc-stop', seconds=3600.0)
+    assert 'NOT confirmed' in rig.answer(rig.drive.stop())
+    assert rig.drive.stop_unconfirmed
+    rig.simulator.inject('plc-stop', seconds=0.0)
+    wait_until(lambda: not rig.drive.stop_unconfirmed)
+
+
 @ONE_MODEL
 def test_a_plc_that_answers_slowly(make: Make, model: str) -> None:
     rig = make(plc=PlcSetting(ros_time=10.0, drive_time=10.0, answer_time=(0.05, 0.4)))

@@ -269,11 +269,11 @@ def test_stops_that_are_not_confirmed_stay_in_sight() -> None:
     source.picture = replace(
         source.picture,
         notes=[Note(1.8e9, Level.INFO, '/drive', 'much ' * 40)] * 9,
-        stops=['/drive: NOT stopped: nobody answers'],
+        stops=['/drive: NOT stopped: no response'],
     )
 
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
-        await shown(app, pilot, '/drive: NOT stopped: nobody answers')
+        await shown(app, pilot, '/drive: NOT stopped: no response')
         source.picture = replace(source.picture, stops=[])
         app._look()
         await pilot.pause()
