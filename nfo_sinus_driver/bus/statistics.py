@@ -65,9 +65,9 @@ class Tally:
 
     def __init__(self, round_trips: int = _ROUND_TRIPS) -> None:
         self._counts = dict.fromkeys(('transactions', 'timeouts', 'damaged', 'refused'), 0)
-        self.retries = 0
+        self._retries = 0
         #: Every opening or connection but the first is a reconnect.
-        self.opened = 0
+        self._opened = 0
         #: How long the last round of polling took, s.
         self.cycle_time = math.nan
         self._round_trips: deque[float] = deque(maxlen=round_trips)
@@ -85,6 +85,18 @@ class Tally:
         self._counts['damaged'] += isinstance(error, DamagedAnswer)
         self._counts['refused'] += isinstance(error, Refused)
 
+    def opened(self) -> None:
+        """Count that the port was opened, or the unit connected to."""
+        self._opened += 1
+
+    def retry(self) -> None:
+        """Count a request that is sent again."""
+        self._retries += 1
+
+    def cycle(self, seconds: float) -> None:
+        """Record how long one round of polling took, s."""
+        self.cycle_time = seconds
+
     def statistics(self, cycle_time: float) -> Statistics:
         """Return the present figures."""
         start = time.monotonic() - _WINDOW
@@ -94,8 +106,8 @@ class Tally:
             utilisation=min(1.0, busy / _WINDOW),
             cycle_time=cycle_time,
             **self._counts,
-            retries=self.retries,
-            reconnects=max(0, self.opened - 1),
+            retries=self._retries,
+            reconnects=max(0, self._opened - 1),
             round_trip_min=_at(trips, 0.0),
             round_trip_mean=sum(trips) / len(trips) if trips else math.nan,
             round_trip_median=_at(trips, 0.5),
@@ -118,11 +130,11 @@ class Recorder:
 
     def opened(self) -> None:
         """Count that the port was opened."""
-        self._line.opened += 1
+        self._line.opened()
 
     def connected(self, unit: int) -> None:
         """Count that a unit was connected to."""
-        self._of(unit).opened += 1
+        self._of(unit).opened()
 
     def transaction(self, unit: int, now: float, seconds: float, error: LinkError | None) -> None:
         """Count a transaction that kept the line busy until ``now``, and how it ended."""
@@ -132,11 +144,11 @@ class Recorder:
     def retry(self, unit: int) -> None:
         """Count a request to a unit that is sent again."""
         for tally in (self._line, self._of(unit)):
-            tally.retries += 1
+            tally.retry()
 
     def cycle(self, unit: int, seconds: float) -> None:
         """Record how long one round of polling took for a unit; NaN: it is no longer polled."""
-        self._of(unit).cycle_time = seconds
+        self._of(unit).cycle(seconds)
 
     def statistics(self, unit: int | None = None) -> Statistics:
         """Return the present figures of the line, or of one unit on it."""

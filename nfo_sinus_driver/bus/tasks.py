@@ -178,9 +178,31 @@ class Task:
         # nobody may cancel the future behind the worker's back
         self.future.set_running_or_notify_cancel()
 
+    def cancel(self) -> None:
+        """End it where it awaits: at once, or where it does so next if it is being stepped."""
+        self.cancelled = True
+        self.cancel_due = self.running
+        if not self.running:
+            self.end_pause()
+
+    def take_cancellation(self) -> bool:
+        """Tell whether it has still to be told that it was cancelled, which is done with it."""
+        due, self.cancel_due = self.cancel_due, False
+        return due
+
+    def fall_asleep(self) -> None:
+        """Begin a pause."""
+        self.asleep = True
+
+    def end_pause(self) -> None:
+        """End its pause, if it is in one: no timer of it counts any more."""
+        self.asleep = False
+        self.pause += 1
+
     def step(self, value: Any, error: BaseException | None) -> Transfer | Pause | None:
         """Run it up to what it awaits next; ``None`` when it has ended."""
         self.running = True
+        self.awaited = None
         try:
             coroutine = self._coroutine
             awaited = coroutine.throw(error) if error is not None else coroutine.send(value)
@@ -190,6 +212,7 @@ class Task:
             self.future.set_exception(failure)
         else:
             assert isinstance(awaited, (Transfer, Pause))
+            self.awaited = awaited
             return awaited
         finally:
             self.running = False
@@ -212,7 +235,7 @@ class Sleepers:
 
     def add(self, task: Task, until: float) -> None:
         """Let a task sleep until a moment of the steady clock, s."""
-        task.asleep = True
+        task.fall_asleep()
         heapq.heappush(self._pauses, (until, next(self._order), task, task.pause))
 
     def take_due(self, now: float) -> Task | None:
@@ -244,3 +267,13 @@ class LatestValue:
     done: Callable[[Transfer, LinkError | None], None]
     told: Callable[[Reply], None] = lambda reply: None
     pending: bool = False
+
+    def ask(self) -> bool:
+        """Have it written; whether that is new."""
+        new, self.pending = not self.pending, True
+        return new
+
+    def take(self) -> Transfer | None:
+        """Take out what is to be written now; ``None`` if there is nothing any more."""
+        self.pending = False
+        return self.make()

@@ -99,7 +99,7 @@ class Bus:
         #: For coroutines on the worker to count in.
         self.recorder = Recorder()
         #: How many coroutines read parameters again and again; they share the time for it.
-        self.refreshing = 0
+        self._refreshing = 0
         #: The units whose settings are read for the first time, and those for which that was begun.
         self._being_introduced: set[int] = set()
         self._introduced: set[int] = set()
@@ -139,8 +139,7 @@ class Bus:
 
     def request(self, slot: LatestValue) -> None:
         """Ask for a slot to be written; asking again before it is written changes nothing."""
-        if not slot.pending:
-            slot.pending = True
+        if slot.ask():
             self._enter(slot)
 
     @property
@@ -270,19 +269,24 @@ class Bus:
         """End a task, if any: it sees :class:`Cancelled` where it stands; nothing more is sent."""
         if task is None or task.future.done() or task.cancelled:
             return
-        task.cancelled = True
-        if task.running:
-            task.cancel_due = True
-            return
-        self._scheduler.withdraw(task)
-        task.asleep = False
-        task.pause += 1
-        self._advance(task, None, Cancelled())
+        task.cancel()
+        if not task.running:
+            self._scheduler.withdraw(task)
+            self._advance(task, None, Cancelled())
 
     def wake(self, task: Task | None) -> None:
         """End the pause of a task early; harmless if it is not in one."""
         if task is not None and task.asleep:
             self._end_pause(task)
+
+    @contextlib.contextmanager
+    def refreshing(self) -> Iterator[Callable[[], int]]:
+        """Read parameters again and again; calls tell how many do, who share the time for it."""
+        self._refreshing += 1
+        try:
+            yield lambda: self._refreshing
+        finally:
+            self._refreshing -= 1
 
     @contextlib.contextmanager
     def introducing(self, unit: int) -> Iterator[None]:
@@ -382,8 +386,7 @@ class Bus:
             self._end_pause(task)
 
     def _end_pause(self, task: Task) -> None:
-        task.asleep = False
-        task.pause += 1
+        task.end_pause()
         self._advance(task, None, None)
 
     def _rest(self, until: float) -> None:
@@ -393,10 +396,9 @@ class Bus:
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
         """Step a task and file what it awaits next."""
         caller, self._current = self._current, task
-        awaited = task.awaited = task.step(value, error)
+        awaited = task.step(value, error)
         self._current = caller
-        if awaited is not None and (self._closed or task.cancel_due):
-            task.cancel_due = False
+        if awaited is not None and (task.take_cancellation() or self._closed):
             self._advance(task, None, Cancelled())
             return
         if awaited is None:
@@ -419,8 +421,7 @@ class Bus:
         return entry is not None
 
     def _write_slot(self, slot: LatestValue) -> None:
-        slot.pending = False
-        transfer = slot.make()
+        transfer = slot.take()
         if transfer is None:
             return
         try:
@@ -504,9 +505,8 @@ class Bus:
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
-        slot.pending = False
         try:
-            transfer = slot.make()
+            transfer = slot.take()
             if transfer is not None:
                 slot.done(transfer, error)
         except BaseException:

@@ -87,11 +87,11 @@ class CommunicationWatchdog:
         inverter = self._inverter
         if inverter.plc_time:
             raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=inverter.plc_time))
-        await inverter.watch(seconds)
+        await inverter.timeout.watch(seconds)
         key = inverter.model.key
         wanted: dict[str, Value] = {}
-        if not inverter.watched_by:
-            if not inverter.can_time_out:
+        if not inverter.timeout.watched_by:
+            if not inverter.timeout.can_be_set:
                 raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
             wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
         if inverter.has(key(Role.STOP_AT_TIMEOUT)):
@@ -119,26 +119,26 @@ class CommunicationWatchdog:
         """
         inverter = self._inverter
         await self._end_watch()
-        if not inverter.can_time_out:
+        if not inverter.timeout.can_be_set:
             return
         try:
             for key in reversed(self._found):
                 if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
                     await self._change({key: self._found[key]})
-            await inverter.read_timeout()
+            await inverter.timeout.read()
         except (LinkError, DriveError) as error:
             self._tell_left(explain_failure(error, inverter))
         else:
-            if inverter.sio_tot and inverter.auto_stop:
+            if inverter.timeout.seconds and inverter.timeout.stops_motor:
                 self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
 
     async def _end_watch(self) -> None:
         inverter = self._inverter
-        by, seconds = inverter.watched_by, inverter.watched_for
+        by, seconds = inverter.timeout.watched_by, inverter.timeout.watched_for
         if not by:
             return
         try:
-            await inverter.watch(0.0)
+            await inverter.timeout.watch(0.0)
         except LinkError as error:
             why = explain_failure(error, inverter)
             inverter.tell(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
@@ -150,7 +150,7 @@ class CommunicationWatchdog:
 
     def _tell_left(self, why: Report) -> None:
         key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
-        name, timeout = self._inverter.model[key].name, self._inverter.sio_tot
+        name, timeout = self._inverter.model[key].name, self._inverter.timeout.seconds
         self._inverter.tell(
             Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
         )
@@ -164,18 +164,18 @@ class CommunicationWatchdog:
 
     def _complaint(self) -> Report | None:
         inverter, model = self._inverter, self._inverter.model
-        timeout, margin = inverter.own_timeout, DRIVE_TIMEOUT_MARGIN
+        timeout, margin = inverter.timeout.shortest, DRIVE_TIMEOUT_MARGIN
         least = inverter.settings.lost_after + margin
         method = inverter.settings.method_class
         if method.plc_time:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
-        if not inverter.can_time_out and not inverter.watched_by:
+        if not inverter.timeout.can_be_set and not inverter.timeout.watched_by:
             return Report(Cause.NO_OWN_TIMEOUT)
-        name = inverter.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
+        name = inverter.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)
-        if not inverter.auto_stop:
+        if not inverter.timeout.stops_motor:
             stop = model[model.key(Role.STOP_AT_TIMEOUT)].name
             return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop)
         if timeout < least - 1e-9:

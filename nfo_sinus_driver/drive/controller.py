@@ -452,8 +452,8 @@ class Controller:
         try:
             await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
         except DriveError:
-            await self._inverter.read_timeout()
-            if not self._inverter.own_timeout or self.method.keeps_control:
+            await self._inverter.timeout.read()
+            if not self._inverter.timeout.shortest or self.method.keeps_control:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self.method.release()

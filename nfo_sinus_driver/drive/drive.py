@@ -129,10 +129,7 @@ class Drive:
 
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
-        for name in ('address', 'block_address', 'model', 'control_method', 'reference'):
-            if getattr(settings, name) != getattr(self.settings, name):
-                raise ValueError(f'{name} cannot change within a session: make another Drive')
-        self.inverter.settings = settings
+        self.inverter.use(settings)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -421,7 +418,7 @@ class Drive:
                 Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
             ) from error
         await inverter.read_control_mode()
-        await inverter.read_timeout()
+        await inverter.timeout.read()
         inverter.require_fresh(await inverter.look(Priority.SERVICE))
         if self._controller is not None:
             await self._controller.secure_found()
@@ -429,7 +426,7 @@ class Drive:
         identity = await inverter.introduce()
         self._watch.connected()
         self.setpoint.connected()
-        inverter.connected = inverter.answering = True
+        inverter.found()
         if self._controller is not None:
             self._controller.connected()
         name = '' if identity.model else inverter.model.name
@@ -446,7 +443,7 @@ class Drive:
         self._watchdog.warn_if_unfit()
 
     def _set_disconnected(self) -> None:
-        self.inverter.connected = False
+        self.inverter.lost()
         if self._controller is not None:
             self._controller.disconnected()
 
@@ -458,23 +455,16 @@ class Drive:
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""
-        values, key = self.parameters.values, self.model.key
-        timeout, stop = key(Role.COMMUNICATION_TIMEOUT), key(Role.STOP_AT_TIMEOUT)
-        if timeout in keys:
-            self.inverter.sio_tot = float(values[timeout])
-        if stop in keys:
-            self.inverter.auto_stop = bool(values.get(stop))
-        if timeout in keys:
+        if self.inverter.timeout.take(keys, self.parameters.values):
             # the drive may have to be kept alive more often from now on
             self._watch.wake()
-        if any(key(role) in keys for role in _MODE_ROLES):
+        if any(self.inverter.model.key(role) in keys for role in _MODE_ROLES):
             self._watch.read_mode_soon()
         self.inverter.listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:
-        self._watch.active = active
         self._bus.cancel(self._telemetry_task)
         if active:
             telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
             self._telemetry_task = self._bus.spawn(telemetry)
-            self._watch.wake()
+        self._watch.set_active(active)

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterator
+import contextlib
 from dataclasses import dataclass
 from dataclasses import replace
 from fractions import Fraction
@@ -36,6 +38,7 @@ from nfo_sinus_driver.catalog import OlderDialect
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
+from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
@@ -125,13 +128,15 @@ class DriveState:
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
         self.answering = False
         #: Called when a request to it failed, whoever asked.
-        self.on_missed: Callable[[], None] = lambda: None
+        self._on_missed: Callable[[], None] = lambda: None
         #: It did not answer just before it was last looked at.
         self.was_silent = False
+        #: How many requests nobody had answered when it was last looked at.
+        self._unanswered = 0
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
         #: Called when a fault comes that did not stand before.
-        self.on_fault: Callable[[], None] = lambda: None
+        self._on_fault: Callable[[], None] = lambda: None
         #: The status that first showed the fault that stands, and whether that was soon.
         self.fault: InverterStatus | None = None
         self.fault_is_fresh = False
@@ -145,14 +150,8 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
-        #: How long the drive may hear nothing of what lives on the line, s, and by what it notices;
-        #: 0: it does not.
-        self.watched_for = 0.0
-        self.watched_by = ''
-        #: SioTot, s; 0 turns the drive's own time-out off.
-        self.sio_tot = 0.0
-        #: AutoStop: without it the motor runs on when SioTot has passed [C91].
-        self.auto_stop = False
+        #: What it does by itself when it hears nothing.
+        self.timeout = CommunicationTimeout(self.registers, self.model, self.has)
 
     async def look(
         self,
@@ -328,12 +327,67 @@ class DriveState:
         elif self.fault is None or self.fault.code != seen.code:
             self.fault = seen
             self.fault_is_fresh = before is not None and seen.at - before.at < _SOON
-            self.on_fault()
+            self._on_fault()
 
     def missed(self) -> None:
         """Take note that a request failed; until it is known why, nobody should wait for it."""
         self.answering = False
-        self.on_missed()
+        self._on_missed()
+
+    def answered(self) -> None:
+        """Take note that a poll was answered."""
+        self.answering = True
+
+    def unanswered(self) -> None:
+        """Take note that a poll was not."""
+        self.answering = False
+
+    def found(self) -> None:
+        """Take note that it is connected."""
+        self.connected = self.answering = True
+
+    def lost(self) -> None:
+        """Take note that it is connected no more."""
+        self.connected = False
+
+    @property
+    def silent_since_look(self) -> bool:
+        """It has not answered something since it was last looked at."""
+        # one that is busy, or whose answer was damaged, was there
+        return self.registers.unanswered > self._unanswered
+
+    def looked_at(self) -> None:
+        """Take note of whether it did not answer just before it was looked at now."""
+        self.was_silent = self.silent_since_look
+        self._unanswered = self.registers.unanswered
+
+    def on_missed(self, call: Callable[[], None]) -> None:
+        """Have something called when a request to it failed, whoever asked."""
+        self._on_missed = call
+
+    def on_fault(self, call: Callable[[], None] | None) -> None:
+        """Have something called when a fault comes that did not stand before; or nothing."""
+        self._on_fault = call or (lambda: None)
+
+    def use(self, settings: DriveSettings) -> None:
+        """
+        Treat the drive by other settings from now on.
+
+        :raises ValueError: they are those of another drive, or of another way to command it.
+        """
+        for name in ('address', 'block_address', 'model', 'control_method', 'reference'):
+            if getattr(settings, name) != getattr(self.settings, name):
+                raise ValueError(f'{name} cannot change within a session: make another Drive')
+        self.settings = settings
+
+    @contextlib.contextmanager
+    def changing_itself(self) -> Iterator[None]:
+        """Know that it changes its parameters itself meanwhile, as it does when it tunes."""
+        self.tuning = True
+        try:
+            yield
+        finally:
+            self.tuning = False
 
     async def measure(self, role: Role, priority: Priority) -> float:
         """
@@ -375,42 +429,6 @@ class DriveState:
     def speed(self) -> float:
         """The speed as last polled, rpm."""
         return self.last_polled(Role.ACTUAL_SPEED).value
-
-    async def watch(self, seconds: float) -> None:
-        """
-        Have the drive notice a silence of so long, s, by what lives on the line; 0: no more.
-
-        Where that fails the drive may go on to watch as before, and that is what is known of it.
-        """
-        self.watched_by = await self.registers.watch(seconds, Priority.SERVICE)
-        self.watched_for = seconds if self.watched_by else 0.0
-
-    @property
-    def own_timeout(self) -> float:
-        """After which silence the drive itself does something, s; 0: after none."""
-        return min(filter(None, (self.sio_tot, self.watched_for)), default=0.0)
-
-    @property
-    def can_time_out(self) -> bool:
-        """It has a time-out of its own that can be read and set over this line."""
-        stop = self.model.key(Role.STOP_AT_TIMEOUT)
-        needed = (self.model.key(Role.COMMUNICATION_TIMEOUT), *([stop] if stop else []))
-        return all(self.has(key) for key in needed)
-
-    async def read_timeout(self) -> None:
-        """Read whether the drive has a time-out of its own."""
-        if not self.can_time_out:
-            return
-        timeout = self.model.key(Role.COMMUNICATION_TIMEOUT)
-        self.sio_tot = await self.registers.read_number(timeout, Priority.SERVICE)
-        stop = self.model.key(Role.STOP_AT_TIMEOUT)
-        if not stop:
-            # where nothing can keep it from that, it stops the motor
-            self.auto_stop = True
-            return
-        data = await self.registers.read_data(stop, Priority.SERVICE)
-        # a code that means neither ON nor OFF is not relied upon
-        self.auto_stop = data == self.registers.encode(stop, True)
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """

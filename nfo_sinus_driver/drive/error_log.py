@@ -312,13 +312,13 @@ class ErrorLogMonitor:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf
-        self._inverter.on_fault = self._expect
+        self._inverter.on_fault(self._expect)
         self._expect()
         self._task = self._bus.spawn(self._watch_for_ever())
 
     def end(self) -> None:
         """Leave the log alone."""
-        self._inverter.on_fault = lambda: None
+        self._inverter.on_fault(None)
         self._bus.cancel(self._task)
 
     def _expect(self) -> None:

@@ -29,6 +29,7 @@ from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Reply
@@ -239,6 +240,10 @@ class ParameterAccess:
             readings += 1
         return reply
 
+    def count(self, error: LinkError) -> None:
+        """Count a request that nobody answered, whoever made it."""
+        self.unanswered += isinstance(error, NoAnswer)
+
     async def _ask(
         self,
         address: Address,
@@ -256,7 +261,7 @@ class ParameterAccess:
                     return await self._bus.read(self._unit, address, priority)
                 return await self._bus.write(self._unit, address, data, priority, require_wanted)
             except (NoAnswer, DamagedAnswer) as error:
-                self.unanswered += isinstance(error, NoAnswer)
+                self.count(error)
                 tries -= 1
                 if not tries:
                     raise

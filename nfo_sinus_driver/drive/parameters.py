@@ -264,14 +264,11 @@ class Parameters:
 
     async def watch_now(self) -> None:
         """Read the settings one after the other, again and again, for ever."""
-        self._bus.refreshing += 1
-        try:
+        with self._bus.refreshing() as sharers:
             while True:
-                await self._watch_round()
-        finally:
-            self._bus.refreshing -= 1
+                await self._watch_round(sharers)
 
-    async def _watch_round(self) -> None:
+    async def _watch_round(self, sharers: Callable[[], int]) -> None:
         inverter = self._inverter
         keys = self._keys
         # without these the drive could hardly be read any more, so one of them in a round will do
@@ -291,7 +288,7 @@ class Parameters:
                     # the poll says so if the drive is lost
                     inverter.missed()
             # many drives on a line take their time, so that other things go on, too
-            pace = _ROUND * self._bus.refreshing / len(due)
+            pace = _ROUND * sharers() / len(due)
             await self._bus.sleep(started + number * pace - time.monotonic())
             if keys is not self._keys:
                 # they are read anew
@@ -380,11 +377,8 @@ class Parameters:
             return tuple(found)
 
         async with self._alone(keys):
-            self._inverter.tuning = True
-            try:
+            with self._inverter.changing_itself():
                 yield changes
-            finally:
-                self._inverter.tuning = False
 
     #: The same for any thread.
     read = on_bus(read_now)

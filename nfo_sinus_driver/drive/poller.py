@@ -134,10 +134,8 @@ class Poller:
         #: A status word that came with something else, and has not been judged yet.
         self._told: Reply | None = None
         self._told_fault = 0
-        #: How many requests nobody had answered when it was last looked at.
-        self._unanswered = 0
         self._conditions = Conditions(inverter)
-        inverter.on_missed = self._look_soon
+        inverter.on_missed(self._look_soon)
 
     @property
     def begun(self) -> bool:
@@ -145,7 +143,7 @@ class Poller:
         return self._task is not None
 
     def begin(self) -> None:
-        """Poller from now on."""
+        """Poll from now on."""
         self._task = self._bus.spawn(self._poll_for_ever())
 
     def end(self) -> None:
@@ -184,6 +182,12 @@ class Poller:
         self._lose(DriveError(Cause.RESTARTED))
         self._failures = 0
         self.begin()
+
+    def set_active(self, active: bool) -> None:
+        """Poll at full rate, or only so that the drive stays watched."""
+        self.active = active
+        if active:
+            self.wake()
 
     def wake(self) -> None:
         """Look at the drive at once."""
@@ -240,7 +244,7 @@ class Poller:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
             heard_at = self._bus.silences.heard_at(self._unit)
-            strikes_in = heard_at + inverter.sio_tot - time.monotonic()
+            strikes_in = heard_at + inverter.timeout.seconds - time.monotonic()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
@@ -263,7 +267,7 @@ class Poller:
         if self.yields:
             period = max(period, _YIELDING_PERIOD)
         inverter = self._inverter
-        for patience in (inverter.sio_tot, inverter.plc_time):
+        for patience in (inverter.timeout.seconds, inverter.plc_time):
             if patience:
                 period = min(period, patience * _KEEP_ALIVE_SHARE)
         return period
@@ -308,7 +312,7 @@ class Poller:
         controller = self._controller
         if controller is not None and controller.changing:
             return 0.0
-        if self._registers.unanswered > self._unanswered:
+        if self._inverter.silent_since_look:
             # it may have been switched off and on
             return 0.0
         return self._slow_period
@@ -329,9 +333,7 @@ class Poller:
         # both words of a status are of one moment, so they are repeated together
         seen = await self._insist(look)
         inverter.require_fresh(seen)
-        # one that is busy, or whose answer was damaged, was there
-        inverter.was_silent = self._registers.unanswered > self._unanswered
-        self._unanswered = self._registers.unanswered
+        inverter.looked_at()
         told = self._controller is not None and self._controller.judge(seen)
         self._tell_fault(seen, told)
         self._conditions.take(seen)
@@ -407,7 +409,7 @@ class Poller:
             except (PortError, Refused, Interrupted):
                 raise
             except LinkError:
-                self._inverter.answering = False
+                self._inverter.unanswered()
                 now = time.monotonic()
                 failing_since = min(failing_since, now)
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
@@ -415,13 +417,13 @@ class Poller:
                     raise
                 self._bus.recorder.retry(self._unit)
             else:
-                self._inverter.answering = True
+                self._inverter.answered()
                 self._setpoint.answered()
                 return answer
 
     def _failed(self, error: LinkError | DriveError) -> None:
         inverter, now = self._inverter, time.monotonic()
-        inverter.answering = False
+        inverter.unanswered()
         if not inverter.connected:
             self._failures += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
@@ -441,7 +443,7 @@ class Poller:
     def _lose(self, error: LinkError | DriveError) -> None:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
-        inverter.connected = False
+        inverter.lost()
         why = explain_failure(error, inverter)
         self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost()

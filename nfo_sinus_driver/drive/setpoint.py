@@ -238,7 +238,7 @@ class Setpoint:
     @property
     def _rewrite_period(self) -> float:
         """After how long an unchanged set-point is written again, s."""
-        timeout = self._inverter.sio_tot
+        timeout = self._inverter.timeout.seconds
         return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
 
     def _is_old(self, at: float) -> bool:
@@ -437,7 +437,7 @@ class Setpoint:
         """
         # the poll asks at once whether it is there, and has the time that a silent drive may
         # take from its neighbours
-        self._registers.unanswered += isinstance(error, NoAnswer)
+        self._registers.count(error)
         self._waits_for_answer = True
         if len(self._keys) > 1 and address in self._written:
             # the motor goes on in its direction, and need not be told to stop first

@@ -180,7 +180,7 @@ HISTORIES = (
         3,
         'in any order: a drive that is lost is still told as connected',
         WATCH,
-        '        inverter.connected = False\n        why =',
+        '        inverter.lost()\n        why =',
         '        why =',
         G2_CONTROL,
     ),

@@ -317,7 +317,7 @@ def test_a_time_out_that_always_stops_needs_nothing_else(bolt: Bolt, bus: Bus) -
     notes = Notes()
     drive = connected(bus, notes, drive_timeout=4.0)
     assert bolt.registers[PATIENT] == 40
-    assert drive.inverter.sio_tot == 4.0 and drive.inverter.auto_stop
+    assert drive.inverter.timeout.seconds == 4.0 and drive.inverter.timeout.stops_motor
     assert not notes.told('time-out of its own')
 
 

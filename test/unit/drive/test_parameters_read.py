@@ -165,11 +165,11 @@ def test_switch_that_is_neither_on_nor_off(
     rig.notes.wait_for('serial.auto_stop: the drive has code 2', Severity.WARNING)
     at_keypad(rig, 'serial.auto_stop', True)
     wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
-    wait_until(lambda: rig.drive.inverter.auto_stop)
+    wait_until(lambda: rig.drive.inverter.timeout.stops_motor)
     # nobody relies on a value that is gone
     put_raw(rig, 'serial.auto_stop', 2)
     wait_until(lambda: 'serial.auto_stop' not in parameters.values)
-    wait_until(lambda: not rig.drive.inverter.auto_stop)
+    wait_until(lambda: not rig.drive.inverter.timeout.stops_motor)
     told = [text for _, text in rig.notes.events if 'has code 2' in text]
     assert len(told) == 2
 
@@ -304,10 +304,10 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
     inverter = rig.drive.inverter
     at_keypad(rig, 'serial.sio_tot', 5)
     at_keypad(rig, 'serial.auto_stop', auto)
-    wait_until(lambda: inverter.sio_tot == 5 and inverter.auto_stop is auto)
+    wait_until(lambda: inverter.timeout.seconds == 5 and inverter.timeout.stops_motor is auto)
     rig.drive.set_drive_timeout(7).result(PATIENCE)
-    assert inverter.sio_tot == 7
-    assert inverter.auto_stop
+    assert inverter.timeout.seconds == 7
+    assert inverter.timeout.stops_motor
     assert parameters.values['serial.sio_tot'] == 7
     assert far(rig, 'serial.sio_tot', 'serial.auto_stop') == [7, True]
 
@@ -315,8 +315,8 @@ def test_time_out_of_the_drive_reaches_the_keeping_alive(
 def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig) -> None:
     rig = make_rig(allow_communication_changes=True)
     connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
-    assert rig.drive.inverter.sio_tot == 3
-    assert rig.drive.inverter.auto_stop
+    assert rig.drive.inverter.timeout.seconds == 3
+    assert rig.drive.inverter.timeout.stops_motor
 
 
 @pytest.mark.parametrize(
