@@ -101,7 +101,7 @@ LAWS = (
     Mutant(
         6,
         'a session changes its control method',
-        DRIVE,
+        'nfo_sinus_driver/drive/drive_state.py',
         '            if getattr(settings, name) != getattr(self.settings, name):',
         '            if False:',
         ('test/unit/drive/test_control_methods.py', '-k', 'never_changes'),
