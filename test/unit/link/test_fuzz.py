@@ -45,27 +45,31 @@ def test_no_decoder_lets_anything_but_typed_errors_out_or_takes_what_is_damaged(
 # --- what the judges would notice: each decoder with one mistake ----------------------------------
 
 
-def _find(decoder: str) -> list[campaign.Finding]:
+def _first(decoder: str) -> campaign.Finding | None:
+    """Return the first thing that is wrong in 20 cases of a decoder, if anything is."""
     count = len(CASES)
-    first = list(CASES).index(decoder)
-    return [
-        finding
-        for case in range(first, 20 * count, count)
-        for finding in campaign.run(Part(SEED, case, case + 1))
-    ]
+    cases = range(list(CASES).index(decoder), 20 * count, count)
+    found = (finding for case in cases for finding in campaign.run(Part(SEED, case, case + 1)))
+    return next(found, None)
+
+
+def _what(decoder: str) -> str:
+    finding = _first(decoder)
+    assert finding is not None
+    return finding.what
 
 
 def test_a_check_sum_that_nobody_checks_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rtu, 'crc', lambda data: judges.seal_rtu(data)[-2:])
-    assert not _find('rtu')
+    assert _first('rtu') is None
     monkeypatch.setattr(rtu, 'crc', lambda data: AnyBytes())
-    assert 'from a damaged frame' in _find('rtu')[0].what
+    assert 'from a damaged frame' in _what('rtu')
     monkeypatch.setattr(modbus_ascii, 'lrc', lambda data: AnyBytes())
-    findings = _find('ascii')
-    assert 'from a damaged frame' in findings[0].what
+    finding = _first('ascii')
+    assert finding is not None and 'from a damaged frame' in finding.what
     # and can be gone through again
-    case = findings[0].frame // CASE
-    assert campaign.run(Part(SEED, case, case + 1)) == findings[:1]
+    case = finding.frame // CASE
+    assert campaign.run(Part(SEED, case, case + 1)) == [finding]
 
 
 class AnyBytes:
@@ -79,25 +83,25 @@ class AnyBytes:
 
 def test_a_wrong_block_check_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(classic, 'check_sum', lambda body: AnyBytes())
-    assert 'not among the bytes' in _find('classic')[0].what
+    assert 'not among the bytes' in _what('classic')
 
 
 def test_a_wrong_sum_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(movitrac, 'check_sum', lambda body: AnyBytes())
-    assert 'from a damaged frame' in _find('movitrac')[0].what
+    assert 'from a damaged frame' in _what('movitrac')
 
 
 def test_an_ack_behind_remains_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(movitrac, 'is_glitch', lambda junk: True)
-    assert 'was believed behind' in _find('movitrac')[0].what
+    assert 'was believed behind' in _what('movitrac')
 
 
 def test_what_a_can_bus_says_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lawicel, '_STAMP', 0)
-    assert 'instead of' in _find('lawicel')[0].what
+    assert 'instead of' in _what('lawicel')
     # a segment told twice is taken twice
     monkeypatch.setattr(sdo, '_TOGGLE', 0)
-    assert 'instead of' in _find('sdo')[0].what
+    assert 'instead of' in _what('sdo')
 
 
 def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,13 +109,13 @@ def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch
         return request.decode(message) if message.startswith(request.answer_head) else None
 
     monkeypatch.setattr(decoders.modbus_pdu, 'understand', understand)
-    assert _find('pdu')
+    assert _first('pdu')
 
 
 def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     feed = classic.Reader.feed
     monkeypatch.setattr(classic.Reader, 'feed', lambda self, data: feed(self, data)[:1])
-    assert 'was not found' in _find('classic')[0].what
+    assert 'was not found' in _what('classic')
     feed_one = movitrac.Reader.feed
 
     def feed_seldom(reader: movitrac.Reader, data: bytes) -> movitrac.Answer | None:
@@ -119,7 +123,7 @@ def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) 
         return None if isinstance(answer, movitrac.Data) else answer
 
     monkeypatch.setattr(movitrac.Reader, 'feed', feed_seldom)
-    assert 'was not found' in _find('movitrac')[0].what
+    assert 'was not found' in _what('movitrac')
 
 
 def test_memory_that_grows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
