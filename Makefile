@@ -14,6 +14,8 @@
 
 # Every target sets up what it needs first; where all is set up already that costs no time.
 
+# Tests start hundreds of processes, which then need not compile again what they import.
+unexport PYTHONDONTWRITEBYTECODE
 # Only these plugins: a machine's own (launch_testing, coverage) have no say in our tests.
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD = 1
 # They steal work from each other: the long tests would come last and alone.
@@ -60,6 +62,9 @@ types: setup ## mypy, on all that is not ROS
 # More workers than processors: these tests wait more than they work.
 unit: setup ## tests without ROS, with the current and with the oldest pymodbus (FULL=1: all there is)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
+	@# by one process, so that the workers have it compiled already; what is wrong they say again
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) --collect-only -qq test/unit \
+		>/dev/null 2>&1 || true
 	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 9 test/unit
 	@echo '== unit again, what uses pymodbus: the current one'
 	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 $(if $(FULL), \

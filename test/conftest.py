@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Settings of the property tests."""
+"""Settings of the property tests, and of the garbage collector."""
+
+import gc
 
 from hypothesis import HealthCheck
 from hypothesis import settings
@@ -30,3 +32,14 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('ours')
+
+
+def pytest_collection() -> None:
+    """Look for no garbage while nine thousand tests are made that all stay."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for it among what is made from now on."""
+    gc.freeze()
+    gc.enable()

@@ -94,7 +94,8 @@ def _judged(seed: int, case: int) -> Iterable[Finding]:
 
 
 def _allocated() -> int:
-    # what a cache keeps is bounded, and fills slowly
+    # what a cache keeps is bounded, and fills slowly; a frozen one would not be found
+    gc.unfreeze()
     for one in gc.get_objects():
         # its type, for some objects raise at whatever they are asked
         if type(one) is functools._lru_cache_wrapper:
