@@ -77,7 +77,7 @@ NEVER_SHOWN = {
     'link/classic_link.py': 'nobody reads by a broadcast',
     'link/movitrac.py': 'a frame that no request makes; the address was checked before',
     'link/sdo.py': 'no parameter of a table has such a size',
-    'drive/drive.py': 'the node makes another session, and asks before',
+    'drive/drive_state.py': 'the node makes another session, and asks before',
     'drive/setpoint.py': 'the node takes finite numbers only, and says so itself',
     'drive/setpoint_all.py': 'the same',
     'demo/bag.py': 'the demo has waited for the connection before',

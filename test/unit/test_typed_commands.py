@@ -111,9 +111,8 @@ def _run(command: Typed, link: str, folder: Path) -> None:
     extra = ['--port', link]
     if options.protocol == 'canopen':
         extra += ['--baud-rate', '125000']
-    if options.verb == 'scan':
-        # so many who do not answer, and nobody else has this processor to himself
-        extra += ['--response-timeout', '0.02']
+    # of a scan many do not answer; all others do, on a machine that may be busy for a while
+    extra += ['--response-timeout', '0.02' if options.verb == 'scan' else '2']
     if getattr(options, 'yes', None) is False:
         # nobody can be asked here
         extra += ['--yes']
