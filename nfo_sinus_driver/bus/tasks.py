@@ -270,8 +270,11 @@ class LatestValue:
 
     def ask(self) -> bool:
         """Have it written; whether that is new."""
-        new, self.pending = not self.pending, True
-        return new
+        # only what was read as False is set: the worker may take it out just now
+        if self.pending:
+            return False
+        self.pending = True
+        return True
 
     def take(self) -> Transfer | None:
         """Take out what is to be written now; ``None`` if there is nothing any more."""

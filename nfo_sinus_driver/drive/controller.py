@@ -364,7 +364,11 @@ class Controller:
                 may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
                 if may_run:
                     await self.method.quick_stop(self._inverter.control_mode)
-                    await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP)
+                    told_at = time.monotonic()
+                    # a PLC whose data stand still goes on showing what was before
+                    await self._inverter.wait_until(
+                        lambda seen: seen.at >= told_at and not seen.driven, Priority.STOP
+                    )
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()

@@ -235,7 +235,10 @@ def test_a_stop_is_confirmed_by_the_first_status_after_it(make: Make, model: str
         wait_until(each_at_the_first_attempt)
 
 
-def test_what_a_plc_goes_on_showing_confirms_no_stop(make: Make, model: str) -> None:
+@pytest.mark.parametrize('command', ['stop', 'quick_stop'])
+def test_what_a_plc_goes_on_showing_confirms_no_stop(
+    make: Make, model: str, command: str
+) -> None:
     rig = make()
     rig.connect()
     rig.ride()
@@ -244,7 +247,7 @@ def test_what_a_plc_goes_on_showing_confirms_no_stop(make: Make, model: str) -> 
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     # its registers are answered, and show a drive that stands
     rig.simulator.inject('plc-stop', seconds=3600.0)
-    assert 'NOT confirmed' in rig.answer(rig.drive.stop())
+    assert 'NOT confirmed' in rig.answer(getattr(rig.drive, command)())
     assert rig.drive.stop_unconfirmed
     rig.simulator.inject('plc-stop', seconds=0.0)
     wait_until(lambda: not rig.drive.stop_unconfirmed)
