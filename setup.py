@@ -54,6 +54,8 @@ setup(
             f'driver = {NAME}.node.main:main',
             f'monitor = {NAME}.node.monitor:main',
             f'nfo-sinus = {NAME}.cli.main:main',
+            f'plot = {NAME}.demo.record:plot',
+            f'record = {NAME}.demo.record:main',
             f'simulator = {NAME}.simulator.main:main',
         ],
     },

@@ -24,7 +24,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 import contextlib
-import importlib
 import os
 from pathlib import Path
 import signal
@@ -39,6 +38,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from nfo_sinus_driver.demo.bench import Bench
 from nfo_sinus_driver.demo.bench import own_domain
+from nfo_sinus_driver.demo.record import why_missing
 from nfo_sinus_driver.demo.recording import Recorder
 from nfo_sinus_driver.demo.recording import RecordingError
 from nfo_sinus_driver.demo.sequence import HEADING
@@ -59,7 +59,7 @@ def main() -> int:
     for number in _ENDING:
         signal.signal(number, signal.default_int_handler)
     folder = _output_folder()
-    missing = _missing('rosbags', 'matplotlib')
+    missing = why_missing('rosbags', 'matplotlib')
     bag = None if 'rosbags' in missing else folder / 'ride'
     if missing:
         what = 'no plot' if bag else 'neither a bag nor a plot'
@@ -108,7 +108,7 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
         executor = SingleThreadedExecutor()
         # before anything is there to be heard
         if bag is not None:
-            recorder = stack.enter_context(Recorder(bag, _REMARKS))
+            recorder = stack.enter_context(Recorder(bag, '/nfo_sinus', _REMARKS))
             executor.add_node(recorder)
         sequence = DemoSequence()
         stack.callback(sequence.destroy_node)
@@ -136,17 +136,6 @@ def _output_folder() -> Path:
     if (folder / 'ride').exists():
         parser.error(f'{folder / "ride"} is there already, and is not written over')
     return folder.resolve()
-
-
-def _missing(*libraries: str) -> dict[str, str]:
-    """Return which libraries cannot be imported, and why."""
-    found = {}
-    for name in libraries:
-        try:
-            importlib.import_module(name)
-        except ImportError as error:
-            found[name] = f'{error} (pip install {name})'
-    return found
 
 
 if __name__ == '__main__':

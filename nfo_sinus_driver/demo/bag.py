@@ -28,6 +28,7 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 _EVENT = '/_service_event'
+_STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
 #: What the states of DriveStatus are to someone who watches the motor.
 _PHASES = {
     'OPERATION_ENABLED': 'running',
@@ -68,6 +69,7 @@ class Recording:
 
     :ivar began: when the drive was connected; times are counted from there.
     :ivar source: the bag, its messages and its topics.
+    :ivar unit: of the set-point and of what follows it.
     :ivar identity: model, serial number and firmware, as far as the drive tells.
     :ivar phases: what the motor did: standby, running, stopping or fault.
     :ivar texts: what the drive's display said.
@@ -80,9 +82,10 @@ class Recording:
     length: float
     remarks: dict[str, str]
     source: str
+    unit: str = 'Hz'
     identity: list[str] = field(default_factory=list)
     setpoint: Curve = field(default_factory=Curve)
-    frequency: Curve = field(default_factory=Curve)
+    actual: Curve = field(default_factory=Curve)
     speed: Curve = field(default_factory=Curve)
     current: Curve = field(default_factory=Curve)
     phases: list[Span] = field(default_factory=list)
@@ -100,11 +103,11 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
             message = reader.deserialize(data, connection.msgtype)
             heard.setdefault(connection.topic, []).append((stamp, message))
     described = yaml.safe_load((folder / 'metadata.yaml').read_text())
-    remarks = described['rosbag2_bagfile_information'].get('custom_data') or {}
+    remarks = dict(described['rosbag2_bagfile_information'].get('custom_data') or {})
 
     statuses = [m for _, m in heard.get(f'{drive}/status', ()) if m.connected]
     if not statuses:
-        raise ValueError(f'{folder}: {drive} was never connected')
+        raise ValueError(f'{drive} was never connected')
     start = _nanoseconds(statuses[0].header.stamp)
 
     def since(nanoseconds: int) -> float:
@@ -129,7 +132,8 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     phases, enabled = [], []
     for time, status in measured('status'):
         if status.connected:
-            run.frequency.add(time, status.actual)
+            run.actual.add(time, status.actual)
+            run.unit = status.unit or run.unit
             phases.append((time, _phase(status)))
             enabled.append((time, 'enabled' if status.enabled else ''))
     run.phases = _spans(phases, length)
@@ -147,6 +151,23 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     ]
     run.calls = sorted(_calls(heard, drive, since))
     return run
+
+
+def only_drive(folder: Path) -> str:
+    """Return the name of the drive that is in a bag; a ValueError if there is none, or several."""
+    if not (folder / 'metadata.yaml').is_file():
+        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
+    with AnyReader([folder]) as reader:
+        drives = sorted(
+            connection.topic.removesuffix('/status')
+            for connection in reader.connections
+            if connection.msgtype == _STATUS and connection.topic.endswith('/status')
+        )
+    if len(drives) == 1:
+        return drives[0]
+    if drives:
+        raise ValueError(f'it has several drives: choose one by --drive: {", ".join(drives)}')
+    raise ValueError('it has no drive: no topic ~/status was recorded')
 
 
 def _calls(

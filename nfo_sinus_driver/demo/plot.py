@@ -75,13 +75,19 @@ _STYLE = {
     'grid.color': '#E6E6E6',
     'legend.frameon': False,
 }
+#: What a unit is of.
+_QUANTITIES = {'Hz': 'frequency', 'rpm': 'speed', '%': 'torque', 'm/s': 'speed'}
 #: Between publications that are further apart nothing was asked, s.
 _SILENCE = 0.5
 
 
-def draw(bag: Path, picture: Path) -> None:
-    """Draw what a bag tells of a run into a PNG file."""
-    run = read(bag)
+def draw(bag: Path, picture: Path, drive: str = '/nfo_sinus') -> None:
+    """
+    Draw what a bag tells of a run into a PNG file.
+
+    :raises ValueError: there is nothing of the drive in it.
+    """
+    run = read(bag, drive)
     with matplotlib.rc_context(_STYLE):
         # no window, and no state that is shared: the figure is drawn for the file alone
         figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor='white')
@@ -93,7 +99,7 @@ def draw(bag: Path, picture: Path) -> None:
         states, frequency, speed, current = (figure.add_subplot(cell) for cell in grid)
         for axes in (states, frequency, speed, current):
             axes.set_xlim(-0.2, run.length + 0.2)
-            axes.xaxis.set_major_locator(MultipleLocator(_step(run.length)))
+            axes.xaxis.set_major_locator(MultipleLocator(_step(max(run.length, 1.0))))
             axes.tick_params(axis='x', labelbottom=axes is current, length=0)
             _mark(axes, run)
         _draw_states(states, run)
@@ -102,7 +108,7 @@ def draw(bag: Path, picture: Path) -> None:
         _draw_quantity(speed, run.speed, 'motor speed (rpm)', _GREEN)
         _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
         current.set_ylim(bottom=0.0)
-        current.set_xlabel('time since the drive was connected (s)', labelpad=8)
+        current.set_xlabel('time (s)', labelpad=8)
         _name_faults(frequency, run)
         figure.align_ylabels([frequency, speed, current])
         _draw_title(figure, run, frequency.get_legend_handles_labels()[0])
@@ -182,15 +188,19 @@ def _draw_frequency(axes: Axes, run: Recording) -> None:
         linestyle=(0, (1, 1.5)), label='ignored: not enabled', zorder=3,
     )
     axes.plot(
-        run.frequency.times, run.frequency.values, color=_BLUE, linewidth=2.4,
-        label='actual frequency', zorder=4,
+        run.actual.times, run.actual.values, color=_BLUE, linewidth=2.4,
+        label=f'actual {_quantity(run)}', zorder=4,
     )
-    axes.set_ylabel('frequency (Hz)')
+    axes.set_ylabel(f'{_quantity(run)} ({run.unit})')
     _finish(axes)
     # room for names above all that is drawn
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.1 * (high - low))
-    _name_setpoints(axes, followed)
+    _name_setpoints(axes, followed, run.unit)
+
+
+def _quantity(run: Recording) -> str:
+    return _QUANTITIES.get(run.unit, 'value')
 
 
 def _draw_quantity(axes: Axes, curve: Curve, name: str, colour: str, marker: str = '') -> None:
@@ -234,16 +244,17 @@ def _name_calls(axes: Axes, run: Recording) -> None:
         text.set_y(1.06 + 0.3 * row)
 
 
-def _name_setpoints(axes: Axes, followed: Curve) -> None:
+def _name_setpoints(axes: Axes, followed: Curve, unit: str) -> None:
     named = math.nan
     for time, value in zip(followed.times, followed.values, strict=True):
         # NaN, where nothing is followed, is neither near nor far
-        if value == value and value != named:
+        if value == value and value not in (named, 0.0):
             axes.annotate(
-                f'{value:+g} Hz'.replace('-', '\N{MINUS SIGN}'), (time, value),
+                f'{value:+g} {unit}'.replace('-', '\N{MINUS SIGN}'), (time, value),
                 (4, 5 if value >= 0 else -5), textcoords='offset points', ha='left',
                 va='bottom' if value >= 0 else 'top', color=_DARK_ORANGE, weight='bold', zorder=6,
             )
+        if value == value:
             named = value
 
 

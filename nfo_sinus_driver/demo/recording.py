@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import json
 from pathlib import Path
 import re
@@ -46,32 +47,33 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.interfaces import Qos
 
-_DRIVE = '/nfo_sinus'
 _EVENT = '_service_event'
 _ROSOUT = QoSProfile(
     depth=1000,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-#: What is recorded: topic, type, and the quality of service that its publishers offer.
-TOPICS = (
-    (f'{_DRIVE}/setpoint', Float32, NEWEST),
-    (f'{_DRIVE}/status', DriveStatus, RELIABLE),
-    (f'{_DRIVE}/inv_st', InvSt, LATCHED),
-    (f'{_DRIVE}/actual_speed', Float32, RELIABLE),
-    (f'{_DRIVE}/actual_frequency', Float32, RELIABLE),
-    (f'{_DRIVE}/telemetry', Telemetry, RELIABLE),
-    (f'{_DRIVE}/enable/{_EVENT}', SetBool.Event, RELIABLE),
-    (f'{_DRIVE}/stop/{_EVENT}', Trigger.Event, RELIABLE),
-    (f'{_DRIVE}/fault_ack/{_EVENT}', Trigger.Event, RELIABLE),
-    ('/nfo_sinus_bus/statistics', BusStatistics, RELIABLE),
-    ('/diagnostics', DiagnosticArray, RELIABLE),
-    ('/rosout', Log, _ROSOUT),
-)
 #: How many messages may wait while the machine is busy with something else.
 _DEPTH = 1000
 #: How rosbag2 writes "for ever", s and ns.
 _FOR_EVER = (9223372036, 854775807)
+
+
+def topics_of(drive: str) -> Iterator[tuple[str, type, QoSProfile]]:
+    """Yield what is recorded of a drive: topic, type, and the quality that publishers offer."""
+    line = drive.rpartition('/')[0]
+    yield f'{drive}/setpoint', Float32, NEWEST
+    yield f'{drive}/status', DriveStatus, RELIABLE
+    yield f'{drive}/inv_st', InvSt, LATCHED
+    yield f'{drive}/actual_speed', Float32, RELIABLE
+    yield f'{drive}/actual_frequency', Float32, RELIABLE
+    yield f'{drive}/telemetry', Telemetry, RELIABLE
+    yield f'{drive}/enable/{_EVENT}', SetBool.Event, RELIABLE
+    yield f'{drive}/stop/{_EVENT}', Trigger.Event, RELIABLE
+    yield f'{drive}/fault_ack/{_EVENT}', Trigger.Event, RELIABLE
+    yield f'{line}/nfo_sinus_bus/statistics', BusStatistics, RELIABLE
+    yield '/diagnostics', DiagnosticArray, RELIABLE
+    yield '/rosout', Log, _ROSOUT
 
 
 class RecordingError(Exception):
@@ -85,16 +87,17 @@ class Recorder(Node):
     By then nothing may be heard any more.
 
     :param folder: the bag, a folder that does not exist.
+    :param drive: the full name of the drive node.
     :param remarks: what the bag is to say of itself.
     :raises RecordingError: the bag cannot be made or, at the end, is not whole.
     """
 
-    def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
+    def __init__(self, folder: Path, drive: str, remarks: dict[str, str]) -> None:
         # here and not above: the demo runs where there is only ROS
         from rosbags.rosbag2 import StoragePlugin
         from rosbags.rosbag2 import Writer
 
-        super().__init__('demo_recorder', enable_rosout=False)
+        super().__init__('recorder', enable_rosout=False)
         self._error: Exception | None = None
         self._count = 0
         self._writer = Writer(
@@ -106,7 +109,7 @@ class Recorder(Node):
             self._writer.open()
         except OSError as error:
             raise RecordingError(f'no bag can be written to {folder}: {error}') from error
-        for topic, type_, qos in TOPICS:
+        for topic, type_, qos in topics_of(drive):
             self._record(topic, type_, qos)
 
     def __enter__(self) -> Recorder:

@@ -25,10 +25,13 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _HELP = """
 The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try:
 
-  ros2 topic echo /nfo_sinus/status
   ros2 service call /nfo_sinus/enable std_srvs/srv/SetBool '{data: true}'
   ros2 topic pub -r 10 /nfo_sinus/setpoint std_msgs/msg/Float32 '{data: 25.0}'
+  ros2 topic echo /nfo_sinus/actual_speed
+  ros2 service call /nfo_sinus/stop std_srvs/srv/Trigger
   simulator inject --link %s fault 5
+  ros2 topic echo --once /nfo_sinus/inv_st
+  ros2 service call /nfo_sinus/fault_ack std_srvs/srv/Trigger
 
 Ctrl-C stops the motor and ends both.
 """
@@ -41,7 +44,7 @@ def main() -> int:
     with Bench() as bench:
         try:
             print(bench.start_simulator(), flush=True)
-            bench.start_driver()
+            bench.start_driver('-p', 'drive_timeout:=2.0')
             print(_HELP % bench.port, flush=True)
             return bench.wait()
         except KeyboardInterrupt:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import threading
 import time
 from typing import Any
@@ -70,8 +71,9 @@ class DemoSequence(Node):
         self._ports: set[str] = set()
         #: What is published again and again.
         self._setpoint: float | None = None
+        #: When the drive was connected, from when on time counts.
         self._started = time.monotonic()
-        self._next_line = 0.0
+        self._printed = -math.inf
         drive = '/nfo_sinus'
         self.create_subscription(DriveStatus, f'{drive}/status', self._on_status, RELIABLE)
         self.create_subscription(InvSt, f'{drive}/inv_st', self._on_inv_st, LATCHED)
@@ -123,6 +125,10 @@ class DemoSequence(Node):
         self._wait_for('no fault', lambda: self._inv_st and self._inv_st.kind == InvSt.STATUS)
         self._say('set-points keep coming, and nothing turns until it is enabled again')
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
+        # what is still asked for would be followed as soon as it is enabled
+        self._say('set-point 0 Hz')
+        self._setpoint = 0.0
+        self._watch_for(_RUNS_FOR, 'standstill', near(0.0))
 
         self._enable()
         reach(15.0)
@@ -138,7 +144,8 @@ class DemoSequence(Node):
             if time.monotonic() > deadline:
                 raise StepError(f'not within {PATIENCE:g} s: {what}')
             self._look_around()
-        self._print()
+        if self._now() > self._printed + _LINE_PERIOD / 5:
+            self._print()
 
     def _watch_for(self, seconds: float, what: str, condition: Callable[[], object]) -> None:
         """
@@ -190,15 +197,15 @@ class DemoSequence(Node):
                 'there is another driver in this ROS domain, and it may have a real motor: '
                 'start again, which takes another domain'
             )
-        if self._now() >= self._next_line:
+        if self._now() >= self._printed + _LINE_PERIOD:
             self._print()
         time.sleep(0.02)
 
     def _print(self) -> None:
-        self._next_line = self._now() + _LINE_PERIOD
         status = self._status
         if status is None or self._inv_st is None:
             return
+        self._printed = self._now()
         setpoint = '--' if self._setpoint is None else f'{self._setpoint:.1f}'
         print(
             f'{self._now():6.1f} s {setpoint:>7} Hz {status.actual:7.1f} Hz {self._speed:5.0f} rpm '
@@ -211,6 +218,9 @@ class DemoSequence(Node):
             self._publisher.publish(Float32(data=self._setpoint))
 
     def _on_status(self, message: DriveStatus) -> None:
+        if message.connected and not (self._status and self._status.connected):
+            self._started = time.monotonic()
+            self._printed = -math.inf
         self._status = message
 
     def _on_inv_st(self, message: InvSt) -> None:

@@ -151,7 +151,9 @@ class LogEntry:
     def __str__(self) -> str:
         if math.isnan(self.operating_time):
             return f'{self.code} {self.full_text}'
-        age = '' if math.isnan(self.age) else f', {self.age:.1f} operating hours ago'
+        # coarser than a wall time that is known
+        known = math.isnan(self.age) or not math.isnan(self.at)
+        age = '' if known else f', {self.age:.1f} operating hours ago'
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
         return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
 

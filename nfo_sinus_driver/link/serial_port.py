@@ -266,6 +266,7 @@ def _name(process: Path) -> str:
     except OSError:
         return 'a process'
     names = [os.path.basename(word.decode(errors='replace')) for word in words if word]
-    if len(names) > 1 and names[0].startswith('python') and not names[1].startswith('-'):
-        return names[1]
+    if len(names) > 1 and names[0].startswith('python'):
+        script = names[2] if names[1] == '-m' and len(names) > 2 else names[1]
+        return names[0] if script.startswith('-') else script
     return names[0] if names else 'a process'

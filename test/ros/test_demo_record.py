@@ -212,7 +212,7 @@ def _check_values(bag: Bag) -> None:
     assert statuses[0].OPERATION_ENABLED in states[faulted:], 'it ran again'
 
     wanted = [value for value, _ in itertools.groupby(one.data for one in bag.drive('setpoint'))]
-    assert wanted == [30.0, -20.0, 15.0]
+    assert wanted == [30.0, -20.0, 0.0, 15.0]
     # 1480 rpm at 50 Hz
     speeds = [message.data for message in bag.drive('actual_speed')]
     assert 850 < max(speeds) < 920

@@ -51,7 +51,7 @@ MAY_IMPORT = {
     # its folder of a family, the words of that one, and no profile: a mistake in that must not hide
     'simulator': {'catalog', 'families', 'version'},
     'node': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'view', 'wording'},
-    'demo': {'node'},
+    'demo': {'node', 'version'},
     'cli': {'bus', 'catalog', 'drive', 'link', 'signals', 'version', 'view', 'wording'},
 }
 #: Rooms that may import ROS, and anything else.

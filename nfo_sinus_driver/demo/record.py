@@ -1,0 +1,222 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+``record``: what a drive does goes to a bag until Ctrl-C, and then to a picture.
+
+``plot`` draws what is in a bag already, recorded by this or by ``ros2 bag record``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from collections.abc import Sequence
+import contextlib
+import importlib
+import math
+import os
+from pathlib import Path
+import signal
+import sys
+import threading
+import time
+
+import rclpy
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.executors import ExternalShutdownException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+import rclpy.utilities
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+from nfo_sinus_driver.demo.recording import Recorder
+from nfo_sinus_driver.demo.recording import RecordingError
+from nfo_sinus_driver.version import VERSION
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: When it is time to say that there is no driver, s.
+_PATIENCE = 5.0
+_PERIOD = 0.1
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Record a drive until Ctrl-C or a signal, then draw it; return the exit status."""
+    given = list(sys.argv[1:] if args is None else args)
+    parser = _record_parser()
+    options = parser.parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
+    folder: Path = (options.output or Path(time.strftime('ride_%Y-%m-%d_%H-%M-%S'))).resolve()
+    bag = folder / 'ride'
+    if bag.exists():
+        parser.error(f'{bag} is there already, and is not written over')
+    missing = why_missing('rosbags', 'matplotlib')
+    if 'rosbags' in missing:
+        print(f'record: cannot write a bag: {missing["rosbags"]}', file=sys.stderr)
+        return 1
+    for number in _ENDING:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        with _recorder(bag, options.drive, given) as recorder:
+            print(f'record: {options.drive} goes to {bag}; Ctrl-C ends it', flush=True)
+            _wait(recorder, options.drive, options.seconds)
+    except RecordingError as error:
+        print(f'record: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        # before there was anything to be kept
+        return 130
+    print(f'record: the bag is {bag}')
+    if missing:
+        print(f'record: no picture: {missing["matplotlib"]}', file=sys.stderr)
+        return 0
+    return _draw('record', bag, options.drive, folder / 'ride.png')
+
+
+def plot(args: Sequence[str] | None = None) -> int:
+    """Draw the ride of a drive that is in a bag; return the exit status."""
+    options = _plot_parser().parse_args(args)
+    missing = why_missing('rosbags', 'matplotlib')
+    if missing:
+        print(f'plot: {"; ".join(missing.values())}', file=sys.stderr)
+        return 1
+    bag: Path = options.bag.resolve()
+    return _draw('plot', bag, options.drive, options.output or bag.with_name(f'{bag.name}.png'))
+
+
+def why_missing(*libraries: str) -> dict[str, str]:
+    """Return which libraries cannot be imported, and why."""
+    found = {}
+    for name in libraries:
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            found[name] = f'{error} (pip install {name})'
+    return found
+
+
+def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
+    # here and not above: a recorder has use for neither library before
+    from rosbags.highlevel import AnyReaderError
+
+    from nfo_sinus_driver.demo import bag as bags
+    from nfo_sinus_driver.demo import plot as plots
+
+    try:
+        plots.draw(bag, picture, drive or bags.only_drive(bag))
+    except (AnyReaderError, OSError, ValueError) as error:
+        print(f'{command}: cannot draw {bag}: {error}', file=sys.stderr)
+        return 1
+    print(f'{command}: the picture is {picture}')
+    return 0
+
+
+@contextlib.contextmanager
+def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recorder]:
+    """Record on a thread of its own; nothing is heard any more when the bag is closed."""
+    with contextlib.ExitStack() as stack:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        recorder = stack.enter_context(Recorder(bag, drive, {'drive': drive}))
+        executor = SingleThreadedExecutor()
+        executor.add_node(recorder)
+        thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+        thread.start()
+        stack.callback(thread.join)
+        stack.callback(executor.shutdown)
+        yield recorder
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    with contextlib.suppress(ExternalShutdownException):
+        executor.spin()
+
+
+def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
+    """Wait until the time is over, or somebody ends it."""
+    began = time.monotonic()
+    warned = False
+    with contextlib.suppress(KeyboardInterrupt):
+        while time.monotonic() < began + seconds:
+            time.sleep(_PERIOD)
+            if warned or time.monotonic() < began + _PATIENCE:
+                continue
+            warned = True
+            if not recorder.count_publishers(f'{drive}/status'):
+                domain = os.environ.get('ROS_DOMAIN_ID', '0')
+                print(
+                    f'record: nothing publishes {drive}/status yet: does the driver run, with '
+                    f'this name and in this ROS_DOMAIN_ID ({domain})?',
+                    file=sys.stderr, flush=True,
+                )
+    # what was recorded is now closed and drawn, and that must not be cut short
+    for number in _ENDING:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _record_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='record', description='Records what a drive does until Ctrl-C, and draws it.'
+    )
+    parser.add_argument(
+        'drive', nargs='?', type=_node, default='/nfo_sinus', metavar='DRIVE',
+        help='the full name of the drive node (default: /nfo_sinus)',
+    )
+    parser.add_argument(
+        '--output', type=Path, metavar='DIR',
+        help='where bag (DIR/ride) and picture (DIR/ride.png) go; '
+        'ride_<date and time> in the current directory if not given',
+    )
+    parser.add_argument(
+        '--for', type=_seconds, default=math.inf, dest='seconds', metavar='SECONDS',
+        help='end it after so long',
+    )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    return parser
+
+
+def _plot_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='plot', description='Draws what a bag tells of the ride of a drive.'
+    )
+    parser.add_argument('bag', type=Path, metavar='BAG', help='the folder of the bag')
+    parser.add_argument(
+        '--drive', type=_node, metavar='DRIVE',
+        help='the full name of the drive node; needed if the bag has several',
+    )
+    parser.add_argument(
+        '--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)'
+    )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    return parser
+
+
+def _node(text: str) -> str:
+    name = f'/{text.strip("/")}'
+    try:
+        validate_full_topic_name(f'{name}/status')
+    except InvalidTopicNameException as error:
+        raise argparse.ArgumentTypeError(' '.join(str(error).split())) from None
+    return name
+
+
+def _seconds(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        seconds = float(text)
+        if seconds > 0:
+            return seconds
+    raise argparse.ArgumentTypeError(f'{text!r} is no time in s')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,117 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``record`` and ``plot``: the ride of any drive goes to a bag and to a picture."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import signal
+import struct
+import subprocess
+import sys
+
+from bench import Bench
+from bench import Process
+from bench import wait_until
+from ways import needs
+
+from nfo_sinus_driver.demo import bag as bags
+
+_RECORD = (sys.executable, '-m', 'nfo_sinus_driver.demo.record')
+_PLOT = (
+    sys.executable, '-c',
+    'import sys; from nfo_sinus_driver.demo.record import plot; sys.exit(plot())',
+)
+_DRIVE = '/line1/infeed'
+_TIME = 120.0
+
+
+def _recorder(bench: Bench, *arguments: str) -> Process:
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
+    process = Process([*_RECORD, *arguments], environment, bench.folder / 'record.log')
+    bench.callback(process.end)
+    return process
+
+
+def _run(*command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, timeout=_TIME, check=False)
+
+
+def _is_picture(path: Path) -> bool:
+    return struct.unpack('>II', path.read_bytes()[16:24]) == (1600, 1000)
+
+
+@needs('own')
+def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-r', '__ns:=/line1', '-p', 'drives:=[infeed]')
+    client = bench.client(_DRIVE).connected()
+    folder = bench.folder / 'a' / 'b'
+    recorder = _recorder(bench, _DRIVE, '--output', str(folder))
+    wait_until(
+        lambda: all(
+            client.node.count_subscribers(f'{_DRIVE}/{topic}') == count
+            for topic, count in (('status', 2), ('setpoint', 2))
+        ),
+        'the recorder listens',
+    )
+    with client.run_at(20.0):
+        pass
+    assert client.call('stop').success
+    client.wait_for('status', lambda status: abs(status.actual) < 0.1, 'it stands')
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0, recorder.text
+    bag, picture = folder / 'ride', folder / 'ride.png'
+    assert f'the bag is {bag}' in recorder.text and f'the picture is {picture}' in recorder.text
+    assert 'Traceback' not in recorder.text
+    assert _is_picture(picture)
+
+    ride = bags.read(bag, bags.only_drive(bag))
+    assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
+    assert set(ride.setpoint.values) == {20.0} and ride.unit == 'Hz'
+    assert len(ride.enabled) == 1 and 'running' in {span.what for span in ride.phases}
+
+    # and again, by itself
+    done = _run(*_PLOT, str(bag), '--output', str(folder / 'again.png'))
+    assert done.returncode == 0 and _is_picture(folder / 'again.png'), done.stderr
+    done = _run(*_PLOT, str(bag), '--drive', 'other')
+    assert done.returncode == 1 and '/other was never connected' in done.stderr
+    done = _run(*_PLOT, str(folder))
+    assert done.returncode == 1 and 'it is no bag' in done.stderr
+    again = _run(*_RECORD, '--output', str(folder))
+    assert again.returncode == 2 and 'is there already' in again.stderr
+
+
+@needs('own')
+def test_a_recorder_that_hears_nothing_says_what_to_check(bench: Bench) -> None:
+    recorder = _recorder(bench, '--output', str(bench.folder / 'out'), '--for', '6')
+    assert recorder.wait() == 1
+    assert 'nothing publishes /nfo_sinus/status yet' in recorder.text
+    assert f'in this ROS_DOMAIN_ID ({bench.domain})?' in recorder.text
+    assert 'the bag is empty: nothing was heard' in recorder.text
+    assert 'Traceback' not in recorder.text
+
+
+def test_a_recorder_refuses_what_cannot_be() -> None:
+    for arguments, why in (
+        (('a b',), 'must not contain characters other than alphanumerics'),
+        (('--for', 'x'), "'x' is no time in s"),
+        (('--for', '-1'), "'-1' is no time in s"),
+    ):
+        done = _run(*_RECORD, *arguments)
+        assert done.returncode == 2 and why in done.stderr, done.stderr
+    done = _run(*_RECORD, '--output', '/proc/none', '--for', '1')
+    assert done.returncode == 1 and 'no bag can be written to /proc/none/ride' in done.stderr
