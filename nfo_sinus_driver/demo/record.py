@@ -48,7 +48,6 @@ from nfo_sinus_driver.version import VERSION
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 #: When it is time to say that there is no driver, s.
 _PATIENCE = 5.0
-_PERIOD = 0.1
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -144,21 +143,19 @@ def _spin(executor: SingleThreadedExecutor) -> None:
 
 def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     """Wait until the time is over, or somebody ends it."""
-    began = time.monotonic()
-    warned = False
+    # never set: only a signal or the time ends a wait
+    ended = threading.Event()
     with contextlib.suppress(KeyboardInterrupt):
-        while time.monotonic() < began + seconds:
-            time.sleep(_PERIOD)
-            if warned or time.monotonic() < began + _PATIENCE:
-                continue
-            warned = True
-            if not recorder.count_publishers(f'{drive}/status'):
-                domain = os.environ.get('ROS_DOMAIN_ID', '0')
-                print(
-                    f'record: nothing publishes {drive}/status yet: does the driver run, with '
-                    f'this name and in this ROS_DOMAIN_ID ({domain})?',
-                    file=sys.stderr, flush=True,
-                )
+        ended.wait(min(seconds, _PATIENCE))
+        if not recorder.count_publishers(f'{drive}/status'):
+            domain = os.environ.get('ROS_DOMAIN_ID', '0')
+            print(
+                f'record: nothing publishes {drive}/status yet: does the driver run, with '
+                f'this name and in this ROS_DOMAIN_ID ({domain})?',
+                file=sys.stderr, flush=True,
+            )
+        if seconds > _PATIENCE:
+            ended.wait(None if seconds == math.inf else seconds - _PATIENCE)
     # what was recorded is now closed and drawn, and that must not be cut short
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
@@ -213,7 +210,7 @@ def _node(text: str) -> str:
 def _seconds(text: str) -> float:
     with contextlib.suppress(ValueError):
         seconds = float(text)
-        if seconds > 0:
+        if 0 < seconds <= threading.TIMEOUT_MAX:
             return seconds
     raise argparse.ArgumentTypeError(f'{text!r} is no time in s')
 

@@ -438,7 +438,6 @@ def _condition(teller: _Teller, now: float) -> Condition:
     return Condition.RUNS if runs else Condition.STANDS
 
 
-
 # --- the program ----------------------------------------------------------------------------------
 
 
