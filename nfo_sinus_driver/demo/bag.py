@@ -126,7 +126,7 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     length = since(_nanoseconds(statuses[-1].header.stamp))
     source = f'{folder.name}: {sum(map(len, heard.values()))} messages on {len(heard)} topics'
     run = Recording(datetime.fromtimestamp(start / 1e9), length, remarks, source)
-    run.identity = _identity(m for _, m in heard.get('/diagnostics', ()))
+    run.identity = _identity((m for _, m in heard.get('/diagnostics', ())), drive)
     received('setpoint', run.setpoint)
     received('actual_speed', run.speed)
     phases, enabled = [], []
@@ -182,12 +182,13 @@ def _calls(
                     yield since(_nanoseconds(event.info.stamp)), f'{name} off' if off else name
 
 
-def _identity(arrays: Iterable[Any]) -> list[str]:
+def _identity(arrays: Iterable[Any], drive: str) -> list[str]:
     """Return what diagnostics tell of who the drive is."""
+    mine = f'{drive.lstrip("/")}: drive'
     for array in arrays:
         for status in array.status:
             values = {pair.key: pair.value for pair in status.values}
-            if values.get('firmware'):
+            if status.name == mine and values.get('firmware'):
                 named = {
                     '': values.get('model', ''),
                     'serial ': values.get('serial number', ''),

@@ -22,6 +22,7 @@ import signal
 import struct
 import subprocess
 import sys
+from types import SimpleNamespace
 
 from bench import Bench
 from bench import Process
@@ -115,3 +116,14 @@ def test_a_recorder_refuses_what_cannot_be() -> None:
         assert done.returncode == 2 and why in done.stderr, done.stderr
     done = _run(*_RECORD, '--output', '/proc/none', '--for', '1')
     assert done.returncode == 1 and 'no bag can be written to /proc/none/ride' in done.stderr
+
+
+def test_who_a_drive_is_is_told_by_its_own_diagnostics() -> None:
+    def told(name: str, serial: str) -> SimpleNamespace:
+        values = {'firmware': '4.38', 'serial number': serial}
+        pairs = [SimpleNamespace(key=key, value=value) for key, value in values.items()]
+        return SimpleNamespace(status=[SimpleNamespace(name=name, values=pairs)])
+
+    arrays = [told('line1/outfeed: drive', 'A1'), told('line1/infeed: drive', 'B2')]
+    assert bags._identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
+    assert bags._identity(arrays, '/infeed') == []
