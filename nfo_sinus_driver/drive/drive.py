@@ -53,13 +53,13 @@ from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.parameters import on_bus
 from nfo_sinus_driver.drive.poller import Poller
 from nfo_sinus_driver.drive.poller import take_snapshot
-from nfo_sinus_driver.drive.poller import watch_telemetry
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener
 from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.drive.snapshot import Snapshot
+from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
 from nfo_sinus_driver.drive.tuning import Tuning
 from nfo_sinus_driver.link import LinkError

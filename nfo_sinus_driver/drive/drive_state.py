@@ -180,24 +180,19 @@ class DriveState:
             word, at = await self._read_int(self.word_key, priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
-        code_of = self.model.profile.status_word.code
-        if code_of is not None:
-            seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
-            seen = self._with_control_as_before(seen)
-            alarmed = before is not None and word != before.word and alarming(seen)
-            priority = Priority.STOP if alarmed else priority
-            seen = await self._with_control(seen, priority, once)
+        half = self.told_by_word(word, at)
+        alarmed = before is not None and word != before.word and alarming(half)
+        priority = Priority.STOP if alarmed else priority
+        if self.model.profile.status_word.code is not None:
+            seen = await self._with_control(half, priority, once)
             return await self._with_frequency(seen, priority, once)
         held = self.seen
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             seen = replace(held, at=at)
             if not alarming(seen):
                 return self._saw(seen)
-        seen = InverterStatus(at, word, NO_CODE, self.model)
-        alarmed = before is not None and word != before.word and alarming(seen)
-        priority = Priority.STOP if alarmed else priority
         code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
-        seen = replace(seen, code=code, code_at=code_at)
+        seen = replace(half, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
         # a fault or an alarm came or went between the two; one that stays so is treated as the
@@ -214,6 +209,14 @@ class DriveState:
             word, at = await self._read_int(self.word_key, priority, once)
             seen = replace(seen, word=word, at=at)
         return await self._with_frequency(seen, priority, once)
+
+    def told_by_word(self, word: int, at: float) -> InverterStatus:
+        """Return what a status word says alone; what only the rest tells is not known of it."""
+        code_of = self.model.profile.status_word.code
+        if code_of is None:
+            return InverterStatus(at, word, NO_CODE, self.model)
+        seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+        return self._with_control_as_before(seen)
 
     def require_fresh(self, seen: InverterStatus) -> None:
         """

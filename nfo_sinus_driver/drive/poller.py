@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The watch over one drive: polls and measures, judges what it sees, notices when it is lost."""
+"""The watch over one drive: polls it, judges what it sees, notices when it is lost."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
+import contextlib
 from dataclasses import replace
 import logging
 import math
@@ -45,7 +45,6 @@ from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Measured
 from nfo_sinus_driver.drive.snapshot import Snapshot
-from nfo_sinus_driver.drive.snapshot import Telemetry
 from nfo_sinus_driver.link import Interrupted
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoData
@@ -131,8 +130,10 @@ class Poller:
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint: Report | None = None
-        #: A status word that came with something else, and has not been judged yet.
+        #: A status word that came with something else, and has not been judged yet; and who judges
+        #: it beside a poll that waits for its turn.
         self._told: Reply | None = None
+        self._urgent: Task | None = None
         self._told_fault = 0
         self._conditions = Conditions(inverter)
         inverter.on_missed(self._look_soon)
@@ -151,6 +152,7 @@ class Poller:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
+        self._bus.cancel(self._urgent)
         self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
@@ -158,7 +160,9 @@ class Poller:
         """
         Take a status word that the drive has told with something else, if it told one.
 
-        It is the answer to a look that waits for it; else it begins one at once, if it is news.
+        It is the answer to a look that waits for it; else it begins one at once, if it is news. On
+        a full line the poll may wait for its turn to read something else: what may have to stop the
+        motor is looked at beside it.
         """
         inverter, registers = self._inverter, self._registers
         if self._task is None or not inverter.connected or not reply.data:
@@ -169,9 +173,23 @@ class Poller:
         # what cannot be counts for nothing: the next poll reads it again
         if not registers.can_be(inverter.word_key, reply.data):
             return
-        if inverter.seen and inverter.status_word(reply.data) != inverter.seen.word:
-            self._told = reply
+        word = inverter.status_word(reply.data)
+        if inverter.seen is None or word == inverter.seen.word:
+            return
+        self._told = reply
+        if self._task.asleep:
             self.wake()
+        elif self._alarming(inverter.told_by_word(word, reply.arrived)):
+            self._look_beside()
+
+    def _look_beside(self) -> None:
+        async def look() -> None:
+            # if it fails, the poll finds out, too
+            with contextlib.suppress(LinkError, DriveError):
+                await self._look()
+
+        if self._urgent is None or self._urgent.future.done():
+            self._urgent = self._bus.spawn(look())
 
     def restarted(self) -> None:
         """Take note that the drive has started anew: it is lost until it is connected to again."""
@@ -179,6 +197,7 @@ class Poller:
             return
         # what is asked of it just now was begun before
         self._bus.cancel(self._task)
+        self._bus.cancel(self._urgent)
         self._lose(DriveError(Cause.RESTARTED))
         self._failures = 0
         self.begin()
@@ -317,9 +336,12 @@ class Poller:
             return 0.0
         return self._slow_period
 
+    def _alarming(self, seen: InverterStatus) -> bool:
+        """Tell whether a status may have to stop the motor."""
+        return self._controller is not None and self._controller.alarmed_by(seen)
+
     async def _look(self) -> InverterStatus:
         inverter = self._inverter
-        alarming = self._controller.alarmed_by if self._controller is not None else lambda _: False
 
         async def look() -> InverterStatus:
             told, self._told = self._told, None
@@ -327,7 +349,11 @@ class Poller:
                 # somebody else has looked since
                 told = None
             return await inverter.look(
-                Priority.POLL, once=True, alarming=alarming, told=told, code_for=self._code_holds
+                Priority.POLL,
+                once=True,
+                alarming=self._alarming,
+                told=told,
+                code_for=self._code_holds,
             )
 
         # both words of a status are of one moment, so they are repeated together
@@ -501,80 +527,3 @@ def take_snapshot(
         speed_at=speed.at,
         actual=actual,
     )
-
-
-#: Read every time.
-FAST = (
-    Role.OUTPUT_VOLTAGE,
-    Role.OUTPUT_CURRENT,
-    Role.OUTPUT_POWER,
-    Role.POWER_FACTOR,
-    Role.DC_LINK_VOLTAGE,
-    Role.ACTUAL_TORQUE,
-)
-#: Read one after the other, one each time, for they change slowly.
-SLOW = (
-    Role.MOTOR_TEMPERATURE,
-    Role.PT1000_TEMPERATURE,
-    Role.OPERATING_TIME,
-    Role.RUNNING_TIME,
-    Role.BRAKE_TIME,
-    Role.ENERGY,
-    Role.TOTAL_ENERGY,
-)
-
-#: What a drive answers that does not have a parameter, and how often until it is believed.
-_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
-_DENIALS = 3
-#: How often the settings are looked at while telemetry is turned off, s.
-_OFF_PERIOD = 0.5
-
-
-async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> None:
-    """
-    Measure at ``telemetry_rate`` until cancelled; a value the drive does not have stays NaN.
-
-    One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
-
-    :param yields: tells whether the line is left to others just now.
-    """
-    values = dict.fromkeys((*FAST, *SLOW), NAN)
-    #: How often in a row the drive said that it has none of them.
-    denied = dict.fromkeys(values, 0)
-    # the first time all are read, so that the first message is whole
-    due = deque(SLOW)
-    first = True
-
-    async def measure(role: Role) -> None:
-        # which firmware it has may be known only later
-        if denied[role] >= _DENIALS or not inverter.has(inverter.model.key(role)):
-            return
-        try:
-            values[role] = await inverter.measure(role, Priority.TELEMETRY)
-            denied[role] = 0
-        except Refused as error:
-            values[role] = NAN
-            # over Classic it says so of everything while it tunes
-            denied[role] += error.code in _NONE_SUCH and not inverter.tuning
-
-    while True:
-        started = time.monotonic()
-        rate = inverter.settings.telemetry_rate
-        if rate and inverter.connected and inverter.answering and not yields():
-            try:
-                for role in (*FAST, *due) if first else (*FAST, due[0]):
-                    await measure(role)
-                due.rotate(-1)
-                first = False
-                # these two are polled anyway
-                polled = {
-                    Role.ACTUAL_FREQUENCY: inverter.frequency,
-                    Role.ACTUAL_SPEED: inverter.speed,
-                }
-                inverter.listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
-            except LinkError:
-                # the poll says so if the drive is lost
-                inverter.missed()
-                values.update(dict.fromkeys(FAST, NAN))
-        period = 1 / rate if rate else _OFF_PERIOD
-        await inverter.bus.sleep(period - (time.monotonic() - started))

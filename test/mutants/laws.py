@@ -415,6 +415,14 @@ LAWS = (
         (RTU_LINK,),
     ),
     Mutant(
+        3,
+        'what a drive tells with a set-point waits until the poll has its turn',
+        WATCH,
+        '            self._look_beside()\n',
+        '            pass\n',
+        ('test/unit/drive/test_set_point_with_status.py', '-k', 'full_line'),
+    ),
+    Mutant(
         9,
         'an idle bus is silent longer than the time-out of the drive',
         WATCH,
