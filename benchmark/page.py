@@ -86,6 +86,7 @@ _DELAYS: tuple[Column, ...] = (
     ('longest, ms', 'longest', 2),
     ('transaction, ms', 'limit', 2),
     ('longest beyond a transaction, ms', 'beyond', 2),
+    ('of that the machine stood still, ms', 'stood_still', 1),
 )
 _EVENTS: tuple[Column, ...] = (
     *_DELAYS,

@@ -60,12 +60,14 @@ class Window:
 
     :ivar core: how much of one core the watched process took.
     :ivar others: how much everybody took who has nothing to do with the measurement.
+    :ivar stalls: from when to when a core of the machine stood still, s.
     """
 
     frames: list[Frame]
     seconds: float
     core: float
     others: float
+    stalls: list[tuple[float, float]]
 
     def figures(self) -> dict[str, float]:
         """Return what was taken of the processor: % of a core, and ms for each transaction."""
@@ -74,6 +76,11 @@ class Window:
         if count:
             cost['cpu_transaction'] = 1e3 * self.core * self.seconds / count
         return cost
+
+    def stood_still(self, start: float, seconds: float) -> float:
+        """Return for how long at most a core stood still meanwhile, s."""
+        end = start + seconds
+        return max([0.0, *(min(b, end) - max(a, start) for a, b in self.stalls)])
 
 
 class Rig(contextlib.ExitStack):
@@ -90,6 +97,7 @@ class Rig(contextlib.ExitStack):
         self.port = str(Path(folder, 'line'))
         self._trace = Path(folder, 'trace')
         self._log = Path(folder, 'log')
+        self._stalls = Path(folder, 'stalls')
         self._processes: list[subprocess.Popen[str]] = []
         addresses = [f'--address={number}' for number in range(1, drives + 1)]
         with contextlib.ExitStack() as failing:
@@ -101,6 +109,8 @@ class Rig(contextlib.ExitStack):
                 *('--boot-time', '0', *addresses),
             )
             self.wait_for(lambda: 'serving' in self.log, simulator)
+            for core in os.sched_getaffinity(0):
+                self.start_script('stalls.py', str(core), output=self._stalls)
             failing.pop_all()
 
     @property
@@ -108,13 +118,15 @@ class Rig(contextlib.ExitStack):
         """What all processes said."""
         return self._log.read_text(errors='replace')
 
-    def start(self, *command: str, stdout: int | None = None) -> subprocess.Popen[str]:
-        """Start a process that ends with the rig."""
-        with self._log.open('ab') as log:
+    def start(
+        self, *command: str, stdout: int | None = None, output: Path | None = None
+    ) -> subprocess.Popen[str]:
+        """Start a process that ends with the rig; what it prints goes to the log, or a file."""
+        with self._log.open('ab') as log, (output or self._log).open('ab') as out:
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=log if stdout is None else stdout,
+                stdout=out if stdout is None else stdout,
                 stderr=log,
                 text=True,
                 start_new_session=True,
@@ -123,9 +135,16 @@ class Rig(contextlib.ExitStack):
         self.callback(_end, process)
         return process
 
-    def start_script(self, name: str, *arguments: str, **how: int) -> subprocess.Popen[str]:
+    def start_script(
+        self,
+        name: str,
+        *arguments: str,
+        stdout: int | None = None,
+        output: Path | None = None,
+    ) -> subprocess.Popen[str]:
         """Start one of the programs beside this one."""
-        return self.start(sys.executable, str(FOLDER / name), *arguments, **how)
+        command = (sys.executable, str(FOLDER / name), *arguments)
+        return self.start(*command, stdout=stdout, output=output)
 
     def watch(self, process: subprocess.Popen[str], seconds: float) -> Window:
         """Let time pass; return what the line carried and what the process cost meanwhile."""
@@ -146,6 +165,7 @@ class Rig(contextlib.ExitStack):
                 now - start,
                 (resources.of_process(process.pid) - cost) / (now - start),
                 (self._others() - others) / (now - start),
+                self.stalls(),
             )
 
         return watched
@@ -161,6 +181,12 @@ class Rig(contextlib.ExitStack):
     def frames(self, start: float = 0.0) -> list[Frame]:
         """Return all that the line has carried since a moment, s."""
         return trace_file.frames_of(self._trace, start)
+
+    def stalls(self) -> list[tuple[float, float]]:
+        """Return from when to when a core of the machine stood still, s."""
+        # the last line may not be whole yet
+        lines = self._stalls.read_text().split('\n')[:-1]
+        return [(float(begin), float(end)) for begin, end in map(str.split, lines)]
 
     def requests(self) -> list[float]:
         """Return when each request began on the line, be it as noisy as it may."""

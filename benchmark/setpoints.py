@@ -103,7 +103,9 @@ def _stops(rig: DriverRig, count: int) -> Row:
     for at, unit, word in trace_file.writes(window.frames, _SCMD):
         if word == Scmd.STOP:
             stops.setdefault(unit, []).append(at)
-    delays = [next(at for at in stops[drive + 1] if at >= call) - call for call, drive in called]
+    delays = [
+        (call, next(at for at in stops[drive + 1] if at >= call) - call) for call, drive in called
+    ]
     figures = _delay_figures(delays, window, rig)
     return Row('event', 'service stop', BAUD_RATE, rig.drives, figures, {'beyond': 3.0})
 
@@ -131,8 +133,12 @@ def _done_by(rig: DriverRig, script: str, count: int) -> tuple[list[Any], Window
     return json.loads(output), window
 
 
-def _delay_figures(delays: Sequence[float], window: Window, rig: DriverRig) -> Figures:
+def _delay_figures(
+    begun: Sequence[tuple[float, float]], window: Window, rig: DriverRig
+) -> Figures:
+    """Return the figures of delays, of which each is when it began and how long it was, s."""
     limit = trace_file.longest_transaction(window.frames, rig.line)
+    delays = [delay for _, delay in begun]
     return {
         'events': len(delays),
         'time': 1e3 * statistics.median(delays),
@@ -140,14 +146,15 @@ def _delay_figures(delays: Sequence[float], window: Window, rig: DriverRig) -> F
         'longest': 1e3 * max(delays),
         'limit': 1e3 * limit,
         'beyond': 1e3 * (max(delays) - limit),
+        'stood_still': 1e3 * window.stood_still(*max(begun, key=lambda one: one[1])),
         **window.figures(),
     }
 
 
 def _delays(
     published: Sequence[tuple[float, int, float]], frames: list[Frame]
-) -> tuple[list[float], int]:
-    """Return how long each set-point took to the line (s), and how many did not come there."""
+) -> tuple[list[tuple[float, float]], int]:
+    """Return when each set-point began and how long it took to the line, s; how many never came."""
     written: dict[tuple[int, int], list[float]] = {}
     for at, unit, word in trace_file.writes(frames, _SETPOINT):
         written.setdefault((unit, word), []).append(at)
@@ -155,5 +162,5 @@ def _delays(
     for at, drive, value in published:
         word = int.from_bytes(_MODEL['status.frq_set'].quantise(value, 'modbus'), 'big')
         moments = written.get((drive + 1, word), ())
-        delays += [moment - at for moment in moments if at <= moment < at + _LOST][:1]
+        delays += [(at, moment - at) for moment in moments if at <= moment < at + _LOST][:1]
     return delays, len(published) - len(delays)

@@ -26,6 +26,7 @@ from collections.abc import Container
 from collections.abc import Iterator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 import itertools
 from itertools import pairwise
 import random
@@ -33,6 +34,7 @@ import signal
 import statistics
 import threading
 import time
+from typing import NamedTuple
 
 from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
@@ -87,6 +89,20 @@ class _Event:
     kind: str
     unit: int
     at: float
+
+
+class _Seen(NamedTuple):
+    """
+    How an event was answered.
+
+    :ivar since: when it was detected, s.
+    :ivar delay: how long after that the stop was on the line, s.
+    :ivar polls: how often the status was read until then.
+    """
+
+    since: float
+    delay: float
+    polls: int
 
 
 class _Wire:
@@ -298,24 +314,27 @@ def _measure(rig: DriverRig, kinds: Sequence[str], count: int) -> dict[str, Figu
         rig.driver.wait(PATIENCE)
         events.append(_Event('SIGTERM', 0, at))
     frames = rig.frames()
+    stalls = replace(window, stalls=rig.stalls())
     limit = trace_file.longest_transaction(window.frames, rig.line)
     wire = _Wire(rig.line.protocol)
     found = {}
     for kind in dict.fromkeys(event.kind for event in events):
         seen = [_seen(event, frames, wire) for event in events if event.kind == kind]
-        delays = [delay for delay, _ in seen]
+        delays = [one.delay for one in seen]
+        longest = max(seen, key=lambda one: one.delay)
         found[kind] = {
             'events': len(seen),
             'time': 1e3 * statistics.median(delays),
             'p99': 1e3 * trace_file.percentile(delays, 99),
-            'longest': 1e3 * max(delays),
+            'longest': 1e3 * longest.delay,
             'limit': 1e3 * limit,
-            'longest_ratio': max(delays) / limit,
-            'beyond': 1e3 * (max(delays) - limit),
+            'longest_ratio': longest.delay / limit,
+            'beyond': 1e3 * (longest.delay - limit),
+            'stood_still': 1e3 * stalls.stood_still(longest.since, longest.delay),
             'others': window.figures()['others'],
         }
         if kind in _INJECTED:
-            found[kind]['polls'] = max(polls for _, polls in seen)
+            found[kind]['polls'] = max(one.polls for one in seen)
     return found
 
 
@@ -330,12 +349,12 @@ def _happen(ride: _Ride, kinds: Sequence[str], drives: int, count: int) -> Itera
         ride.mend(kind, unit)
 
 
-def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
-    """Return how long after its detection an event was answered (s), and polls until that."""
+def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> _Seen:
+    """Return how an event was answered."""
     stops = _stops(event, frames, wire)
     stop = next(frame.first for frame in stops if frame.first >= event.at)
     if event.kind not in _INJECTED:
-        return stop - event.at, 0
+        return _Seen(event.at, stop - event.at, 0)
     keys = (_MODE_KEY,) if event.kind == 'control mode changed' else (_STATUS, _INV_ST)
     asked = dict.fromkeys((_STATUS, *keys))
     before: dict[str, int] = {}
@@ -356,7 +375,7 @@ def _seen(event: _Event, frames: list[Frame], wire: _Wire) -> tuple[float, int]:
                 before[key] = word
     if not told:
         raise RuntimeError(f'{event}: nothing told it')
-    return stop - told[0], polls
+    return _Seen(told[0], stop - told[0], polls)
 
 
 def _tells(key: str, before: int | None, word: int) -> bool:

@@ -26,6 +26,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from concurrent.futures import as_completed
 import contextlib
 import ctypes
+import gc
 import sys
 import time
 import traceback
@@ -115,6 +116,10 @@ class DriverProcess:
 
     def start(self) -> None:
         """Open the port and let the nodes work."""
+        # nearly all of it stays: a search for garbage that looks at it again keeps every thread
+        # waiting, the worker of the bus too, for 25 ms here and for longer on a small computer
+        gc.collect()
+        gc.freeze()
         self._bus_node.start()
         self._context.setpoint_subscriber.start()
         for executor in self._executors:
