@@ -76,6 +76,7 @@ _ENABLED: tuple[Column, ...] = (
     ('cycle / limit', 'ratio', 3),
     ('plain limit, ms', 'plain', 1),
     ('cycle / plain limit', 'plain_ratio', 3),
+    ('polls and set-points / plain limit', 'polls_ratio', 3),
     *_CPU,
     _OTHERS,
 )

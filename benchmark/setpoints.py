@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 import json
 import statistics
 import subprocess
@@ -30,15 +31,21 @@ from row import Row
 import speed
 import trace_file
 from trace_file import Frame
+from trace_file import Line
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Status
 
 BAUD_RATE = 57600
 DRIVES = (1, 8, 32)
 _MODEL = load_family('sinus_g2')
-_SETPOINT, _SCMD = (
-    _MODEL[key].at('modbus').index for key in ('status.frq_set', 'fieldbus.scmd')
+_SETPOINT, _SCMD, _STATUS, *_POLLED = (
+    _MODEL[key].at('modbus').index
+    for key in (
+        *('status.frq_set', 'fieldbus.scmd', 'fieldbus.drive_status', 'fieldbus.inv_st'),
+        *('status.frq_act', 'status.spd_act', 'control.mode'),
+    )
 )
 #: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real
 #: conveyor; a machine that is busy elsewhere stops no motor.
@@ -75,18 +82,47 @@ def measure(drives: int, effort: Effort) -> list[Row]:
 
 
 def _all_follow(rig: DriverRig) -> bool:
-    written = trace_file.writes(rig.frames(), _SETPOINT)
-    return len({unit for _, unit, word in written if word}) == rig.drives
+    """Tell whether all drives have a set-point and say that they run at it."""
+    words: dict[int, int] = {}
+    for request, answer in pairwise(rig.frames()):
+        if _reads(request, answer, (_STATUS,)):
+            words[request.data[0]] = int.from_bytes(answer.data[3:5], 'big')
+    written = {unit for _, unit, word in trace_file.writes(rig.frames(), _SETPOINT) if word}
+    return len(written) == rig.drives and all(
+        words.get(unit, 0) & Status.SETPOINT_REACHED for unit in written
+    )
+
+
+def _reads(request: Frame, answer: Frame, registers: Sequence[int]) -> bool:
+    if not request.is_request or answer.is_request:
+        return False
+    return trace_file.read_register(request.data) in registers
 
 
 def _unchanged(rig: DriverRig, effort: Effort) -> Row:
     """Measure the cycle while the same set-points come again and again."""
     window = speed.watch(rig, rig.driver, effort)
     figures = speed.cycles(window, rig)
-    plain = 1e3 * rig.drives * speed.plain_cycle(rig.line)
-    figures.update(plain=plain, plain_ratio=figures['time'] / plain)
-    aims = {'ratio': 1.05, 'plain_ratio': 0.6}
+    plain = speed.plain_cycle(rig.line)
+    figures.update(
+        plain=1e3 * rig.drives * plain,
+        plain_ratio=figures['time'] / (1e3 * rig.drives * plain),
+        polls_ratio=_time_of_a_poll(window.frames, rig.line) / plain,
+    )
+    aims = {'ratio': 1.05, 'polls_ratio': 0.6}
     return Row('enabled', 'enabled, same set-points', BAUD_RATE, rig.drives, figures, aims)
+
+
+def _time_of_a_poll(frames: Sequence[Frame], line: Line) -> float:
+    """Return what polls and set-points take on the wire, for one status, s."""
+    seconds, statuses = 0.0, 0
+    for request, answer in pairwise(frames):
+        if _reads(request, answer, (_STATUS, *_POLLED)) or (
+            request.is_request and trace_file.written(request.data)[1] == _SETPOINT
+        ):
+            seconds += line.limit((request, answer))
+            statuses += _reads(request, answer, (_STATUS,))
+    return seconds / statuses
 
 
 def _saturated(rig: DriverRig, count: int) -> Row:

@@ -15,12 +15,14 @@
 """
 ``make mutants``: break the laws in copies of the project, one by one; each time a test must fail.
 
-A long campaign, and therefore not part of ``make test``.
+A long campaign, and therefore not part of ``make test``. Several are tried at once, for their
+tests wait more than they work.
 """
 
 from __future__ import annotations
 
 import argparse
+from concurrent.futures import ThreadPoolExecutor
 import os
 from pathlib import Path
 import shutil
@@ -40,16 +42,16 @@ def main() -> int:
     """Try every mutant; return 1 if one was not noticed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--only', default='', help='only those whose name contains this')
-    only = parser.parse_args().only
-    survivors = []
-    for mutant in MUTANTS:
-        if only not in str(mutant):
-            continue
-        noticed = _is_noticed(mutant)
-        print(f'{"noticed " if noticed else "SURVIVED"}  {mutant}', flush=True)
-        if not noticed:
-            survivors.append(mutant)
-    print(f'{len(survivors)} survived')
+    parser.add_argument('--jobs', type=int, default=(os.cpu_count() or 1) + 1, metavar='N')
+    options = parser.parse_args()
+    chosen = [mutant for mutant in MUTANTS if options.only in str(mutant)]
+    survivors = 0
+    with ThreadPoolExecutor(options.jobs) as executor:
+        # in the order of the list, whichever is through first
+        for mutant, noticed in zip(chosen, executor.map(_is_noticed, chosen), strict=True):
+            print(f'{"noticed " if noticed else "SURVIVED"}  {mutant}', flush=True)
+            survivors += not noticed
+    print(f'{len(chosen)} tried, {survivors} survived')
     return 1 if survivors else 0
 
 
