@@ -74,7 +74,7 @@ ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
 	@tools/run python $(PYTEST) -n 6 $(if $(WAY),--way $(WAY)) test/ros
 
-mutants: setup ## break each law in a copy and see that a test fails (a quarter of an hour)
+mutants: setup ## break each law in a copy and see that a test fails (half an hour)
 	@tools/run python test/mutants/run.py
 
 campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=3000)

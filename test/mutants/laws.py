@@ -138,6 +138,8 @@ LAWS = (
         '        if await self.method.in_control(Priority.SERVICE):\n            if seen',
         '        self._since = float("inf")\n        if False:\n            if seen',
         (NO_RESTART, '-k', 'restarted_driver'),
+        # a poll would find it, too
+        ((CONTROLLER, '            reason = Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
     ),
     Mutant(
         2,
@@ -251,6 +253,8 @@ LAWS = (
         'if drive is None or self._outside != threading.get_ident():',
         'if drive is None:',
         ('test/ros/test_parameters_follow.py',),
+        # what has not changed would not be written
+        ((WRITER, '        if before == data:', '        if False:'),),
     ),
     Mutant(
         7,
@@ -428,7 +432,7 @@ LAWS = (
         WATCH,
         '                period = min(period, patience * _KEEP_ALIVE_SHARE)',
         '                pass',
-        (WAYS_OUT, '-k', 'kept_alive'),
+        ('test/unit/drive/test_poll_schedule.py', '-k', 'kept_alive'),
     ),
     Mutant(
         9,

@@ -61,6 +61,8 @@ class Mutant:
     :ivar law: the number of the law in docs/architecture.md that it breaks.
     :ivar old: what stands in the file, once.
     :ivar tests: what has to fail, as arguments of pytest.
+    :ivar also: what else is broken, where one thing keeps the law without the other: file, what
+        stands there, what in its place.
     """
 
     law: int
@@ -69,6 +71,7 @@ class Mutant:
     old: str
     new: str
     tests: tuple[str, ...]
+    also: tuple[tuple[str, str, str], ...] = ()
 
     def __str__(self) -> str:
         return f'law {self.law}: {self.what}'

@@ -59,11 +59,11 @@ def _is_noticed(mutant: Mutant) -> bool:
     with tempfile.TemporaryDirectory(prefix='nfo_sinus_mutant_') as folder:
         copy = Path(folder) / 'copy'
         _copy_project(copy)
-        file = copy / mutant.file
-        text = file.read_text(encoding='utf-8')
-        if mutant.old not in text:
-            raise SystemExit(f'{mutant}: {mutant.file} does not say any more:\n{mutant.old}')
-        file.write_text(text.replace(mutant.old, mutant.new), encoding='utf-8')
+        for name, old, new in ((mutant.file, mutant.old, mutant.new), *mutant.also):
+            text = (copy / name).read_text(encoding='utf-8')
+            if old not in text:
+                raise SystemExit(f'{mutant}: {name} does not say any more:\n{old}')
+            (copy / name).write_text(text.replace(old, new), encoding='utf-8')
         # the processes that a test starts import the copy, too
         path = os.pathsep.join((str(copy), os.environ.get('PYTHONPATH', '')))
         done = subprocess.run(

@@ -353,3 +353,15 @@ def test_a_change_of_the_idle_rate_counts_at_once(make_virtual: MakeVirtual) -> 
     rig.drive.settings = dataclasses.replace(rig.drive.settings, idle_poll_rate=2.0)
     rig.pass_time(0.5)
     assert polls(rig, 5.0) <= 11
+
+
+def test_a_drive_that_stands_is_kept_alive_by_its_polls_alone(make_virtual: MakeVirtual) -> None:
+    rig = make_virtual(poll_rate=0.1, telemetry_rate=0.0, drive_timeout=2.0)
+    rig.ride()
+    rig.send(None)
+    assert rig.answer(rig.drive.stop()).startswith('stop')
+    rig.pass_time(25.0)
+    assert rig.drive.snapshot.status is not None
+    assert rig.drive.snapshot.status.from_bus, 'control is still ours, and that makes this a test'
+    assert not rig.drive.snapshot.status.faulted
+    assert 'enabled' in rig.answer(rig.drive.enable())
