@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
-import contextlib
 from dataclasses import replace
 import logging
 import math
@@ -134,6 +133,8 @@ class Poller:
         #: it beside a poll that waits for its turn.
         self._told: Reply | None = None
         self._urgent: Task | None = None
+        #: The newest status that has been judged.
+        self._judged: InverterStatus | None = None
         self._told_fault = 0
         self._conditions = Conditions(inverter)
         inverter.on_missed(self._look_soon)
@@ -160,9 +161,9 @@ class Poller:
         """
         Take a status word that the drive has told with something else, if it told one.
 
-        It is the answer to a look that waits for it; else it begins one at once, if it is news. On
-        a full line the poll may wait for its turn to read something else: what may have to stop the
-        motor is looked at beside it.
+        It is the answer to a look that waits for it; else, if it is news, the next poll comes at
+        once. On a full line that may wait for its turn to read something else, so what may have to
+        stop the motor is looked at beside it.
         """
         inverter, registers = self._inverter, self._registers
         if self._task is None or not inverter.connected or not reply.data:
@@ -177,16 +178,21 @@ class Poller:
         if inverter.seen is None or word == inverter.seen.word:
             return
         self._told = reply
-        if self._task.asleep:
-            self.wake()
-        elif self._alarming(inverter.told_by_word(word, reply.arrived)):
+        if self._alarming(inverter.told_by_word(word, reply.arrived)):
             self._look_beside()
+        else:
+            self.wake()
 
     def _look_beside(self) -> None:
         async def look() -> None:
-            # if it fails, the poll finds out, too
-            with contextlib.suppress(LinkError, DriveError):
+            try:
                 await self._look()
+            except Interrupted as error:
+                # told once only, so that nobody else would find out
+                self._begin_anew(error)
+            except (LinkError, DriveError):
+                # the poll finds out, too
+                return
 
         if self._urgent is None or self._urgent.future.done():
             self._urgent = self._bus.spawn(look())
@@ -195,10 +201,12 @@ class Poller:
         """Take note that the drive has started anew: it is lost until it is connected to again."""
         if self._task is None or not self._inverter.connected:
             return
-        # what is asked of it just now was begun before
+        self._begin_anew(DriveError(Cause.RESTARTED))
+
+    def _begin_anew(self, error: LinkError | DriveError) -> None:
+        """Take the drive for lost until it is connected to again; the poll was begun before."""
         self._bus.cancel(self._task)
-        self._bus.cancel(self._urgent)
-        self._lose(DriveError(Cause.RESTARTED))
+        self._lose(error)
         self._failures = 0
         self.begin()
 
@@ -229,7 +237,7 @@ class Poller:
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = None
-        self._told = None
+        self._told = self._judged = None
         self._inverter.polled.clear()
 
     async def _poll_for_ever(self) -> None:
@@ -359,6 +367,10 @@ class Poller:
         # both words of a status are of one moment, so they are repeated together
         seen = await self._insist(look)
         inverter.require_fresh(seen)
+        if self._judged is not None and seen.at < self._judged.at:
+            # a newer one has been judged beside it
+            return self._judged
+        self._judged = seen
         inverter.looked_at()
         told = self._controller is not None and self._controller.judge(seen)
         self._tell_fault(seen, told)
@@ -469,6 +481,7 @@ class Poller:
     def _lose(self, error: LinkError | DriveError) -> None:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
+        self._bus.cancel(self._urgent)
         inverter.lost()
         why = explain_failure(error, inverter)
         self._bus.recorder.cycle(self._unit, math.nan)

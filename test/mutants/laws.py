@@ -423,7 +423,7 @@ LAWS = (
         'what a drive tells with a set-point waits until the poll has its turn',
         WATCH,
         '            self._look_beside()\n',
-        '            pass\n',
+        '            self.wake()\n',
         ('test/unit/drive/test_set_point_with_status.py', '-k', 'full_line'),
     ),
     Mutant(
