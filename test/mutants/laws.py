@@ -456,7 +456,7 @@ LAWS = (
         'nfo_sinus_driver/drive/drive.py',
         '            if self._controller.method.keeps_control:',
         '            if False:',
-        (MOVITRAC_LAWS, '-k', 'clean_end'),
+        ('test/unit/drive/test_movitrac_timeout.py', '-k', 'clean_end'),
     ),
     Mutant(
         2,
