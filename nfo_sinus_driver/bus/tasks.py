@@ -19,8 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Coroutine
 from collections.abc import Generator
+from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import Future
+import contextlib
 from dataclasses import dataclass
 import enum
 import heapq
@@ -173,10 +175,23 @@ class Task:
         #: Tells timers of earlier pauses from that of the present one.
         self.pause = 0
         self.asleep = False
-        #: Tasks that wait for the end of this one.
-        self.joiners: list[Task] = []
+        self._joiners: list[Task] = []
         # nobody may cancel the future behind the worker's back
         self.future.set_running_or_notify_cancel()
+
+    @property
+    def joiners(self) -> tuple[Task, ...]:
+        """Tasks that wait for the end of this one."""
+        return tuple(self._joiners)
+
+    @contextlib.contextmanager
+    def joined_by(self, other: Task) -> Iterator[None]:
+        """Have another task wait for its end meanwhile."""
+        self._joiners.append(other)
+        try:
+            yield
+        finally:
+            self._joiners.remove(other)
 
     def cancel(self) -> None:
         """End it where it awaits: at once, or where it does so next if it is being stepped."""

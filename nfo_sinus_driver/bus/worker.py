@@ -251,11 +251,8 @@ class Bus:
         if not task.future.done():
             me = self._current
             assert me is not None, 'only for coroutines on the bus'
-            task.joiners.append(me)
-            try:
+            with task.joined_by(me):
                 await self.sleep(timeout)
-            finally:
-                task.joiners.remove(me)
         return task.future.done()
 
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
@@ -403,7 +400,7 @@ class Bus:
             return
         if awaited is None:
             self._tasks.discard(task)
-            for joiner in tuple(task.joiners):
+            for joiner in task.joiners:
                 self.wake(joiner)
             return
         self._tasks.add(task)

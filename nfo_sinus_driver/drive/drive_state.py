@@ -142,8 +142,8 @@ class DriveState:
         self.fault_is_fresh = False
         #: Measured values that were told to be impossible.
         self._told_impossible: set[str] = set()
-        #: What was polled last, by catalog key.
-        self.polled: dict[Role, Measured] = {}
+        #: What was polled last.
+        self._polled: dict[Role, Measured] = {}
         #: It changes its parameters itself just now.
         self.tuning = False
         self.control_mode = ''
@@ -258,7 +258,7 @@ class DriveState:
             frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
         except Refused:
             frequency = math.nan
-        self.polled[Role.ACTUAL_FREQUENCY] = Measured(frequency, time.monotonic())
+        self.polled(Role.ACTUAL_FREQUENCY, frequency)
         return self._saw(seen.with_frequency(frequency, self.seen))
 
     async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
@@ -419,9 +419,17 @@ class DriveState:
             self.tell(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
 
+    def polled(self, role: Role, value: float) -> None:
+        """Take note of what a poll has measured just now."""
+        self._polled[role] = Measured(value, time.monotonic())
+
+    def forget_polled(self) -> None:
+        """Take note that what was polled is not known of the drive that is there now."""
+        self._polled.clear()
+
     def last_polled(self, role: Role | None) -> Measured:
         """Return what a poll has measured last."""
-        return NOT_MEASURED if role is None else self.polled.get(role, NOT_MEASURED)
+        return NOT_MEASURED if role is None else self._polled.get(role, NOT_MEASURED)
 
     @property
     def frequency(self) -> float:

@@ -238,7 +238,7 @@ class Poller:
         self._failures = 0
         self._complaint = None
         self._told = self._judged = None
-        self._inverter.polled.clear()
+        self._inverter.forget_polled()
 
     async def _poll_for_ever(self) -> None:
         polled_at = -math.inf
@@ -415,7 +415,7 @@ class Poller:
             return inverter.frequency
         asked_at = time.monotonic()
         value = await self._read_measured(role)
-        inverter.polled[role] = Measured(value, time.monotonic())
+        inverter.polled(role, value)
         if role in inverter.model.roles:
             self._turn = time.monotonic() - asked_at
         return value

@@ -79,6 +79,8 @@ HISTORIES = (
         '        if await self.method.in_control(Priority.SERVICE):\n            if seen',
         '        self._since = float("inf")\n        if False:\n            if seen',
         G2_CONTROL,
+        # a poll would find it, too
+        ((CONTROLLER, '            reason = Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
     ),
     Mutant(
         2,

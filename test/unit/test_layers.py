@@ -196,15 +196,28 @@ def violations(path: str, source: str) -> list[str]:
     return found
 
 
+#: What changes a list, a dict or a set.
+CHANGES = frozenset(
+    ('append', 'clear', 'discard', 'extend', 'insert', 'pop', 'popleft', 'remove', 'update')
+)
+
+
 def foreign_writes(tree: ast.Module) -> Iterator[str]:
-    """What a module assigns to fields of objects that are not its own."""
+    """What a module changes of the fields of objects that are not its own."""
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Attribute) or not isinstance(node.ctx, ast.Store):
+        field: ast.AST | None = None
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, (ast.Store, ast.Del)):
+            field = node
+        elif isinstance(node, ast.Subscript) and isinstance(node.ctx, (ast.Store, ast.Del)):
+            field = node.value
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            field = node.func.value if node.func.attr in CHANGES else None
+        if not isinstance(field, ast.Attribute):
             continue
-        own = isinstance(node.value, ast.Name) and node.value.id in ('self', 'cls')
+        own = isinstance(field.value, ast.Name) and field.value.id in ('self', 'cls')
         # why an error came is one that was made here
-        if not own and node.attr != '__cause__':
-            yield ast.unparse(node)
+        if not own and field.attr != '__cause__':
+            yield ast.unparse(field)
 
 
 def circles(sources: dict[str, str]) -> set[frozenset[str]]:
@@ -285,6 +298,9 @@ def test_nobody_writes_the_fields_of_another_object() -> None:
         ('for task.asleep in x: other.count += 1', ['task.asleep', 'other.count']),
         ('with x as self.a, y as b.c: pass', ['b.c']),
         ('error.__cause__ = error', []),
+        ('self.a[0] = a[0] = a.append(1)', []),
+        ('del self.a.b[0]; a.b[0] = 1', ['self.a.b', 'a.b']),
+        ('self.a.clear(); self.a.b.append(1); a.b.get(1)', ['self.a.b']),
     ],
 )
 def test_written_fields_of_others_are_found(source: str, fields: list[str]) -> None:
