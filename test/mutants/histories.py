@@ -231,8 +231,8 @@ HISTORIES = (
         3,
         'a tuning that refuses the stop is taken for a motor that stands',
         SEQUENCE,
-        '        if seen.tuning:\n',
-        '        if False:\n',
+        '        if seen.tuning and refusal:\n',
+        '        if refusal and seen.tuning:\n            return None\n        if False:\n',
         STOP_CONFIRMED,
     ),
     Mutant(
@@ -298,6 +298,8 @@ HISTORIES = (
         '        if self._reasons > reasons:\n',
         '        if False:\n',
         STOP_CONFIRMED,
+        # a status from before the stop is waited out, too
+        ((SEQUENCE, '            self._told_at = math.inf\n            self._reasons += 1\n', ''),),
     ),
     Mutant(
         2,
@@ -321,7 +323,15 @@ HISTORIES = (
         MAIN,
         '            if self._may_be_there(node) and not',
         '            if node.managed.drive.identity is not None and not',
-        ('test/ros/test_no_false_success.py', '-k', 'before_the_first_answer'),
+        ('test/ros/test_no_false_success.py', '-k', 'only_answer'),
+        # who does not release the drive does not learn it either
+        (
+            (
+                MAIN,
+                '            elif node.managed.drive.heard:',
+                '            elif node.managed.drive.identity is not None:',
+            ),
+        ),
     ),
     # what reading the controller has found
     Mutant(

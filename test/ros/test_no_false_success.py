@@ -164,6 +164,21 @@ def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(benc
         _run_by_another(bench)
 
 
+def test_an_exit_after_the_only_answer_of_a_drive_is_no_success(bench: Bench) -> None:
+    drive = bench.simulator(*bench.drives.ramps(0.5))
+    _run_by_another(bench)
+    asked = _frames_of_before(bench)
+    # it takes several answers until it is known which drive it is
+    drive.inject('delay', 10, 0.4)
+    driver = bench.driver('-p', 'response_timeout:=1.0')
+    wait_until(lambda: len(bench.frames()) > asked + 1, 'the first answer')
+    drive.inject('line-dead', PATIENCE)
+    driver.signal(signal.SIGTERM)
+    assert driver.wait() == 1, driver.text
+    assert 'WITHOUT a confirmed stop' in driver.text
+    assert drive.state()['turning'], 'the drive runs on, and that makes this a test'
+
+
 def _frames_of_before(bench: Bench) -> int:
     """Return how many there are when what the driver that was killed has sent has arrived."""
     counts: list[int] = []
