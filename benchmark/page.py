@@ -91,6 +91,7 @@ _DELAYS: tuple[Column, ...] = (
 )
 _EVENTS: tuple[Column, ...] = (
     *_DELAYS,
+    ("of that in the sender's call, ms", 'in_sender', 1),
     ('never came', 'lost', 0),
     ('gaps < t3.5', 'short_gaps', 0),
     ('CPU, % of a core', 'cpu', 1),

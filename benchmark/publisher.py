@@ -16,9 +16,9 @@
 Publishes set-points at random moments and says when; a process of its own.
 
 Each drive gets one in its turn. Prints one JSON list: moment (s of the steady clock), number of
-the drive, value. Then it waits to be ended. With a count of 0 all drives get the same set-point
-again and again, until it is ended. Before, all get it for a while that is not counted: the first
-message of a new publisher waits until the driver's side of the middleware knows it.
+the drive, value, how long the call took (s). Then it waits to be ended. With a count of 0 all drives get the same set-point
+again and again, until it is ended. Before, all get it once, which is not counted: the first message
+of a new publisher waits until the driver's side of the middleware knows it.
 """
 
 from __future__ import annotations
@@ -63,19 +63,22 @@ def main() -> None:
         if time.monotonic() > deadline:
             raise SystemExit('not every drive listens to its set-points')
         time.sleep(0.05)
-    known_at = time.monotonic() + _DISCOVERY
-    while not options.count or time.monotonic() < known_at:
+    while True:
         for publisher in publishers:
             publisher.publish(Float32(data=_SAME))
+        if options.count:
+            break
         time.sleep(_SAME_PERIOD)
+    time.sleep(_DISCOVERY)
     chance = random.Random()
     published = []
     for number in range(options.count):
         time.sleep(chance.uniform(*_PERIODS))
         drive = number % len(publishers)
         message = Float32(data=VALUES[number % len(VALUES)])
-        published.append((time.monotonic(), drive, message.data))
+        at = time.monotonic()
         publishers[drive].publish(message)
+        published.append((at, drive, message.data, time.monotonic() - at))
     time.sleep(1.0)
     print(json.dumps(published), flush=True)
     # whoever reads it wants to know what this process has cost

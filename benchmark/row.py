@@ -29,7 +29,7 @@ Figures = dict[str, float]
 _NEVER = ('short_gaps', 'lost')
 _SUMMED = (*_NEVER, 'events')
 #: The longest that any event of any run took.
-_WORST = ('longest', 'longest_ratio', 'beyond', 'stood_still', 'polls')
+_WORST = ('longest', 'longest_ratio', 'beyond', 'in_sender', 'stood_still', 'polls')
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ import json
 import statistics
 import subprocess
 from typing import Any
+from typing import NamedTuple
 
 from driver_rig import DriverRig
 from rig import Window
@@ -57,6 +58,19 @@ _LOST = 1.5
 #: Of the 99th percentile with eight drives, ms; with more, the longest read of a poll beside it.
 _MOST = 10.0
 _TRANSACTION = 6.75
+
+
+class _Delay(NamedTuple):
+    """
+    How long something took to the line.
+
+    :ivar since: when it was called, s.
+    :ivar in_sender: how long the call itself took, in the process of the caller, s.
+    """
+
+    since: float
+    seconds: float
+    in_sender: float
 
 
 def measure_idle(effort: Effort) -> list[Row]:
@@ -169,12 +183,10 @@ def _done_by(rig: DriverRig, script: str, count: int) -> tuple[list[Any], Window
     return json.loads(output), window
 
 
-def _delay_figures(
-    begun: Sequence[tuple[float, float]], window: Window, rig: DriverRig
-) -> Figures:
-    """Return the figures of delays, of which each is when it began and how long it was, s."""
+def _delay_figures(found: Sequence[_Delay], window: Window, rig: DriverRig) -> Figures:
     limit = trace_file.longest_transaction(window.frames, rig.line)
-    delays = [delay for _, delay in begun]
+    delays = [one.seconds for one in found]
+    longest = max(found, key=lambda one: one.seconds)
     return {
         'events': len(delays),
         'time': 1e3 * statistics.median(delays),
@@ -182,21 +194,23 @@ def _delay_figures(
         'longest': 1e3 * max(delays),
         'limit': 1e3 * limit,
         'beyond': 1e3 * (max(delays) - limit),
-        'stood_still': 1e3 * window.stood_still(*max(begun, key=lambda one: one[1])),
+        'in_sender': 1e3 * longest.in_sender,
+        'stood_still': 1e3 * window.stood_still(longest.since, longest.seconds),
         **window.figures(),
     }
 
 
 def _delays(
-    published: Sequence[tuple[float, int, float]], frames: list[Frame]
-) -> tuple[list[tuple[float, float]], int]:
-    """Return when each set-point began and how long it took to the line, s; how many never came."""
+    published: Sequence[tuple[float, int, float, float]], frames: list[Frame]
+) -> tuple[list[_Delay], int]:
+    """Return how long each set-point took to the line, and how many did not come there."""
     written: dict[tuple[int, int], list[float]] = {}
     for at, unit, word in trace_file.writes(frames, _SETPOINT):
         written.setdefault((unit, word), []).append(at)
     delays = []
-    for at, drive, value in published:
+    for at, drive, value, took in published:
         word = int.from_bytes(_MODEL['status.frq_set'].quantise(value, 'modbus'), 'big')
         moments = written.get((drive + 1, word), ())
-        delays += [(at, moment - at) for moment in moments if at <= moment < at + _LOST][:1]
+        came = (moment for moment in moments if at <= moment < at + _LOST)
+        delays += [_Delay(at, moment - at, took) for moment in came][:1]
     return delays, len(published) - len(delays)

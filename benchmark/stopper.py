@@ -16,7 +16,8 @@
 Stops drives at random moments by their service and says when; a process of its own.
 
 Each drive is stopped in its turn and enabled again. Prints one JSON list: moment of the call (s of
-the steady clock), number of the drive. Then it waits to be ended.
+the steady clock), number of the drive, how long the middleware took to send the request (s). Then
+it waits to be ended.
 """
 
 from __future__ import annotations
@@ -69,20 +70,23 @@ def main() -> None:
     for number in range(options.count):
         drive, stop, enable = drives[number % len(drives)]
         time.sleep(random.uniform(*_PAUSES))
-        called.append((time.monotonic(), drive))
-        _call(node, stop, Trigger.Request())
+        at = time.monotonic()
+        called.append((at, drive, _call(node, stop, Trigger.Request()) - at))
         _call(node, enable, SetBool.Request(data=True))
     print(json.dumps(called), flush=True)
     # whoever reads it wants to know what this process has cost
     signal.pause()
 
 
-def _call(node: rclpy.node.Node, client: Client, request: Any) -> None:
+def _call(node: rclpy.node.Node, client: Client, request: Any) -> float:
+    """Call a service; return when the request was sent."""
     future = client.call_async(request)
+    sent_at = time.monotonic()
     rclpy.spin_until_future_complete(node, future, timeout_sec=_PATIENCE)
     response = future.result()
     if response is None or not response.success:
         raise SystemExit(f'{client.srv_name}: {response}')
+    return sent_at
 
 
 if __name__ == '__main__':
