@@ -16,9 +16,10 @@
 Publishes set-points at random moments and says when; a process of its own.
 
 Each drive gets one in its turn. Prints one JSON list: moment (s of the steady clock), number of
-the drive, value, how long the call took (s). Then it waits to be ended. With a count of 0 all drives get the same set-point
-again and again, until it is ended. Before, all get it once, which is not counted: the first message
-of a new publisher waits until the driver's side of the middleware knows it.
+the drive, value, how long the call took (s). Then it waits to be ended. With a count of 0 all
+drives get the same set-point again and again, until it is ended. Before, all get it once, which is
+not counted: the first message of a new publisher waits until the driver's side of the middleware
+knows it.
 """
 
 from __future__ import annotations

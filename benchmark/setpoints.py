@@ -154,7 +154,8 @@ def _stops(rig: DriverRig, count: int) -> Row:
         if word == Scmd.STOP:
             stops.setdefault(unit, []).append(at)
     delays = [
-        (call, next(at for at in stops[drive + 1] if at >= call) - call) for call, drive in called
+        _Delay(call, next(at for at in stops[drive + 1] if at >= call) - call, took)
+        for call, drive, took in called
     ]
     figures = _delay_figures(delays, window, rig)
     return Row('event', 'service stop', BAUD_RATE, rig.drives, figures, {'beyond': 3.0})
