@@ -17,9 +17,7 @@ Publishes set-points at random moments and says when; a process of its own.
 
 Each drive gets one in its turn. Prints one JSON list: moment (s of the steady clock), number of
 the drive, value, how long the call took (s). Then it waits to be ended. With a count of 0 all
-drives get the same set-point again and again, until it is ended. Before, all get it once, which is
-not counted: the first message of a new publisher waits until the driver's side of the middleware
-knows it.
+drives get the same set-point again and again, until it is ended.
 """
 
 from __future__ import annotations
@@ -43,8 +41,6 @@ VALUES = [5.0 + 0.5 * step for step in range(61)]
 #: The set-point that does not change, Hz, and how often each drive gets it, s.
 _SAME = 20.0
 _SAME_PERIOD = 0.1
-#: How long a new publisher may take to be known to the driver, s: most take 0.3.
-_DISCOVERY = 2.0
 
 
 def main() -> None:
@@ -64,13 +60,10 @@ def main() -> None:
         if time.monotonic() > deadline:
             raise SystemExit('not every drive listens to its set-points')
         time.sleep(0.05)
-    while True:
+    while not options.count:
         for publisher in publishers:
             publisher.publish(Float32(data=_SAME))
-        if options.count:
-            break
         time.sleep(_SAME_PERIOD)
-    time.sleep(_DISCOVERY)
     chance = random.Random()
     published = []
     for number in range(options.count):

@@ -109,8 +109,9 @@ class Rig(contextlib.ExitStack):
                 *('--boot-time', '0', *addresses),
             )
             self.wait_for(lambda: 'serving' in self.log, simulator)
-            for core in os.sched_getaffinity(0):
-                self.start_script('stalls.py', str(core), output=self._stalls)
+            with self._stalls.open('ab') as stalls:
+                for core in os.sched_getaffinity(0):
+                    self.start_script('stalls.py', str(core), stdout=stalls.fileno())
             failing.pop_all()
 
     @property
@@ -118,15 +119,13 @@ class Rig(contextlib.ExitStack):
         """What all processes said."""
         return self._log.read_text(errors='replace')
 
-    def start(
-        self, *command: str, stdout: int | None = None, output: Path | None = None
-    ) -> subprocess.Popen[str]:
-        """Start a process that ends with the rig; what it prints goes to the log, or a file."""
-        with self._log.open('ab') as log, (output or self._log).open('ab') as out:
+    def start(self, *command: str, stdout: int | None = None) -> subprocess.Popen[str]:
+        """Start a process that ends with the rig."""
+        with self._log.open('ab') as log:
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=out if stdout is None else stdout,
+                stdout=log if stdout is None else stdout,
                 stderr=log,
                 text=True,
                 start_new_session=True,
@@ -135,16 +134,9 @@ class Rig(contextlib.ExitStack):
         self.callback(_end, process)
         return process
 
-    def start_script(
-        self,
-        name: str,
-        *arguments: str,
-        stdout: int | None = None,
-        output: Path | None = None,
-    ) -> subprocess.Popen[str]:
+    def start_script(self, name: str, *arguments: str, **how: int) -> subprocess.Popen[str]:
         """Start one of the programs beside this one."""
-        command = (sys.executable, str(FOLDER / name), *arguments)
-        return self.start(*command, stdout=stdout, output=output)
+        return self.start(sys.executable, str(FOLDER / name), *arguments, **how)
 
     def watch(self, process: subprocess.Popen[str], seconds: float) -> Window:
         """Let time pass; return what the line carried and what the process cost meanwhile."""

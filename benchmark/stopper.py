@@ -63,8 +63,7 @@ def main() -> None:
             if not client.wait_for_service(_PATIENCE):
                 raise SystemExit(f'there is no service {client.srv_name}')
     # the first request of a new client waits until the driver knows it
-    for _, stop, enable in drives:
-        _call(node, stop, Trigger.Request())
+    for _, _, enable in drives:
         _call(node, enable, SetBool.Request(data=True))
     called = []
     for number in range(options.count):

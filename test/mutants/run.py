@@ -36,7 +36,7 @@ from mutants import MUTANTS
 _ROOT = Path(__file__).resolve().parents[2]
 _PYTEST = (sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', '-p', 'timeout')
 _FAILED = 1
-_NOTICED = 'noticed '
+_NOTICED = 'noticed'
 
 
 def main() -> int:
@@ -50,7 +50,7 @@ def main() -> int:
     with ThreadPoolExecutor(options.jobs) as executor:
         # in the order of the list, whichever is through first
         for mutant, result in zip(chosen, executor.map(_try, chosen), strict=True):
-            print(f'{result}  {mutant}', flush=True)
+            print(f'{result:8}  {mutant}', flush=True)
             failures += result != _NOTICED
     print(f'{len(chosen)} mutants, {failures} not noticed')
     return 1 if failures else 0

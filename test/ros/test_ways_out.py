@@ -165,7 +165,8 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
 @needs('timeout')
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
-    # without telemetry, and with a poll every five seconds, little else is said
+    # what keeps it alive is polls, and parameters that are read again; polls alone have a test of
+    # their own (test_poll_schedule)
     settings = ('drive_timeout:=2.0', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
     bench.driver(*(word for setting in settings for word in ('-p', setting)))
     client = bench.client().connected()

@@ -198,7 +198,10 @@ def violations(path: str, source: str) -> list[str]:
 
 #: What changes a list, a dict or a set.
 CHANGES = frozenset(
-    ('append', 'clear', 'discard', 'extend', 'insert', 'pop', 'popleft', 'remove', 'update')
+    (
+        *('add', 'append', 'appendleft', 'clear', 'discard', 'extend', 'insert', 'pop', 'popitem'),
+        *('popleft', 'remove', 'setdefault', 'sort', 'update'),
+    )
 )
 
 

@@ -21,12 +21,12 @@ import dataclasses
 import itertools
 
 from any_order_rig import Notes
+from neighbour import neighbour
 import pytest
 from support.addresses import register
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
-from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
@@ -73,11 +73,11 @@ def fast(make_virtual: MakeVirtual, **settings: object) -> VirtualRig:
     )
 
 
-async def busy(rig: VirtualRig) -> None:
-    """Read something again and again, as other drives of a line are read."""
+def full_line(rig: VirtualRig) -> None:
+    """Let as many others be read as a full line has."""
     voltage = register(rig.register('status.u_rms'))
-    while True:
-        await rig.bus.read(1, voltage, Priority.POLL)
+    for _ in range(31):
+        rig.bus.run(neighbour(rig.bus, voltage))
 
 
 def per_poll(rig: VirtualRig, seconds: float) -> float:
@@ -103,12 +103,11 @@ def test_a_poll_takes_two_transactions_on_a_full_line_too(make_virtual: MakeVirt
     rig = fast(make_virtual)
     rig.ride()
     voltage = rig.register('status.u_rms')
-    neighbours = [rig.bus.run(busy(rig)) for _ in range(31)]
+    full_line(rig)
     rig.pass_time(2.0)
     begun = len(rig.link.frames)
     rig.pass_time(30.0)
     asked = reads(rig, begun)
-    assert not any(neighbour.done() for neighbour in neighbours)
     ours = sum(asked.values()) - asked[voltage]
     assert ours / asked[STATUS] <= 0.60 * 4
     assert asked[SPEED] >= asked[STATUS] / 8
@@ -164,12 +163,11 @@ def test_a_motor_that_comes_to_a_stop_is_told_to_stand_in_both_units_at_once(
     rig.send(600.0)
     rig.pass_time(1.0)
     rig.send(None)
-    # a full line, where a turn takes long
-    neighbours = [rig.bus.run(busy(rig)) for _ in range(31)]
+    # where a turn takes long
+    full_line(rig)
     rig.drive.stop()
     kept = keep(rig)
     rig.pass_time(10.0)
-    assert not any(neighbour.done() for neighbour in neighbours)
     stands = [snapshot for _, snapshot in kept.told if snapshot.speed == 0]
     assert stands
     assert all(snapshot.frequency == 0 for snapshot in stands)

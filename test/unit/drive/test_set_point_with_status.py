@@ -18,13 +18,11 @@ from __future__ import annotations
 
 import pytest
 from support.addresses import Words
-from support.addresses import register
 from support.wire import Request
 from support.wire import understand
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
 
-from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator.modbus import server
@@ -281,44 +279,3 @@ def test_a_set_point_that_somebody_else_changed_is_written_again(make_virtual: M
     server(rig.far).write(SETPOINT, (300,))
     rig.pass_time(6.0)
     assert abs(rig.far.motor.frequency - 20.0) < 0.2
-
-
-async def neighbour(rig: VirtualRig) -> None:
-    """Read something again and again, as another drive of the line is read."""
-    voltage = register(rig.register('status.u_rms'))
-    while True:
-        await rig.bus.read(1, voltage, Priority.POLL)
-
-
-@pytest.mark.parametrize('event', ['fault', 'RUN input', 'keypad'])
-@pytest.mark.parametrize('turns', range(0, 40, 7))
-def test_on_a_full_line_too_whatever_the_poll_waits_for(
-    make_virtual: MakeVirtual, event: str, turns: int
-) -> None:
-    rig = make_virtual(
-        variant={'refuses_in_fault': NOTHING}, poll_rate=0.0, telemetry_rate=0.0
-    )
-    rig.ride(20.0)
-    rig.send(None)
-    for _ in range(15):
-        rig.bus.run(neighbour(rig))
-    # the poll waits for its turn, for one value or another
-    for _ in range(100 + turns):
-        rig.bus.step()
-    assert rig.drive.armed
-    if event == 'fault':
-        rig.far.trip(OVERLOAD)
-    elif event == 'RUN input':
-        rig.far.control_unit.run_input = False
-    else:
-        rig.far.control_unit.press('stop')
-    rig.far.advance(0.01)
-    begun = len(rig.link.frames)
-    rig.drive.set_setpoint(30.0)
-    for _ in range(10):
-        rig.bus.step()
-    asked = [(one.place, one.words) for one in frames(rig)[begun:]]
-    told = asked.index((SETPOINT, (300,)))
-    # two of them are as many as the status has parts
-    assert (SCMD, (0,)) in asked[told : told + 4]
-    assert not rig.drive.armed
