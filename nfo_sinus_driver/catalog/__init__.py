@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.family import example_setting
 from nfo_sinus_driver.catalog.family import families
 from nfo_sinus_driver.catalog.family import load_family
+from nfo_sinus_driver.catalog.family import load_parameter
 from nfo_sinus_driver.catalog.family import load_profile
 from nfo_sinus_driver.catalog.family import usual_family
 from nfo_sinus_driver.catalog.inverter_status import InverterStatus
@@ -83,6 +84,7 @@ __all__ = [
     'example_setting',
     'families',
     'load_family',
+    'load_parameter',
     'load_profile',
     'to_bytes',
     'to_words',

@@ -22,6 +22,7 @@ More folders are found where the search path of that package, its ``__path__``, 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -216,32 +217,30 @@ def load_family(name: str, method: str = '') -> Family:
 
 
 @functools.cache
+def load_parameter(name: str, role: Role) -> Parameter | None:
+    """
+    Read the parameter of a drive family that has a role, and no other: all tables take memory.
+
+    :return: ``None`` if none has that role.
+    :raises ValueError: there is no such family; the message lists those there are.
+    :raises CatalogError: what is said of this parameter contradicts itself.
+    """
+    load_profile(name)
+    _, folder = _place(name, '')
+    keys = _keys(folder)
+    key = _roles(folder, keys).get(role)
+    return _parameters(folder, keys, key)[key] if key else None
+
+
+@functools.cache
 def _read_family(name: str, method: str = '') -> Family:
     profile = load_profile(name, method)
     _, folder = _place(name, method)
-    keys = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
-    addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
-
-    def known(row: table.Row) -> str:
-        if row['parameter'] not in addresses:
-            raise ValueError(f'no parameter is {row["parameter"]}')
-        return row['parameter']
-
-    def address(row: table.Row) -> tuple[str, Address]:
-        return known(row), _address(row)
-
-    def role(row: table.Row) -> tuple[Role, str]:
-        return Role(row['role']), known(row)
-
-    def parameter(row: table.Row) -> Parameter:
-        return _parameter(row, addresses[row['parameter']])
-
-    for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes):
-        addresses[key][found.protocol] = found
-    parameters = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key])
-    roles = table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]])
+    keys = _keys(folder)
+    parameters = _parameters(folder, keys)
+    roles = _roles(folder, keys)
     for needed in _needed_roles(profile):
-        if needed not in dict(roles):
+        if needed not in roles:
             raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
 
@@ -249,19 +248,53 @@ def _read_family(name: str, method: str = '') -> Family:
         found = _area(row)
         for entry in range(found.limit):
             for _, key in found.readings_of(entry):
-                known({'parameter': key})
+                _known(key, keys)
         return found
 
     log = folder / 'error_log.csv'
     logs = table.read(log, area, lambda row: [row.protocol]) if log.exists() else []
     return Family(
         name=name,
-        parameters={row.key: row for row in parameters},
-        roles=dict(roles),
+        parameters=parameters,
+        roles=roles,
         status_codes={row.code: row for row in codes},
         error_logs={row.protocol: row for row in logs},
         profile=profile,
     )
+
+
+def _keys(folder: Path) -> Collection[str]:
+    rows = table.read(folder / 'parameters.csv', lambda row: row['parameter'], lambda key: [key])
+    return dict.fromkeys(rows)
+
+
+def _known(key: str, keys: Collection[str]) -> str:
+    if key not in keys:
+        raise ValueError(f'no parameter is {key}')
+    return key
+
+
+def _parameters(folder: Path, keys: Collection[str], only: str = '') -> Mapping[str, Parameter]:
+    """Read the parameters of a folder, or only one of them."""
+    addresses: dict[str, dict[str, Address]] = {key: {} for key in keys}
+
+    def address(row: table.Row) -> tuple[str, Address]:
+        return _known(row['parameter'], keys), _address(row)
+
+    def parameter(row: table.Row) -> Parameter:
+        return _parameter(row, addresses[row['parameter']])
+
+    for key, found in table.read(folder / 'addresses.csv', address, _what_it_takes, only):
+        addresses[key][found.protocol] = found
+    rows = table.read(folder / 'parameters.csv', parameter, lambda row: [row.key], only)
+    return {row.key: row for row in rows}
+
+
+def _roles(folder: Path, keys: Collection[str]) -> Mapping[Role, str]:
+    def role(row: table.Row) -> tuple[Role, str]:
+        return Role(row['role']), _known(row['parameter'], keys)
+
+    return dict(table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]]))
 
 
 def _needed_roles(profile: Profile) -> Iterator[Role]:

@@ -32,12 +32,18 @@ class CatalogError(Exception):
     """A table contradicts itself; the message names the file and the line."""
 
 
-def read(path: Path, parse: Callable[[Row], _T], unique: Callable[[_T], Iterable[str]]) -> list[_T]:
+def read(
+    path: Path,
+    parse: Callable[[Row], _T],
+    unique: Callable[[_T], Iterable[str]],
+    only: str = '',
+) -> list[_T]:
     """
     Read a table.
 
     :param parse: makes something of a row; ``KeyError`` and ``ValueError`` say what is wrong.
     :param unique: names what no two rows may share.
+    :param only: the key of the one parameter whose rows are wanted; ``''``: all rows are.
     :raises CatalogError: there is no such file, or a row is wrong, or says what another one has.
     """
     found: list[_T] = []
@@ -51,6 +57,8 @@ def read(path: Path, parse: Callable[[Row], _T], unique: Callable[[_T], Iterable
         for row in rows:
             if None in row or None in row.values():
                 raise ValueError('too many or too few columns')
+            if only and row['parameter'] != only:
+                continue
             made = parse(row)
             for name in unique(made):
                 if name in lines:

@@ -26,7 +26,7 @@ from nfo_sinus_driver.catalog import ControlMethod
 from nfo_sinus_driver.catalog import Profile
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import load_parameter
 from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.catalog import usual_family
 from nfo_sinus_driver.link import PROTOCOLS
@@ -70,8 +70,7 @@ def _own_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
     """Return the longest time-out of a model's own, and its step, s; of all while not known."""
     found = []
     for name in families() if model == AUTO else (model,):
-        family = load_family(name)
-        parameter = family.get(family.key(Role.COMMUNICATION_TIMEOUT))
+        parameter = load_parameter(name, Role.COMMUNICATION_TIMEOUT)
         if parameter is not None:
             protocol = next(iter(parameter.addresses))
             found.append((parameter.span(protocol)[1], parameter.step(protocol)))

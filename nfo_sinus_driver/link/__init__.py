@@ -33,8 +33,8 @@ from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Supervision
 from nfo_sinus_driver.link.interface import Watch
-from nfo_sinus_driver.link.protocols import BIT_RATES
-from nfo_sinus_driver.link.protocols import PROTOCOLS
+from nfo_sinus_driver.link.line_protocols import BIT_RATES
+from nfo_sinus_driver.link.line_protocols import PROTOCOLS
 from nfo_sinus_driver.link.protocols import line_settings
 from nfo_sinus_driver.link.protocols import open_link
 from nfo_sinus_driver.link.reconnect import Reconnect

@@ -24,7 +24,6 @@ from dataclasses import replace
 import re
 import time
 
-from nfo_sinus_driver.link import lawicel
 from nfo_sinus_driver.link import nmt
 from nfo_sinus_driver.link import sdo
 from nfo_sinus_driver.link.can import FUNCTION_CODE
@@ -34,7 +33,6 @@ from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
 from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
@@ -43,6 +41,7 @@ from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
+from nfo_sinus_driver.link.line_protocols import CANOPEN
 from nfo_sinus_driver.link.object_shapes import SECOND
 from nfo_sinus_driver.link.object_shapes import ObjectShapes
 from nfo_sinus_driver.link.port import port_of
@@ -100,18 +99,7 @@ class CanopenLink:
     """
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
-    protocol = LineProtocol(
-        name='canopen',
-        addressing='canopen',
-        units=range(1, 128),
-        baud_rate=125_000,
-        char_format='8N1',
-        baud_rates=tuple(lawicel.BIT_RATES),
-        identifies=True,
-        rates_disturb=True,
-        check='power, the node id, the bit rate, CAN_H and CAN_L, 120 ohms at each end of the bus '
-        'and nowhere else, and that the interface is up (ip -details link show)',
-    )
+    protocol = CANOPEN
 
     def __init__(self, port: CanPort, settings: LineSettings) -> None:
         self._port = port

@@ -29,11 +29,8 @@ from operator import xor
 
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import Refused
-
-#: The address at which a drive answers whatever its own is; for a drive alone on the line.
-POINT_TO_POINT = 0
-#: The address that all drives obey and none answers.
-BROADCAST = 95
+from nfo_sinus_driver.link.line_protocols import BROADCAST
+from nfo_sinus_driver.link.line_protocols import POINT_TO_POINT
 
 #: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
 PREPARED = 1024

@@ -23,7 +23,6 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link.classic import BROADCAST
 from nfo_sinus_driver.link.classic import INV_ST
 from nfo_sinus_driver.link.classic import MODE
 from nfo_sinus_driver.link.classic import SIO_ERR
@@ -38,7 +37,6 @@ from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
@@ -47,6 +45,8 @@ from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.line_protocols import BROADCAST
+from nfo_sinus_driver.link.line_protocols import CLASSIC
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
 
@@ -109,16 +109,7 @@ class ClassicLink:
     supervision = None
     #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
     #: [M0 §6.1.2], [C10].
-    protocol = LineProtocol(
-        name='classic',
-        addressing='classic',
-        units=range(classic.POINT_TO_POINT, BROADCAST),
-        baud_rate=9600,
-        char_format='7E1',
-        char_formats=('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1'),
-        broadcast=BROADCAST,
-        point_to_point=classic.POINT_TO_POINT,
-    )
+    protocol = CLASSIC
 
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port

@@ -29,8 +29,7 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.interface import LineProtocol
-from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.line_protocols import MODBUS_ASCII
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.serial_link import SerialLink
@@ -119,16 +118,7 @@ class AsciiLink(SerialLink):
     would leave the line unused for that, so no pause may be longer than it may take to begin one.
     """
 
-    protocol = LineProtocol(
-        name='modbus_ascii',
-        addressing='modbus',
-        units=UNITS,
-        baud_rate=19200,
-        char_format='7E1',
-        char_formats=('7E1', '7O1', '7N2', '7N1', '7E2', '7O2'),
-        identifies=True,
-        writes_and_reads=True,
-    )
+    protocol = MODBUS_ASCII
 
     @property
     def _gap(self) -> float:

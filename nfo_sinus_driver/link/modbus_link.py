@@ -34,9 +34,6 @@ from nfo_sinus_driver.link.modbus_pdu import Write
 from nfo_sinus_driver.link.modbus_pdu import read_of
 from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
 
-#: The addresses of drives [M0 §6.2.2].
-UNITS = range(1, 248)
-
 _T = TypeVar('_T')
 
 

@@ -38,7 +38,6 @@ from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import GatewaySilent
-from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
@@ -46,7 +45,7 @@ from nfo_sinus_driver.link.interface import NoPath
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.line_protocols import MODBUS_TCP
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import understand
@@ -114,17 +113,7 @@ class TcpLink(ModbusLink):
     :param response_timeout: from a request sent to its answer, s.
     """
 
-    protocol = LineProtocol(
-        name='modbus_tcp',
-        addressing='modbus',
-        units=UNITS,
-        # the line behind a gateway is set in the gateway
-        baud_rate=19200,
-        char_format='8E1',
-        identifies=True,
-        writes_and_reads=True,
-        carries=frozenset((telegram.ADDRESSING,)),
-    )
+    protocol = MODBUS_TCP
 
     def __init__(self, host: str, port: int, response_timeout: float) -> None:
         self._host = host

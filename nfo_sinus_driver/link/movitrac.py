@@ -26,8 +26,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-#: The addresses that a drive may have (P842) [M4 §2.3.1].
-UNITS = range(64)
+from nfo_sinus_driver.link.line_protocols import MOVITRAC
+
 #: How many bytes a value has: of a plain frame, and of a long one.
 SIZES = (4, 8)
 #: Bytes of LONG_DATA, the longest answer.
@@ -131,8 +131,7 @@ def encode(message: Message) -> bytes:
         start = _start(message.value, _DATA, _LONG_DATA)
         body = bytes((start,)) + _word(message.index) + message.value
     else:
-        if message.unit not in UNITS:
-            raise ValueError(f'address {message.unit}: there are {UNITS[0]} to {UNITS[-1]}')
+        MOVITRAC.require_unit(message.unit)
         value = message.value if isinstance(message, Select) else b''
         start = _start(value, _SELECT, _LONG_SELECT) if isinstance(message, Select) else _ENQUIRY
         body = bytes((start, message.unit)) + _word(message.index) + value
@@ -165,7 +164,7 @@ def decode(data: bytes) -> Message | None:
     if start in (_DATA, _LONG_DATA):
         return Data(int.from_bytes(body[:2], 'big'), body[2:])
     unit, index = body[0], int.from_bytes(body[1:3], 'big')
-    if unit not in UNITS:
+    if unit not in MOVITRAC.units:
         return None
     return Enquiry(unit, index) if start == _ENQUIRY else Select(unit, index, body[3:])
 

@@ -25,7 +25,6 @@ from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import movitrac_refusal
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NeverSilent
@@ -34,6 +33,7 @@ from nfo_sinus_driver.link.interface import NothingToAsk
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.line_protocols import MOVITRAC
 from nfo_sinus_driver.link.movitrac import Answer
 from nfo_sinus_driver.link.movitrac import Data
 from nfo_sinus_driver.link.movitrac import Enquiry
@@ -99,18 +99,7 @@ class MovitracLink:
 
     supervision = None
     #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
-    protocol = LineProtocol(
-        name='movitrac',
-        addressing='movitrac',
-        units=movitrac.UNITS,
-        baud_rate=9600,
-        char_format='8N1',
-        baud_rates=(9600,),
-        char_formats=('8N1',),
-        check='power, the interface (USS 11A or UST 11A on X4, or terminals 67/68 of the option '
-        'on X20), master-slave operation off (P880 = No), the address (P842), A and B of the '
-        'wires, 9600 bit/s 8N1 in a device server',
-    )
+    protocol = MOVITRAC
 
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port

@@ -12,31 +12,41 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every protocol that there is, and the link that speaks it."""
+"""The link that speaks each protocol, loaded when it is opened: a driver speaks only one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import importlib
+from typing import Protocol
+from typing import cast
 
-from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
-from nfo_sinus_driver.link.modbus_ascii import AsciiLink
-from nfo_sinus_driver.link.modbus_tcp import TcpLink
-from nfo_sinus_driver.link.movitrac_link import MovitracLink
-from nfo_sinus_driver.link.rtu import RtuLink
+from nfo_sinus_driver.link.line_protocols import PROTOCOLS
 
-#: A new protocol is a file of this folder, and its link stands here.
+#: Where the link for each protocol stands in this folder.
 _LINKS = {
-    link.protocol.name: link
-    for link in (RtuLink, AsciiLink, TcpLink, ClassicLink, MovitracLink, CanopenLink)
+    'modbus_rtu': 'rtu.RtuLink',
+    'modbus_ascii': 'modbus_ascii.AsciiLink',
+    'modbus_tcp': 'modbus_tcp.TcpLink',
+    'classic': 'classic_link.ClassicLink',
+    'movitrac': 'movitrac_link.MovitracLink',
+    'canopen': 'canopen_link.CanopenLink',
 }
-#: What the driver's ``protocol`` parameter takes, and what each is.
-PROTOCOLS: Mapping[str, LineProtocol] = {name: link.protocol for name, link in _LINKS.items()}
-#: The bit rates of all of them.
-BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.baud_rates}))
+
+
+class _LinkClass(Protocol):
+    """What makes a link of a kind."""
+
+    def on_port(self, port: str, settings: LineSettings) -> Link:
+        """Return the link on a port; it is not open yet."""
+
+
+def _link_class(protocol: str) -> _LinkClass:
+    module, name = _LINKS[protocol].split('.')
+    package = importlib.import_module(f'{__package__}.{module}')
+    return cast('_LinkClass', getattr(package, name))
 
 
 def protocol_of(name: str) -> LineProtocol:
@@ -83,4 +93,4 @@ def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
     found = protocol_of(protocol)
     found.require_baud_rate(settings.baud_rate)
     found.require_char_format(settings.char_format)
-    return _LINKS[protocol].on_port(port, settings)
+    return _link_class(protocol).on_port(port, settings)

@@ -27,8 +27,7 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.interface import LineProtocol
-from nfo_sinus_driver.link.modbus_link import UNITS
+from nfo_sinus_driver.link.line_protocols import MODBUS_RTU
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.serial_link import SerialLink
@@ -99,16 +98,7 @@ _CRC_TABLE = tuple(_crc_entry(byte) for byte in range(256))
 class RtuLink(SerialLink):
     """A Modbus RTU master; between frames the line is silent for t3.5."""
 
-    protocol = LineProtocol(
-        name='modbus_rtu',
-        addressing='modbus',
-        units=UNITS,
-        baud_rate=19200,
-        char_format='8E1',
-        char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
-        identifies=True,
-        writes_and_reads=True,
-    )
+    protocol = MODBUS_RTU
 
     @property
     def _gap(self) -> float:

@@ -26,6 +26,7 @@ from nfo_sinus_driver.link.lawicel import Heard
 from nfo_sinus_driver.link.lawicel import Reader
 from nfo_sinus_driver.link.lawicel import bit_rate
 from nfo_sinus_driver.link.lawicel import encode
+from nfo_sinus_driver.link.line_protocols import CANOPEN
 
 FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))
 #: What else an adapter says.
@@ -123,5 +124,6 @@ def test_what_is_no_standard_frame(frame: Frame) -> None:
 def test_bit_rates() -> None:
     assert [bit_rate(rate) for rate in (10_000, 125_000, 1_000_000)] == [b'S0\r', b'S4\r', b'S8\r']
     assert sorted(BIT_RATES.values()) == list(range(9))
+    assert tuple(BIT_RATES) == CANOPEN.baud_rates
     with pytest.raises(ValueError, match='bit rate 9600: there are 10000, 20000'):
         bit_rate(9600)

@@ -194,7 +194,7 @@ def test_what_answers_something_else_is_no_answer(
 @pytest.mark.parametrize(
     ('message', 'problem'),
     [
-        (Enquiry(64, 0), 'address 64: there are 0 to 63'),
+        (Enquiry(64, 0), 'address 64: Movitrac has 0 to 63'),
         (Enquiry(-1, 0), 'address -1'),
         (Select(64, 0, bytes(4)), 'address 64'),
         (Enquiry(0, 0x10000), 'index 65536 does not fit'),
