@@ -471,6 +471,7 @@ def test_stop_while_the_drive_restarts(make_rig: MakeRig) -> None:
     rig.set_response_timeout(0.2)
     rig.simulator.inject('power-cycle', 3600)
     assert 'NOT confirmed' in rig.refused(rig.drive.stop())
+    rig.set_response_timeout(2.0)
     rig.boot()
     wait_until(lambda: not rig.drive.stop_unconfirmed)
     assert not rig.drive.armed

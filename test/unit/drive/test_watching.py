@@ -195,6 +195,7 @@ def test_what_ends_a_ride(
 
     # noticed and published: what happened, and that it does not follow us any more
     polls = polls_until(rig, before, lambda told: event.tells(told) and not told.enabled)
+    rig.set_response_timeout(rig.line.response_timeout)
     assert polls <= POLLS
     assert not rig.drive.armed
 
