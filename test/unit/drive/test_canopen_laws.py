@@ -114,7 +114,7 @@ def test_the_watch_outlives_an_idle_driver(tmp_path: Path) -> None:
 
 
 def test_a_watch_that_could_not_be_changed_is_ended_all_the_same(tmp_path: Path) -> None:
-    with CanopenRig(tmp_path, drive_timeout=5.0, response_timeout=0.3, retries=0) as rig:
+    with CanopenRig(tmp_path, drive_timeout=5.0, response_timeout=1.0, retries=0) as rig:
         rig.connect()
         rig.simulator.inject('silence', seconds=3600.0)
         assert 'did not answer' in rig.answer(rig.drive.set_drive_timeout(6.0))

@@ -98,7 +98,7 @@ def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
 
 
 def test_rubbish_at_this_address(make_rig: MakeRig) -> None:
-    rig = make_rig(response_timeout=0.5, retries=0)
+    rig = make_rig(response_timeout=1.5, retries=0)
     rig.simulator.inject('damage', 50)
     message = rig.refused(rig.drive.connect())
     assert 'is no answer' in message
