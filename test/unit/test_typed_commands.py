@@ -37,6 +37,8 @@ from nfo_sinus_driver.cli.options import parse
 _CLI = 'import sys; from nfo_sinus_driver.cli.main import main; sys.exit(main())'
 _SIMULATOR = 'nfo_sinus_driver.simulator'
 _PATIENCE = 120.0
+#: How long a scan may take at most, s.
+_SCAN = 20.0
 #: What belongs to a page that shows how something is made, and is not there.
 _MADE_UP = 'acme'
 #: What is answered on the line of a page that does not say what has been connected.
@@ -111,8 +113,9 @@ def _run(command: Typed, link: str, folder: Path) -> None:
     extra = ['--port', link]
     if options.protocol == 'canopen':
         extra += ['--baud-rate', '125000']
-    # of a scan many do not answer; all others do, on a machine that may be busy for a while
-    extra += ['--response-timeout', '0.02' if options.verb == 'scan' else '2']
+    # all answer on a machine that may be busy for a while, but for most of those that a scan asks
+    asked = len(options.addresses) if options.verb == 'scan' else 1
+    extra += ['--response-timeout', str(min(2.0, _SCAN / asked))]
     if getattr(options, 'yes', None) is False:
         # nobody can be asked here
         extra += ['--yes']
