@@ -34,12 +34,19 @@ from virtual_rig import VirtualRig
 
 from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive import poller as watch_module
 from nfo_sinus_driver.drive import sequences
 
 
 @pytest.fixture
-def make_rig(tmp_path: Path) -> Iterator[MakeRig]:
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let what a drive is to confirm take longer: the clock goes on while the machine stands."""
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 10.0)
+
+
+@pytest.fixture
+def make_rig(tmp_path: Path, unhurried: None) -> Iterator[MakeRig]:
     """Makes a rig, started; at the end the laws are judged by what was on the line."""
     with contextlib.ExitStack() as stack:
 

@@ -63,7 +63,7 @@ from nfo_sinus_driver.simulator.simulator import Simulator
 #: No honest wait takes this long, on any machine, s.
 PATIENCE = 90.0
 #: s; see :func:`patient`.
-_LOST_AFTER = 4.0
+_LOST_AFTER = 10.0
 BAUD = 57600
 ACKNOWLEDGES = 'reads the status that acknowledges'
 SCMD = 0x298

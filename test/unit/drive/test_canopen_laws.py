@@ -46,6 +46,8 @@ METHODS = pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
 #: A fault whose status is a code of its own: Overload.
 OVERLOAD = 5
 
+pytestmark = pytest.mark.usefixtures('unhurried')
+
 
 @EACH_SHAPE
 @METHODS
@@ -54,7 +56,7 @@ def test_a_ride_over_each_shape_of_the_node(
     tmp_path: Path, shape: str, method: str, turnaround: float
 ) -> None:
     with CanopenRig(
-        tmp_path, control_method=method, drive_timeout=5.0, options=SHAPES[shape],
+        tmp_path, control_method=method, drive_timeout=20.0, options=SHAPES[shape],
         line={'turnaround': turnaround},
     ) as rig:
         rig.connect()
@@ -78,7 +80,7 @@ def test_a_ride_over_each_shape_of_the_node(
         # as it was found: whoever watches has nothing to watch for
         assert rig.far.peek('serial.sio_tot') == 0
         assert not rig.far.faults.codes
-        rig.touch(lambda: rig.far.advance(10.0))
+        rig.touch(lambda: rig.far.advance(30.0))
         assert not rig.far.faults.codes
 
 

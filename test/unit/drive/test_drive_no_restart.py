@@ -240,11 +240,11 @@ def test_port_that_is_unplugged_for_a_while(make_rig: MakeRig, tmp_path: Path) -
 
 def test_time_out_of_the_drive(make_rig: MakeRig) -> None:
     # the drive stops by itself when the line is dead, and wants acknowledging
-    rig = make_rig(retries=1, drive_timeout=5.0)
+    rig = make_rig(retries=1, drive_timeout=20.0)
     rig.turn()
     rig.set_response_timeout(0.1)
     rig.simulator.inject('line-dead', 3600)
-    rig.skip(6.0)
+    rig.skip(21.0)
     rig.wait_until_still()
     assert rig.far.faults.codes
     wait_until(lambda: not rig.drive.snapshot.connected)

@@ -111,7 +111,7 @@ class Rig:
 
 
 @pytest.fixture(params=_WAYS.values(), ids=_WAYS)
-def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
+def rig(request: pytest.FixtureRequest, unhurried: None) -> Iterator[Rig]:
     rig = Rig(request.param)
     rig.start()
     try:

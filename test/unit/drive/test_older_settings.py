@@ -138,7 +138,7 @@ class Rig:
 
 
 @pytest.fixture
-def stack() -> Iterator[contextlib.ExitStack]:
+def stack(unhurried: None) -> Iterator[contextlib.ExitStack]:
     with contextlib.ExitStack() as stack:
         yield stack
 

@@ -71,7 +71,7 @@ def model(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def make(tmp_path: Path, model: str) -> Iterator[Make]:
+def make(tmp_path: Path, model: str, unhurried: None) -> Iterator[Make]:
     with contextlib.ExitStack() as stack:
 
         def made(**options: Any) -> TelegramRig:
