@@ -46,7 +46,7 @@ _SETPOINT_RATE = 10.0
 #: How late a message may be in the middle, and at the worst, s; the status of a poll is stamped
 #: when it arrives, and published at the end of the poll.
 _LAG = 0.2
-_WORST_LAG = 3.0
+_WORST_LAG = 10.0
 
 _EVENT = 'std_srvs/srv/{}_Event'
 _TYPES = {

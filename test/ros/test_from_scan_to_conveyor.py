@@ -45,12 +45,18 @@ outfeed: {{ros__parameters: {{address: 3, {third}}}}}
 """
 
 
-def start(bench: Bench, third: str = 'telemetry_rate: 2.0', rate: str = '25.0') -> tuple:
+def start(
+    bench: Bench,
+    third: str = 'telemetry_rate: 2.0',
+    rate: str = '25.0',
+    setpoint_timeout: str = '2.5',
+) -> tuple:
     """Start three drives and the driver; return the simulator and a client of each drive."""
     simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     parameters = bench.folder / 'three.yaml'
     parameters.write_text(_THREE.format(third=third))
-    bench.driver('--params-file', str(parameters), '-p', f'poll_rate:={rate}')
+    rates = (f'poll_rate:={rate}', f'setpoint_timeout:={setpoint_timeout}')
+    bench.driver('--params-file', str(parameters), *(word for one in rates for word in ('-p', one)))
     clients = [bench.client(name).connected() for name in ('/infeed', '/middle', '/outfeed')]
     return simulator, clients
 
@@ -174,7 +180,7 @@ def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
 @pytest.mark.every_way
 @needs('rtu')
 def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -> None:
-    simulator, (infeed, middle, outfeed) = start(bench, rate='2.0')
+    simulator, (infeed, middle, outfeed) = start(bench, rate='2.0', setpoint_timeout='20.0')
 
     def turn_on() -> bool:
         return all(

@@ -98,7 +98,8 @@ def test_it_is_asked_once_for_each_connection(bench: Bench) -> None:
 @pytest.mark.parametrize('treated', ['refused', 'silent'])
 def test_a_drive_that_does_not_tell_connects_and_runs(bench: Bench, treated: str) -> None:
     drive = bench.simulator('--newer-functions', treated, *_QUICK)
-    driver = bench.driver()
+    # else a machine that stands still asks again, to be certain whose answer it has
+    driver = bench.driver('-p', 'response_timeout:=4.0')
     client = bench.client().connected()
     (line,) = re.findall(r'connected: .*', driver.text)
     assert line == 'connected: sinus_g2, firmware 4.38 / 4018'

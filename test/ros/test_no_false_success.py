@@ -76,8 +76,8 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
     drive.wait_for(lambda state: state['inv_st'] == 28, timeout=PATIENCE)
     success = _succeeds(client, driver, out)
     tuning = drive.state()['inv_st'] == 28
-    # a machine that is slow enough sees the end of the tuning first
-    assert success != tuning, driver.text
+    # a machine that is slow enough sees the end of the tuning first, before the answer or after it
+    assert not (success and tuning), driver.text
     if out == 'deactivate':
         assert client.state() == ('inactive' if success else 'active')
         drive.wait_for(lambda state: state['inv_st'] != 28, timeout=PATIENCE)

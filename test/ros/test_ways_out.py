@@ -167,20 +167,20 @@ def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
     # what keeps it alive is polls, and parameters that are read again; polls alone have a test of
     # their own (test_poll_schedule)
-    settings = ('drive_timeout:=2.0', 'poll_rate:=0.2', 'telemetry_rate:=0.0')
+    settings = ('drive_timeout:=6.0', 'poll_rate:=0.1', 'telemetry_rate:=0.0')
     bench.driver(*(word for setting in settings for word in ('-p', setting)))
     client = bench.client().connected()
     with client.run_at(20.0):
         assert client.call('stop').success
         running = drive.state()['time']
         state = drive.wait_for(
-            lambda state: state['fault'] or state['time'] > running + 4.0, timeout=PATIENCE
+            lambda state: state['fault'] or state['time'] > running + 8.0, timeout=PATIENCE
         )
         assert not state['fault']
         assert client.change_state(Transition.TRANSITION_DEACTIVATE)
         stopped = drive.state()['time']
         state = drive.wait_for(
-            lambda state: state['fault'] or state['time'] > stopped + 4.0, timeout=PATIENCE
+            lambda state: state['fault'] or state['time'] > stopped + 8.0, timeout=PATIENCE
         )
     assert not state['fault']
     assert bench.drives.taken(state), 'control is still ours, and that makes this a test'
