@@ -396,7 +396,8 @@ def test_no_control_word_is_asked_of_it(stack: contextlib.ExitStack) -> None:
 
 
 def test_nothing_at_all_is_asked_that_it_does_not_know(rig: Rig) -> None:
-    drive = rig.driver(telemetry_rate=50.0, drive_timeout=4.0)
+    # answers are lost for longer than a drive would wait by default
+    drive = rig.driver(telemetry_rate=50.0, drive_timeout=16.0)
     drive.connect(parameters=True).result(PATIENCE)
     drive.activate()
     wait_until(lambda: drive.snapshot.status)
@@ -424,11 +425,12 @@ def test_nothing_at_all_is_asked_that_it_does_not_know(rig: Rig) -> None:
     rig.turn()
     drive.parameters.refresh().result(PATIENCE)
     rig.change(accel=0.5)
-    drive.set_drive_timeout(5.0).result(PATIENCE)
+    drive.set_drive_timeout(20.0).result(PATIENCE)
     drive.error_log(40).result(PATIENCE)
     assert LineError.UNKNOWN not in rig.flags
     drive.stop().result(PATIENCE)
     beside()
+    assert not rig.flags, rig.flags
     rig.simulator.inject('heal')
     rig.simulator.inject('fault', 5)
     wait_until(lambda: drive.snapshot.status and drive.snapshot.status.faulted)
