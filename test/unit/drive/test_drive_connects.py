@@ -163,7 +163,7 @@ def test_telemetry_turned_off(make_rig: MakeRig) -> None:
 
 
 def test_clean_exit(make_rig: MakeRig) -> None:
-    rig = make_rig(drive_timeout=5.0)
+    rig = make_rig(drive_timeout=20.0)
     rig.turn()
     answer = said(rig.drive.disconnect(PATIENCE).result(PATIENCE))
     assert answer.startswith(STOPPING_OR_STOPPED)
@@ -174,7 +174,7 @@ def test_clean_exit(make_rig: MakeRig) -> None:
     assert not rig.drive.armed
     assert not rig.drive.snapshot.connected
     # nobody talks any more, and no fault comes of it
-    rig.skip(10.0)
+    rig.skip(30.0)
     assert rig.far.faults.codes == []
     # and the next one finds a drive that works
     rig.connect()
@@ -200,12 +200,12 @@ def test_exit_leaves_a_slow_motor_to_its_ramp(make_rig: MakeRig) -> None:
 
 
 def test_exit_releases_a_slow_motor_that_would_end_in_a_fault(make_rig: MakeRig) -> None:
-    rig = make_rig(parameters={'control.retard': 60.0}, drive_timeout=5.0)
+    rig = make_rig(parameters={'control.retard': 60.0}, drive_timeout=20.0)
     rig.turn()
     answer = said(rig.drive.disconnect(0.1).result(PATIENCE))
     assert answer.startswith('released to coast')
     assert not rig.far.motor.driven
-    rig.skip(10.0)
+    rig.skip(30.0)
     assert rig.far.faults.codes == []
 
 
