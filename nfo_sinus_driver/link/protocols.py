@@ -45,8 +45,7 @@ class _LinkClass(Protocol):
 
 def _link_class(protocol: str) -> _LinkClass:
     module, name = _LINKS[protocol].split('.')
-    package = importlib.import_module(f'{__package__}.{module}')
-    return cast('_LinkClass', getattr(package, name))
+    return cast('_LinkClass', getattr(importlib.import_module(f'{__package__}.{module}'), name))
 
 
 def protocol_of(name: str) -> LineProtocol:

@@ -55,8 +55,8 @@ def start(
     simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     parameters = bench.folder / 'three.yaml'
     parameters.write_text(_THREE.format(third=third))
-    rates = (f'poll_rate:={rate}', f'setpoint_timeout:={setpoint_timeout}')
-    bench.driver('--params-file', str(parameters), *(word for one in rates for word in ('-p', one)))
+    settings = ('-p', f'poll_rate:={rate}', '-p', f'setpoint_timeout:={setpoint_timeout}')
+    bench.driver('--params-file', str(parameters), *settings)
     clients = [bench.client(name).connected() for name in ('/infeed', '/middle', '/outfeed')]
     return simulator, clients
 
