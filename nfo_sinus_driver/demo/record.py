@@ -48,6 +48,8 @@ from nfo_sinus_driver.version import VERSION
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 #: When it is time to say that there is no driver, s.
 _PATIENCE = 5.0
+#: How long what was sent before the end may be on its way, s.
+_ON_ITS_WAY = 0.5
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -126,7 +128,9 @@ def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recor
     with contextlib.ExitStack() as stack:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        recorder = stack.enter_context(Recorder(bag, drive, {'drive': drive}))
+        recorder = stack.enter_context(
+            Recorder(bag, drive, {'drive': drive}, lambda: _tell_heard(drive))
+        )
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
         thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
@@ -134,6 +138,10 @@ def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recor
         stack.callback(thread.join)
         stack.callback(executor.shutdown)
         yield recorder
+
+
+def _tell_heard(drive: str) -> None:
+    print(f'record: {drive} is heard', flush=True)
 
 
 def _spin(executor: SingleThreadedExecutor) -> None:
@@ -159,6 +167,7 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     # what was recorded is now closed and drawn, and that must not be cut short
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
+    time.sleep(_ON_ITS_WAY)
 
 
 def _record_parser() -> argparse.ArgumentParser:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Iterator
 import json
 from pathlib import Path
@@ -89,15 +90,23 @@ class Recorder(Node):
     :param folder: the bag, a folder that does not exist.
     :param drive: the full name of the drive node.
     :param remarks: what the bag is to say of itself.
+    :param heard: called once, when the first status of the drive is in the bag.
     :raises RecordingError: the bag cannot be made or, at the end, is not whole.
     """
 
-    def __init__(self, folder: Path, drive: str, remarks: dict[str, str]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        drive: str,
+        remarks: dict[str, str],
+        heard: Callable[[], None] = lambda: None,
+    ) -> None:
         # here and not above: the demo runs where there is only ROS
         from rosbags.rosbag2 import StoragePlugin
         from rosbags.rosbag2 import Writer
 
         super().__init__('recorder', enable_rosout=False)
+        self._heard: Callable[[], None] | None = heard
         self._error: Exception | None = None
         self._count = 0
         self._writer = Writer(
@@ -148,9 +157,16 @@ class Recorder(Node):
             # back, but a bag's must not
             latest = max(latest, info.get('received_timestamp') or time.time_ns())
             self._write(connection, latest, data)
+            if type_ is DriveStatus:
+                self._tell_heard()
 
         deep = QoSProfile(depth=_DEPTH, reliability=qos.reliability, durability=qos.durability)
         self.create_subscription(type_, topic, write, deep, raw=True)
+
+    def _tell_heard(self) -> None:
+        tell, self._heard = self._heard, None
+        if tell is not None:
+            tell()
 
     def _write(self, connection: Connection, stamp: int, data: bytes) -> None:
         if self._error is not None:
