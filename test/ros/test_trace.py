@@ -45,7 +45,7 @@ def _requests(bench: Bench) -> list[Request]:
 def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
     way = bench.way
     drive = bench.simulator(*bench.drives.ramps(1))
-    driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=3.0')
+    driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=16.0')
     client = bench.client().connected()
     with client.run_at(20.0):
         client.wait_for('telemetry', lambda message: message.frequency > 15, 'telemetry')
