@@ -166,6 +166,7 @@ class LineProtocol:
     What a protocol can do, and how its lines leave the factory.
 
     :ivar name: as the driver's parameter ``protocol`` has it.
+    :ivar link: what speaks it, file and class of this folder, such as ``rtu.RtuLink``.
     :ivar addressing: which addresses of the catalog it reaches parameters by.
     :ivar units: the addresses that a drive may have.
     :ivar baud_rate: of the factory, bit/s.
@@ -184,6 +185,7 @@ class LineProtocol:
     """
 
     name: str
+    link: str
     addressing: str
     units: range
     baud_rate: int

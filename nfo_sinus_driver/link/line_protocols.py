@@ -29,6 +29,7 @@ BROADCAST = 95
 
 MODBUS_RTU = LineProtocol(
     name='modbus_rtu',
+    link='rtu.RtuLink',
     addressing='modbus',
     units=_MODBUS_UNITS,
     baud_rate=19200,
@@ -39,6 +40,7 @@ MODBUS_RTU = LineProtocol(
 )
 MODBUS_ASCII = LineProtocol(
     name='modbus_ascii',
+    link='modbus_ascii.AsciiLink',
     addressing='modbus',
     units=_MODBUS_UNITS,
     baud_rate=19200,
@@ -49,6 +51,7 @@ MODBUS_ASCII = LineProtocol(
 )
 MODBUS_TCP = LineProtocol(
     name='modbus_tcp',
+    link='modbus_tcp.TcpLink',
     addressing='modbus',
     units=_MODBUS_UNITS,
     # the line behind a gateway is set in the gateway
@@ -60,6 +63,7 @@ MODBUS_TCP = LineProtocol(
 )
 CLASSIC = LineProtocol(
     name='classic',
+    link='classic_link.ClassicLink',
     addressing='classic',
     units=range(POINT_TO_POINT, BROADCAST),
     baud_rate=9600,
@@ -70,6 +74,7 @@ CLASSIC = LineProtocol(
 )
 MOVITRAC = LineProtocol(
     name='movitrac',
+    link='movitrac_link.MovitracLink',
     addressing='movitrac',
     # P842 [M4 §2.3.1]
     units=range(64),
@@ -83,6 +88,7 @@ MOVITRAC = LineProtocol(
 )
 CANOPEN = LineProtocol(
     name='canopen',
+    link='canopen_link.CanopenLink',
     addressing='canopen',
     units=range(1, 128),
     baud_rate=125_000,

@@ -25,16 +25,6 @@ from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.line_protocols import PROTOCOLS
 
-#: Where the link for each protocol stands in this folder.
-_LINKS = {
-    'modbus_rtu': 'rtu.RtuLink',
-    'modbus_ascii': 'modbus_ascii.AsciiLink',
-    'modbus_tcp': 'modbus_tcp.TcpLink',
-    'classic': 'classic_link.ClassicLink',
-    'movitrac': 'movitrac_link.MovitracLink',
-    'canopen': 'canopen_link.CanopenLink',
-}
-
 
 class _LinkClass(Protocol):
     """What makes a link of a kind."""
@@ -43,8 +33,8 @@ class _LinkClass(Protocol):
         """Return the link on a port; it is not open yet."""
 
 
-def _link_class(protocol: str) -> _LinkClass:
-    module, name = _LINKS[protocol].split('.')
+def _link_class(protocol: LineProtocol) -> _LinkClass:
+    module, name = protocol.link.split('.')
     return cast('_LinkClass', getattr(importlib.import_module(f'{__package__}.{module}'), name))
 
 
@@ -92,4 +82,4 @@ def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
     found = protocol_of(protocol)
     found.require_baud_rate(settings.baud_rate)
     found.require_char_format(settings.char_format)
-    return _link_class(protocol).on_port(port, settings)
+    return _link_class(found).on_port(port, settings)
