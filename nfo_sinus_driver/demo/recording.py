@@ -158,15 +158,15 @@ class Recorder(Node):
             latest = max(latest, info.get('received_timestamp') or time.time_ns())
             self._write(connection, latest, data)
             if type_ is DriveStatus:
-                self._tell_heard()
+                self._hear_drive()
 
         deep = QoSProfile(depth=_DEPTH, reliability=qos.reliability, durability=qos.durability)
         self.create_subscription(type_, topic, write, deep, raw=True)
 
-    def _tell_heard(self) -> None:
-        tell, self._heard = self._heard, None
-        if tell is not None:
-            tell()
+    def _hear_drive(self) -> None:
+        heard, self._heard = self._heard, None
+        if heard is not None:
+            heard()
 
     def _write(self, connection: Connection, stamp: int, data: bytes) -> None:
         if self._error is not None:

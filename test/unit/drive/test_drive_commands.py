@@ -131,8 +131,12 @@ def test_two_at_a_time_cannot_enable(make_rig: MakeRig) -> None:
     assert rig.refused(first) == 'it was stopped while it was being enabled'
 
 
-def test_start_delay_of_the_drive_is_waited_for(make_rig: MakeRig, impatient: None) -> None:
-    rig = make_rig(parameters={'control.run_dly': 1})
+def test_start_delay_of_the_drive_is_waited_for(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the delay is longer, and what follows it has as long as everything else
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 2.5)
+    rig = make_rig(parameters={'control.run_dly': 3})
     rig.connect()
     assert rig.enable().startswith('enabled')
     assert rig.far.motor.driven

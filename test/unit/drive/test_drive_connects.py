@@ -34,7 +34,6 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -45,12 +44,6 @@ from nfo_sinus_driver.link import NoAnswer
 OVERLOAD = 5
 #: Read registers, and who are you.
 ONLY_READ = {3, 17, 43}
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
 
 
 def test_connect_says_who_answers(rig: Rig) -> None:

@@ -445,9 +445,9 @@ def test_stop_during_the_start_delay(make_rig: MakeRig) -> None:
 def test_stop_when_nobody_answers_is_tried_on_and_on(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.5)
     rig = make_rig(retries=1)
     rig.turn()
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.5)
     rig.set_response_timeout(0.1)
     rig.simulator.inject('line-dead', 3600)
     message = rig.refused(rig.drive.stop())
@@ -483,9 +483,9 @@ def test_exit_while_the_drive_restarts(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the same, and nobody polls any more whose answers would tell
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
     rig = make_rig(retries=0)
     rig.turn()
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
     rig.set_response_timeout(0.2)
     rig.simulator.inject('power-cycle', 3600)
     assert 'NOT confirmed' in rig.refused(rig.drive.disconnect(0.1))
@@ -498,8 +498,8 @@ def test_exit_while_the_drive_restarts(
 def test_stop_that_is_refused_is_tried_on_and_on(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.3)
     rig.turn()
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.3)
     write = rig.far.write_raw
 
     def write_raw(key: str, raw: int) -> None:

@@ -28,18 +28,11 @@ from virtual_rig import MakeVirtual
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 OVERLOAD = 5
 #: Read registers, and who are you.
 ONLY_READ = {3, 17, 43}
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver give up soon on what will never happen."""
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.2)
 
 
 @pytest.mark.parametrize(

@@ -425,12 +425,12 @@ def test_table_16_idle(make_rig: MakeRig, exits: Exits, words, wanted, cause: st
 def test_table_16_switched_on_that_is_left_while_it_is_being_enabled(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.3)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 2.0)
     rig = make_rig(control_method='drive_control')
     answer = when_switched_on(rig, lambda: command(rig, ON & ~Control.ENABLE_VOLTAGE))
     assert 'does not start' in answer or 'RUN input' in answer
     assert not rig.drive.armed
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 2.0)
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 10.0)
     assert_it_can_be_enabled(rig)
 
 
