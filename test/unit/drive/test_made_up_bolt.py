@@ -112,7 +112,8 @@ def bus(bolt: Bolt) -> Iterator[Bus]:
 
 def connected(bus: Bus, notes: Notes, **settings: Any) -> Drive:
     """A drive that can be enabled."""
-    drive = Drive(bus, DriveSettings(**{'model': 'bolt', **settings}), notes)
+    settings = {'model': 'bolt', 'setpoint_timeout': 0.0, **settings}
+    drive = Drive(bus, DriveSettings(**settings), notes)
     drive.connect(parameters=True).result(PATIENCE)
     drive.activate()
     return drive

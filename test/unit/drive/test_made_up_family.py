@@ -136,7 +136,8 @@ def test_of_two_that_tell_nothing_a_person_has_to_say(
 
 
 def driver(bus: Bus, notes: Notes, **settings: Any) -> Drive:
-    settings = {'model': 'acme', 'control_method': 'drive_control', **settings}
+    usual = {'model': 'acme', 'control_method': 'drive_control', 'setpoint_timeout': 0.0}
+    settings = {**usual, **settings}
     return Drive(bus, DriveSettings(**settings), notes)
 
 
@@ -198,12 +199,13 @@ def test_a_ride(acme: Acme, bus: Bus) -> None:
 
 
 def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes(), setpoint_timeout=0.2)
+    drive = turning(acme, bus, Notes())
+    drive.settings = dataclasses.replace(drive.settings, setpoint_timeout=0.2)
     wait_until(lambda: (acme.hertz, acme.registers[TURN]) == (0, 0))
     wait_until(lambda: drive.snapshot.setpoint == 0)
     assert drive.armed
     drive.set_setpoint(-5.0)
-    wait_until(lambda: acme.hertz == -5.0)
+    wait_until(lambda: -5.0 in acme.followed)
 
 
 def test_a_lost_answer_to_a_set_point_slows_no_motor_down(acme: Acme, bus: Bus) -> None:

@@ -44,7 +44,7 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
     with Simulator(protocol='classic', dialect='5.0', boot_time=0.2, settings=settings) as far:
         bus = Bus(open_link('classic', far.port, line))
         notes = Notes()
-        drive = Drive(bus, DriveSettings(classic_dialect='v5.0'), notes)
+        drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
         bus.start()
         try:
             drive.connect().result(PATIENCE)
@@ -82,7 +82,7 @@ def notes() -> Notes:
 def drive(far: Simulator, notes: Notes) -> Iterator[Drive]:
     """An active drive without a status word."""
     bus = Bus(open_link('classic', far.port, line_settings('classic', response_timeout=2.0)))
-    drive = Drive(bus, DriveSettings(classic_dialect='v5.0'), notes)
+    drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
     bus.start()
     try:
         drive.connect().result(PATIENCE)

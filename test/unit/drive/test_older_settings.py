@@ -101,7 +101,8 @@ class Rig:
     def driver(self, **settings: Any) -> Drive:
         """Begin a driver."""
         lost_after = patient(settings.get('drive_timeout', 0.0))
-        settings = {'classic_dialect': 'v5.0', 'lost_after': lost_after, **settings}
+        usual = {'classic_dialect': 'v5.0', 'setpoint_timeout': 0.0, 'lost_after': lost_after}
+        settings = {**usual, **settings}
         line = line_settings('classic', response_timeout=2.0)
         self.bus = Bus(open_link('classic', self.simulator.port, line))
         self.drive = Drive(self.bus, DriveSettings(**settings), self.notes)
