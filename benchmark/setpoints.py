@@ -50,7 +50,7 @@ _SETPOINT, _SCMD, _STATUS, *_POLLED = (
 )
 #: A drive may wait for its turn of the publisher, s. Its own time-out is set, as on a real
 #: conveyor; a machine that is busy elsewhere stops no motor.
-_SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 5.0, 'lost_after': 4.0}
+SETTINGS = {'setpoint_timeout': 10.0, 'drive_timeout': 5.0, 'lost_after': 4.0}
 #: One drive that is rarely asked for anything.
 _IDLE = {'poll_rate': 1.0, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
 #: A set-point that is not on the line by then was replaced by a newer one, s.
@@ -84,15 +84,21 @@ def measure_idle(effort: Effort) -> list[Row]:
 
 def measure(drives: int, effort: Effort) -> list[Row]:
     """Return the rows of a line with enabled drives that is full."""
-    with DriverRig(BAUD_RATE, drives, **_SETTINGS) as rig:
-        rig.listener.enable_all()
-        steady = rig.start_script('publisher.py', '0', *rig.names)
-        rig.wait_for(lambda: _all_follow(rig), steady)
+    with DriverRig(BAUD_RATE, drives, **SETTINGS) as rig:
+        steady = give_the_same(rig)
         rows = [_unchanged(rig, effort), _stops(rig, effort.stops)]
         rig.end(steady)
         rig.listener.enable_all()
         rows.append(_saturated(rig, effort.setpoints))
     return rows
+
+
+def give_the_same(rig: DriverRig) -> subprocess.Popen[str]:
+    """Enable all drives, and have a process give each the same set-point again and again."""
+    rig.listener.enable_all()
+    steady = rig.start_script('publisher.py', '0', *rig.names)
+    rig.wait_for(lambda: _all_follow(rig), steady)
+    return steady
 
 
 def _all_follow(rig: DriverRig) -> bool:
