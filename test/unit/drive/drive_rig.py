@@ -261,6 +261,8 @@ class Rig:
         return str(identity)
 
     def enable(self) -> str:
+        """Enable, as soon as no stop is on its way any more."""
+        wait_until(lambda: not self.drive.stop_unconfirmed)
         return said(self.drive.enable().result(PATIENCE))
 
     def refused(self, future: Any) -> Said:
