@@ -167,6 +167,7 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     # what was recorded is now closed and drawn, and that must not be cut short
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
+    # the end overtakes messages: nobody tells a subscriber which are yet to come
     time.sleep(_ON_ITS_WAY)
 
 
