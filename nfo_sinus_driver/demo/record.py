@@ -50,6 +50,9 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _PATIENCE = 5.0
 #: How long what was sent before the end may be on its way, s.
 _ON_ITS_WAY = 0.5
+#: How long a signal may wait that came to another thread: Python handles it in the main one, but
+#: does not wake it (s). That is where it comes when the process was suspended.
+_POLL_SIGNALS = 0.2
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -151,10 +154,9 @@ def _spin(executor: SingleThreadedExecutor) -> None:
 
 def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     """Wait until the time is over, or somebody ends it."""
-    # never set: only a signal or the time ends a wait
-    ended = threading.Event()
+    end = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt):
-        ended.wait(min(seconds, _PATIENCE))
+        _sleep_until(min(end, time.monotonic() + _PATIENCE))
         if not recorder.count_publishers(f'{drive}/status'):
             domain = os.environ.get('ROS_DOMAIN_ID', '0')
             print(
@@ -162,13 +164,17 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
                 f'this name and in this ROS_DOMAIN_ID ({domain})?',
                 file=sys.stderr, flush=True,
             )
-        if seconds > _PATIENCE:
-            ended.wait(None if seconds == math.inf else seconds - _PATIENCE)
+        _sleep_until(end)
     # what was recorded is now closed and drawn, and that must not be cut short
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
     # the end overtakes messages: nobody tells a subscriber which are yet to come
     time.sleep(_ON_ITS_WAY)
+
+
+def _sleep_until(end: float) -> None:
+    while (left := end - time.monotonic()) > 0:
+        time.sleep(min(left, _POLL_SIGNALS))
 
 
 def _record_parser() -> argparse.ArgumentParser:
@@ -186,7 +192,7 @@ def _record_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--for', type=_seconds, default=math.inf, dest='seconds', metavar='SECONDS',
-        help='end it after so long',
+        help=f'end it after so long, and {_ON_ITS_WAY:g} s for what is on its way then',
     )
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     return parser

@@ -45,6 +45,9 @@ from nfo_sinus_driver.version import VERSION
 
 #: Lets the line's thread go on soon after another one was busy (s).
 _SWITCH_INTERVAL = 0.0002
+#: How long a signal may wait that came to another thread: Python handles it in the main one, but
+#: does not wake it (s). That is where it comes when the process was suspended.
+_POLL_SIGNALS = 0.2
 
 _EPILOG = """
 While it runs, "simulator inject --link LINK VERB ..." makes things happen to it: faults, a lost
@@ -89,7 +92,8 @@ def _serve(simulator: Simulator) -> int:
     also = ''.join(f'; also {other}' for other in others)
     print(f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True)
     # the line has a thread of its own: this one waits for a signal, or for a failure there
-    simulator.finished.wait()
+    while not simulator.finished.wait(_POLL_SIGNALS):
+        continue
     print(f'simulator: the line broke down: {simulator.failure!r}', file=sys.stderr)
     return 1
 

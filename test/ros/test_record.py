@@ -77,7 +77,11 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     # and the recorder, too, has heard it
     known = len(client.messages['status'])
     wait_until(lambda: len(client.messages['status']) > known + 5, 'it still stands')
-    recorder.signal(signal.SIGINT)
+    # suspended meanwhile, it is told to end before it hears the last set-point
+    recorder.signal(signal.SIGSTOP)
+    client.publish(7.0)
+    recorder.signal(signal.SIGINT, thread=recorder.pid)
+    recorder.signal(signal.SIGCONT)
     assert recorder.wait() == 0, recorder.text
     bag, picture = folder / 'ride', folder / 'ride.png'
     assert f'the bag is {bag}' in recorder.text and f'the picture is {picture}' in recorder.text
@@ -87,7 +91,7 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
 
     ride = bags.read(bag, bags.only_drive(bag))
     assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
-    assert set(ride.setpoint.values) == {20.0} and ride.unit == 'Hz'
+    assert set(ride.setpoint.values) == {20.0, 7.0} and ride.unit == 'Hz'
     assert len(ride.enabled) == 1 and 'running' in {span.what for span in ride.phases}
 
     # and again, by itself
@@ -109,6 +113,17 @@ def test_a_recorder_that_hears_nothing_says_what_to_check(bench: Bench) -> None:
     assert f'in this ROS_DOMAIN_ID ({bench.domain})?' in recorder.text
     assert 'the bag is empty: nothing was heard' in recorder.text
     assert 'Traceback' not in recorder.text
+
+
+@needs('own')
+def test_a_signal_that_comes_to_another_thread_ends_a_recorder(bench: Bench) -> None:
+    recorder = _recorder(bench, '--output', str(bench.folder / 'out'))
+    wait_until(lambda: 'nothing publishes' in recorder.text, 'it waits without end')
+    # the system chooses one when the process was suspended, and Python does not wake the main one
+    other = max(int(path.name) for path in Path(f'/proc/{recorder.pid}/task').iterdir())
+    recorder.signal(signal.SIGTERM, thread=other)
+    assert recorder.wait() == 1
+    assert 'the bag is empty: nothing was heard' in recorder.text
 
 
 def test_a_recorder_refuses_what_cannot_be() -> None:

@@ -14,6 +14,7 @@
 
 """The commands ``simulator`` and ``simulator inject``, as processes of their own."""
 
+import ctypes
 import json
 import os
 from pathlib import Path
@@ -79,6 +80,26 @@ def test_it_says_what_it_serves_and_leaves_nothing_behind(start, link, open_mast
     assert not os.path.lexists(link)
     assert not os.path.lexists(f'{link}.control')
     assert process.stderr.read() == ''
+
+
+def test_it_ends_though_it_was_suspended(start, link):
+    process, _ = start('--link', link)
+    # as a shell ends a suspended job
+    process.send_signal(signal.SIGSTOP)
+    process.send_signal(signal.SIGTERM)
+    process.send_signal(signal.SIGCONT)
+    assert process.wait(5) == 0
+    assert not os.path.lexists(link)
+
+
+def test_a_signal_that_comes_to_another_thread_ends_it(start, link):
+    process, _ = start('--link', link)
+    # the system chooses one when the process was suspended, and Python does not wake the main one
+    other = max(int(path.name) for path in Path(f'/proc/{process.pid}/task').iterdir())
+    assert other != process.pid
+    assert ctypes.CDLL(None).tgkill(process.pid, other, signal.SIGTERM) == 0
+    assert process.wait(5) == 0
+    assert not os.path.lexists(link)
 
 
 def test_a_killed_one_is_replaced_and_a_live_one_is_not(start, link):
