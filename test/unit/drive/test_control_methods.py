@@ -190,7 +190,7 @@ def test_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
     assert rig.enable().startswith('enabled')
     inverter = rig.drive.inverter
 
-    async def read(priority: Priority = Priority.SERVICE) -> str:
+    async def read(priority: Priority = Priority.SERVICE, *, once: bool = False) -> str:
         inverter.control_mode = '7'
         return inverter.control_mode
 
