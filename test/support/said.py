@@ -44,7 +44,7 @@ CALLS = Calls(
 
 class Said(str):
     """
-    A templates.
+    A sentence, and the reports that it was made of.
 
     :ivar causes: what it says, and why.
     """

@@ -222,6 +222,8 @@ class Rig:
         others = [complaint for complaint in found if ACKNOWLEDGES not in complaint]
         assert not others, others
         assert len(acknowledged) <= self.acknowledged, acknowledged
+        # a mistake, be it of a test that replaces a part of the driver, may pass for a lost drive
+        assert not self.notes.told(Cause.DRIVER_ERROR), self.notes.events
 
     def trace(self) -> list[dict[str, Any]]:
         """Every frame on the line so far, as the simulator saw it."""
