@@ -173,6 +173,7 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
 
 
 def _sleep_until(end: float) -> None:
+    """Sleep in pieces: between them a signal is handled that came to another thread."""
     while (left := end - time.monotonic()) > 0:
         time.sleep(min(left, _POLL_SIGNALS))
 

@@ -137,7 +137,7 @@ def _serve() -> None:
 
 def _end_with_parent_after(between: int) -> None:
     """Be killed with who asked: a test that is killed leaves no driver and no drive behind."""
-    # not before: the end of the process between would be taken for it
+    # not before: the end of the process between would be taken for it, and nothing tells of it
     while os.getppid() == between:
         time.sleep(0.001)
     assert ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0) == 0

@@ -263,6 +263,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
 
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '1', '--params', '-')
+    assert done.status == 0, done.err
     assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
     assert 'NFO1001' in done.err
 
