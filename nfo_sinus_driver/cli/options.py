@@ -46,6 +46,7 @@ DEFAULTS = {
 }
 #: Nobody waits long for each of 247 addresses.
 SCAN_TIMEOUT = 0.1
+SCAN_RETRIES = 0
 
 _ALLOW = '--allow-communication-changes'
 _EPILOG = """
@@ -61,6 +62,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     defaults = dict(DEFAULTS)
     if options.verb == 'scan':
         defaults['response_timeout'] = SCAN_TIMEOUT
+        options.silence_retries = getattr(options, 'retries', SCAN_RETRIES)
     for name, default in defaults.items():
         if not hasattr(options, name):
             setattr(options, name, default)
@@ -168,7 +170,8 @@ def _common() -> argparse.ArgumentParser:
         type=int,
         choices=range(11),
         metavar='TIMES',
-        help='how often a request without a response is repeated (default: 2)',
+        help='how often a request without a response is repeated (default: 2; scan: '
+        f'{SCAN_RETRIES} where nobody has answered yet)',
     )
     return parser
 

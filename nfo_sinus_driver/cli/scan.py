@@ -44,6 +44,8 @@ from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
@@ -52,6 +54,8 @@ from nfo_sinus_driver.link.interface import BAUD_RATES
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
+#: How often who gave a damaged answer is asked again.
+_DAMAGE_RETRIES = 2
 #: The columns and their widths.
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
 
@@ -147,17 +151,16 @@ def _who_answers(
     """Ask one address after the other, as one line is set."""
     with Session(options) as session:
         for address in addresses:
-            facts = _ask(session.drive(address))
+            facts = _ask(session.drive(address), options.silence_retries)
             step()
             if facts is not None:
                 yield address, facts
 
 
-def _ask(drive: Remote) -> dict[str, str] | None:
+def _ask(drive: Remote, silence_retries: int) -> dict[str, str] | None:
     """Return who answers at an address (DriveError: the port cannot be used)."""
     try:
-        status = drive.model.key_of_status
-        drive.do(lambda: drive.registers.read_data(status, Priority.POLL, once=True))
+        drive.do(lambda: _first_answer(drive, silence_retries))
         identity = drive.identify()
     except DriveError as error:
         cause = error.__cause__
@@ -179,6 +182,30 @@ def _ask(drive: Remote) -> dict[str, str] | None:
         'serial number': identity.serial,
         'model': drive.model.name,
     }
+
+
+async def _first_answer(drive: Remote, silence_retries: int) -> None:
+    """
+    Have an address answer once.
+
+    After silence it is asked again as often as told: most addresses have nobody. After a damaged
+    answer it always is, for somebody is there.
+    """
+    retries: dict[type[LinkError], int] = {
+        NoAnswer: silence_retries,
+        DamagedAnswer: _DAMAGE_RETRIES,
+    }
+    status = drive.model.key_of_status
+    while True:
+        try:
+            await drive.registers.read_data(status, Priority.POLL, once=True)
+        except (NoAnswer, DamagedAnswer) as error:
+            kind = NoAnswer if isinstance(error, NoAnswer) else DamagedAnswer
+            if not retries[kind]:
+                raise
+            retries[kind] -= 1
+        else:
+            return
 
 
 def _row(facts: dict[str, str]) -> str:

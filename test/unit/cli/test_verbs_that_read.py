@@ -187,8 +187,8 @@ def test_what_makes_no_sense_is_a_matter_of_usage(
 
 
 def test_scan_finds_who_answers(nfo: Nfo, bench: Bench) -> None:
-    done = nfo('scan', '--addresses', '2-4,1')
-    assert done.status == 0
+    done = nfo('scan', '--addresses', '2-3,1', '--retries', 1)
+    assert done.status == 0, done.err
     rows = [line.split() for line in done.out.splitlines()]
     assert rows[0][0] == 'address'
     assert [row[0] for row in rows[1:]] == ['1', '2']
@@ -208,10 +208,8 @@ def test_scan_asks_every_address_that_a_drive_may_have(
 
 
 def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
-    done = nfo(
-        'scan', '--addresses', '1-2', '--all-settings', '--json'
-    )
-    assert done.status == 0
+    done = nfo('scan', '--addresses', '1-2', '--all-settings', '--json', '--retries', 1)
+    assert done.status == 0, done.err
     found = json.loads(done.out)
     # a pseudo-terminal has no baud rate, so that the first setting finds them
     assert [(drive['address'], drive['line']) for drive in found] == [
@@ -226,11 +224,30 @@ def test_scan_finds_nobody(nfo: Nfo) -> None:
     assert 'no response' in done.err
 
 
+@pytest.mark.parametrize(
+    ('fault', 'retries', 'requests', 'found'),
+    [
+        ('drop', (), 1, False),
+        ('drop', ('--retries', 1), 2, True),
+        # somebody is there, whatever was said
+        ('damage', (), 2, True),
+    ],
+)
+def test_scan_asks_again(
+    nfo: Nfo, bench: Bench, fault: str, retries: tuple[object, ...], requests: int, found: bool
+) -> None:
+    bench.simulator.inject(fault, 1, address=1)
+    done = nfo('scan', '--addresses', '1', *retries)
+    assert (done.status == 0) is found, done.err
+    assert bench.requests()[:3].count(bench.requests()[0]) == requests
+    assert bench.writes() == []
+
+
 def test_scan_writes_a_parameter_file_for_the_driver(
     nfo: Nfo, bench: Bench, tmp_path: Path
 ) -> None:
     file = tmp_path / 'line.yaml'
-    arguments = ('scan', '--addresses', '1-3', '--params', file)
+    arguments = ('scan', '--addresses', '1-3', '--params', file, '--retries', 1)
     done = nfo(*arguments)
     assert done.status == 0, done.err
     assert f'--params-file {file}' in done.err
@@ -262,7 +279,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
 
 
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
-    done = nfo('scan', '--addresses', '1', '--params', '-')
+    done = nfo('scan', '--addresses', '1', '--params', '-', '--retries', 1)
     assert done.status == 0, done.err
     assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
     assert 'NFO1001' in done.err
