@@ -77,7 +77,8 @@ def says(process: Process, text: str) -> None:
 def one(bench: Bench) -> Any:
     """Start a drive that is quick, and its driver; return what looks into it."""
     drive = bench.simulator(*bench.drives.ramps(1))
-    bench.driver()
+    # a busy machine may hold the client up; none of these tests is about it
+    bench.driver('-p', 'setpoint_timeout:=10.0')
     bench.client().connected()
     return drive
 
