@@ -45,11 +45,11 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link.interface import BAUD_RATES
+from nfo_sinus_driver.link.interface import NeverSilent
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
@@ -191,21 +191,23 @@ async def _first_answer(drive: Remote, silence_retries: int) -> None:
     After silence it is asked again as often as told: most addresses have nobody. After a damaged
     answer it always is, for somebody is there.
     """
-    retries: dict[type[LinkError], int] = {
-        NoAnswer: silence_retries,
-        DamagedAnswer: _DAMAGE_RETRIES,
-    }
+    damage_retries = _DAMAGE_RETRIES
     status = drive.model.key_of_status
     while True:
         try:
             await drive.registers.read_data(status, Priority.POLL, once=True)
-        except (NoAnswer, DamagedAnswer) as error:
-            kind = NoAnswer if isinstance(error, NoAnswer) else DamagedAnswer
-            if not retries[kind]:
-                raise
-            retries[kind] -= 1
-        else:
             return
+        except NoAnswer:
+            if not silence_retries:
+                raise
+            silence_retries -= 1
+        except NeverSilent:
+            # nothing was asked
+            raise
+        except DamagedAnswer:
+            if not damage_retries:
+                raise
+            damage_retries -= 1
 
 
 def _row(facts: dict[str, str]) -> str:
