@@ -29,7 +29,6 @@ from pathlib import Path
 import signal
 import sys
 import tempfile
-import threading
 import time
 
 import rclpy
@@ -45,6 +44,7 @@ from nfo_sinus_driver.demo.sequence import HEADING
 from nfo_sinus_driver.demo.sequence import PATIENCE
 from nfo_sinus_driver.demo.sequence import DemoSequence
 from nfo_sinus_driver.demo.sequence import StepError
+from nfo_sinus_driver.node.executor import spinning
 
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')
@@ -113,10 +113,7 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
         sequence = DemoSequence()
         stack.callback(sequence.destroy_node)
         executor.add_node(sequence)
-        thread = threading.Thread(target=executor.spin, daemon=True)
-        thread.start()
-        stack.callback(thread.join)
-        stack.callback(executor.shutdown)
+        stack.enter_context(spinning(executor))
         yield sequence
 
 

@@ -35,7 +35,6 @@ import time
 
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
@@ -43,6 +42,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from nfo_sinus_driver.demo.recording import Recorder
 from nfo_sinus_driver.demo.recording import RecordingError
+from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -136,20 +136,12 @@ def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recor
         )
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
-        thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
-        thread.start()
-        stack.callback(thread.join)
-        stack.callback(executor.shutdown)
+        stack.enter_context(spinning(executor))
         yield recorder
 
 
 def _tell_heard(drive: str) -> None:
     print(f'record: {drive} is heard', flush=True)
-
-
-def _spin(executor: SingleThreadedExecutor) -> None:
-    with contextlib.suppress(ExternalShutdownException):
-        executor.spin()
 
 
 def _wait(recorder: Recorder, drive: str, seconds: float) -> None:

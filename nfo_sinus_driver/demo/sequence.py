@@ -135,6 +135,8 @@ class DemoSequence(Node):
         self._trigger('stop')
         self._wait_for('standby', lambda: self._inv_st and self._inv_st.code == _BUS_STANDBY)
         self._setpoint = None
+        # of what is told, the state may be newer than the frequency
+        self._wait_for('standstill', near(0.0))
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
     def _wait_for(self, what: str, condition: Callable[[], object]) -> None:

@@ -17,6 +17,9 @@ Who serves one node: its thread sleeps until something is asked of the node, and
 
 Services have no order among them: of two requests the later may be taken first. So this tells when
 each was received, too.
+
+Who has just come may ask before the middleware knows where his answer goes, which it then drops.
+So this sends it again.
 """
 
 from __future__ import annotations
@@ -24,11 +27,15 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Iterable
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+import contextlib
 from contextvars import ContextVar
 import logging
 import threading
 import time
+from typing import Any
+import warnings
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ConditionReachedException
@@ -50,6 +57,11 @@ _NOTHING = (
 
 #: No request waits for its turn for longer, s: a start delay before it may last an hour.
 _LONGEST_WAIT = 4000.0
+#: When an answer that was dropped is sent again, s after the last time. Each time that is in vain
+#: holds up all threads for 0.1 s, for rclpy lets none of them run while the middleware waits.
+_SENT_AGAIN_AFTER = (0.2, 0.5, 2.0)
+#: How rclpy tells that an answer was dropped: as a warning, which nobody may see a second time.
+_DROPPED = 'failed to send response'
 _received: ContextVar[float] = ContextVar('received')
 
 
@@ -90,6 +102,7 @@ class NodeExecutor(Executor):
 
     def start(self) -> None:
         """Begin to serve."""
+        warnings.filterwarnings('error', _DROPPED, RuntimeWarning)
         self._thread.start()
 
     @property
@@ -139,19 +152,60 @@ class NodeExecutor(Executor):
                 response = await await_or_execute(srv.callback, request, srv.srv_type.Response())
             finally:
                 _received.reset(token)
-            srv.send_response(response, header)
+            self._respond(srv, response, header)
 
         return answer
+
+    def _respond(
+        self,
+        srv: Service,
+        response: Any,
+        header: Any,
+        again_after: tuple[float, ...] = _SENT_AGAIN_AFTER,
+    ) -> None:
+        """Send an answer, and soon again if the middleware does not know yet where to."""
+        try:
+            srv.send_response(response, header)
+        except InvalidHandle:
+            # the service was destroyed meanwhile
+            return
+        except (RuntimeWarning, SystemError) as error:
+            if not _is_dropped(error):
+                raise
+        else:
+            return
+        if not again_after:
+            with contextlib.suppress(InvalidHandle):
+                _log.warning(
+                    'an answer of %s was dropped by the middleware, which does not find the '
+                    'caller: he may be gone; if he waits, call again', srv.service_name,
+                )
+            return
+        # not on a thread of the pool, for the next call may need it
+        timer = threading.Timer(
+            again_after[0], self._respond, (srv, response, header, again_after[1:])
+        )
+        timer.daemon = True
+        timer.start()
 
     def _is_ending(self) -> bool:
         return self._ending
 
     def _serve(self) -> None:
-        while not self._ending:
+        while not self._ending and self._context.ok():
             try:
                 self.spin_once()
             except Exception:
                 _log.exception('error in an executor; it goes on')
+
+
+def _is_dropped(error: BaseException) -> bool:
+    """Whether rclpy says that an answer was dropped, itself or as the cause of another error."""
+    while not isinstance(error, RuntimeWarning):
+        if error.__cause__ is None:
+            return False
+        error = error.__cause__
+    return _DROPPED in str(error)
 
 
 async def _do_nothing() -> None:
@@ -178,3 +232,23 @@ def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
     waiter = threading.Thread(target=lambda: [one.finish() for one in executors], daemon=True)
     waiter.start()
     waiter.join(timeout)
+
+
+@contextlib.contextmanager
+def spinning(executor: Executor) -> Iterator[None]:
+    """Have an executor of rclpy spun on a thread, which ends before what it waits for is gone."""
+    ended = threading.Event()
+
+    def spin() -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            while not ended.is_set():
+                executor.spin_once()
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.create_task(ended.set)
+        thread.join()
+        executor.shutdown()

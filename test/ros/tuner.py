@@ -28,13 +28,16 @@ class Tuner:
     A client of the action.
 
     An action client of rclpy knows of a request only once it is sent, and drops an answer that
-    another thread hears before: all requests are sent by the thread that hears the answers.
+    another thread hears before: all requests are sent by the thread that hears the answers. That
+    one ends with an error if what it waits for is destroyed by another.
     """
 
     def __init__(self, client: Client, name: str = '/nfo_sinus') -> None:
         self._client = client
-        self._action = ActionClient(client.node, Tune, f'{name}/tune')
-        client.callback(self._action.destroy)
+        self._action = client.where_it_spins(
+            lambda: ActionClient(client.node, Tune, f'{name}/tune')
+        )
+        client.callback(client.where_it_spins, self._action.destroy)
         wait_until(self._action.server_is_ready, 'there is an action server')
         self.feedback: list[Tune.Feedback] = []
 
