@@ -107,7 +107,8 @@ def wait_until(
         for process in _watched:
             process.has_not_crashed(what)
         assert time.monotonic() < deadline, (
-            f'not within {timeout:g} s: {what}; {"; ".join(map(_last_words, _watched))}'
+            f'not within {timeout:g} s: {what}; '
+            f'{"; ".join([*map(_last_words, _watched), *map(_last_seen, _views)])}'
         )
         time.sleep(period)
 
@@ -196,8 +197,14 @@ def _last_words(driver: Process) -> str:
     return f'the driver says at last:\n{driver.text[-2000:]}'
 
 
+def _last_seen(view: Terminal) -> str:
+    return f'the view shows:\n{view.text}'
+
+
 #: The drivers at work: what a test waits for will not come when one of them has ended by itself.
 _watched: list[Process] = []
+#: The views at work, of which a screen tells what they were asked for.
+_views: list[Terminal] = []
 
 
 class Bench(contextlib.ExitStack):
@@ -275,7 +282,10 @@ class Bench(contextlib.ExitStack):
     def view(self, *arguments: str, columns: int = 80, rows: int = 24) -> Terminal:
         """Start the view of all drives on a terminal of its own."""
         command = [sys.executable, '-m', 'nfo_sinus_driver.node.monitor', *arguments]
-        return self.enter_context(Terminal(command, columns, rows, self._environment))
+        view = self.enter_context(Terminal(command, columns, rows, self._environment))
+        _views.append(view)
+        self.callback(_views.remove, view)
+        return view
 
     @property
     def log(self) -> str:

@@ -430,11 +430,12 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
 def test_each_drive_tells_its_own_statistics(bench: Bench) -> None:
     drive = bench.simulator('--address', '1', '--address', '2')
     parameters = bench.folder / 'two.yaml'
-    # so long that no answer of the other is late on a busy machine
+    # so long that no answer of the other is late on a busy machine; and one that is silent is
+    # asked several times before it is lost
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [left, right], response_timeout: 1.0}}\n'
         'left: {ros__parameters: {address: 1}}\n'
-        'right: {ros__parameters: {address: 2}}\n'
+        'right: {ros__parameters: {address: 2, lost_after: 5.0}}\n'
     )
     bench.driver('--params-file', str(parameters))
     left = bench.client('/left').connected()

@@ -31,6 +31,8 @@ _TWO = """
 /**/drive_2: {ros__parameters: {address: 1}}
 /**/drive_10: {ros__parameters: {address: 2}}
 """
+#: What the key for the row above sends.
+_UP = '\x1b[A'
 
 
 def start(bench: Bench) -> object:
@@ -58,7 +60,8 @@ def test_a_fault_a_lost_line_and_stops_by_keys(bench: Bench, columns: int) -> No
     with first.setpoints(20.0), second.setpoints(25.0):
         # no standstill before this: with its message it is taken for what was asked for
         view.wait_for('► 2 running', '20.0 Hz', '25.0 Hz', 'enabled')
-        view.press('s')
+        # whoever is discovered first is chosen, and remains so when the other comes above it
+        view.press(_UP + 's')
         wait_until(lambda: not simulator.state(1)['turning'], 'the one that was chosen stands')
         view.wait_for('■ 1 standing', '► 1 running')
         assert simulator.state(2)['turning'], 'the other one runs on'
