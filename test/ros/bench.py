@@ -74,6 +74,8 @@ PATIENCE = 90.0
 _STARTING = 3 * PATIENCE
 #: After how long a question is asked anew, s.
 _ASK_ANEW = 10.0
+#: How long a process may take to say where its threads are, s.
+_STACKS_PATIENCE = 5.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
 
@@ -161,6 +163,18 @@ class Process:
         """Its number."""
         return self._process.pid
 
+    def stacks(self) -> str:
+        """Return where its threads are, if it can be asked."""
+        if not isinstance(self._process, forks.Fork) or not self.running:
+            return ''
+        before = len(self.text)
+        self._process.send_signal(forks.TELL_STACKS)
+        deadline = time.monotonic() + _STACKS_PATIENCE
+        # the one that got the signal, which is told last, is called the current one
+        while 'Current thread' not in self.text[before:] and time.monotonic() < deadline:
+            time.sleep(0.1)
+        return self.text[before:]
+
     def signal(self, number: int, thread: int | None = None) -> None:
         """Send it, or one of its threads, a signal, which may end it."""
         self._may_end = True
@@ -194,7 +208,8 @@ class Process:
 
 
 def _last_words(driver: Process) -> str:
-    return f'the driver says at last:\n{driver.text[-2000:]}'
+    said = driver.text[-2000:]
+    return f'the driver says at last:\n{said}\nand its threads are at\n{driver.stacks()[:20000]}'
 
 
 def _last_seen(view: Terminal) -> str:

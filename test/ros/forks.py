@@ -24,6 +24,7 @@ command from its beginning to its end, as a process of its own would.
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import functools
 import importlib
 import json
@@ -50,6 +51,8 @@ _MODULES = (
 #: In the environment: how patient the driver takes a PLC for, s, on a machine that may rest for
 #: longer than a PLC waits.
 PLC_TIME = 'PLC_TIME_OF_TESTS'
+#: What makes a fork tell where each of its threads is; the driver takes others for a wish to end.
+TELL_STACKS = signal.SIGURG
 _SET_CHILD_SUBREAPER = 36
 _SET_PARENT_DEATH_SIGNAL = 1
 #: How often it is looked whether one has ended, s.
@@ -153,6 +156,8 @@ def _become(command: list[str], environment: dict[str, str], log: str) -> None:
         os.dup2(opened, descriptor)
         os.close(opened)
     os.dup2(1, 2)
+    # to the log itself, whatever becomes of the output
+    faulthandler.register(TELL_STACKS, os.dup(1))
     if PLC_TIME in environment:
         importlib.import_module('nfo_sinus_driver.link.telegram').PLC_TIME = float(
             environment[PLC_TIME]
