@@ -149,11 +149,11 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     end = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt):
         _sleep_until(min(end, time.monotonic() + _PATIENCE))
-        if not recorder.count_publishers(f'{drive}/status'):
+        if not recorder.hears_drive:
             domain = os.environ.get('ROS_DOMAIN_ID', '0')
             print(
-                f'record: nothing publishes {drive}/status yet: does the driver run, with '
-                f'this name and in this ROS_DOMAIN_ID ({domain})?',
+                f'record: nothing is heard of {drive} yet: does the driver run, with this name '
+                f'and in this ROS_DOMAIN_ID ({domain})?',
                 file=sys.stderr, flush=True,
             )
         _sleep_until(end)

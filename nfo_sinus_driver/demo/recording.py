@@ -109,6 +109,7 @@ class Recorder(Node):
         self._heard: Callable[[], None] | None = heard
         self._error: Exception | None = None
         self._count = 0
+        self._began = time.monotonic()
         self._writer = Writer(
             folder, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP
         )
@@ -120,6 +121,11 @@ class Recorder(Node):
             raise RecordingError(f'no bag can be written to {folder}: {error}') from error
         for topic, type_, qos in topics_of(drive):
             self._record(topic, type_, qos)
+
+    @property
+    def hears_drive(self) -> bool:
+        """The drive has told its status."""
+        return self._heard is None
 
     def __enter__(self) -> Recorder:
         return self
@@ -138,7 +144,8 @@ class Recorder(Node):
         if self._error is not None:
             raise RecordingError(f'the bag is not whole: {self._error}')
         if not self._count:
-            raise RecordingError('the bag is empty: nothing was heard')
+            seconds = time.monotonic() - self._began
+            raise RecordingError(f'the bag is empty: nothing was heard in {seconds:.1f} s')
 
     def _record(self, topic: str, type_: type, qos: QoSProfile) -> None:
         name = name_of(type_)

@@ -496,6 +496,9 @@ class Poller:
 
     def _publish(self, seen: InverterStatus | None) -> None:
         inverter = self._inverter
+        if seen is not None and inverter.seen is not None and inverter.seen.at > seen.at:
+            # a command has looked since: with it the drive may be enabled, its fault acknowledged
+            seen = inverter.seen
         frequency, speed = (inverter.last_polled(role) for role in _BASIC)
         actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
         self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)

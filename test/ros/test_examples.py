@@ -105,11 +105,17 @@ def _tells(fault: Any) -> Callable[[Any], bool]:
     return lambda inv_st: inv_st.code == (fault.told or fault.code)
 
 
-def runs(drive: Any, frequency: float, address: int | None = None) -> None:
-    """Wait until a motor follows a set-point, Hz."""
-    drive.wait_for(
-        lambda state: abs(state['frequency'] - frequency) < 0.5, timeout=PATIENCE, address=address
-    )
+def runs(process: Process, drive: Any, frequency: float, address: int | None = None) -> None:
+    """Wait until a motor follows a set-point, Hz, that an example sends."""
+
+    def follows(state: dict[str, Any]) -> bool:
+        assert process.running, f'the example has ended:\n{process.text}'
+        return abs(state['frequency'] - frequency) < 0.5
+
+    try:
+        drive.wait_for(follows, timeout=PATIENCE, address=address)
+    except TimeoutError as error:
+        raise AssertionError(f'{error}; the example says:\n{process.text}') from error
 
 
 # --- one drive --------------------------------------------------------------------------------
@@ -124,7 +130,7 @@ def ride(bench: Bench, *arguments: str) -> Process:
 def test_a_ride_goes_up_and_down_and_stops(bench: Bench) -> None:
     drive = one(bench)
     process = ride(bench, '--frequency', '-20', '--hold', '1.5')
-    runs(drive, -20.0)
+    runs(process, drive, -20.0)
     assert process.wait() == 0, process.text
     assert not bench.drives.commanded(drive.state())
     stands(drive)
@@ -135,7 +141,7 @@ def test_rides_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     # one after the other, for the start of a driver is what takes long
     drive = one(bench)
     process = ride(bench)
-    runs(drive, 20.0)
+    runs(process, drive, 20.0)
     process.signal(signal.SIGINT)
     # another one cuts nothing short
     process.signal(signal.SIGHUP)
@@ -145,14 +151,14 @@ def test_rides_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     stands(drive)
     # somebody else stops it
     process = ride(bench)
-    runs(drive, 20.0)
+    runs(process, drive, 20.0)
     assert bench.client().call('stop').success
     assert process.wait() == 1, process.text
     assert 'stopped by somebody else' in process.text
     stands(drive)
     # nobody confirms the stop
     process = ride(bench)
-    runs(drive, 20.0)
+    runs(process, drive, 20.0)
     drive.inject('silence', 3600.0)
     assert process.wait() == 1
     assert 'the drive does not respond' in process.text
@@ -166,7 +172,7 @@ def test_a_fault_is_told_and_acknowledged_only_where_that_is_wanted(bench: Bench
     drive = one(bench)
     overload = bench.drives.overload
     process = ride(bench)
-    runs(drive, 20.0)
+    runs(process, drive, 20.0)
     drive.inject('fault', overload.code)
     assert process.wait() == 1, process.text
     shown = bench.client().wait_for('inv_st', _tells(overload), 'fault')
@@ -181,7 +187,7 @@ def test_a_fault_is_told_and_acknowledged_only_where_that_is_wanted(bench: Bench
     assert drive.state()['fault'] == overload.code
     # with it a ride begins
     process = ride(bench, '--acknowledge')
-    runs(drive, 20.0)
+    runs(process, drive, 20.0)
     assert told in process.text and 'acknowledged' in process.text
     drive.inject('fault', overload.code)
     # and another fault ends it: acknowledged, but nothing turns again
@@ -209,7 +215,7 @@ def test_a_conveyor_stops_all_when_one_drops_out(bench: Bench) -> None:
     def dropped_out(happens: Callable[[], object], told: str) -> Process:
         process = start(bench, 'conveyor', '--drives', *_NAMES, *_PATIENT)
         for address in (1, 2):
-            runs(drives, 20.0, address)
+            runs(process, drives, 20.0, address)
         happens()
         assert process.wait() == 1, process.text
         assert told in process.text
@@ -243,7 +249,7 @@ def test_a_conveyor_ends_by_ctrl_c_and_by_a_status_that_is_too_old(bench: Bench)
     drives = two(bench)
     process = start(bench, 'conveyor', '--drives', *_NAMES, *_PATIENT, '--frequency', '-15')
     for address in (1, 2):
-        runs(drives, -15.0, address)
+        runs(process, drives, -15.0, address)
     process.signal(signal.SIGINT)
     assert process.wait() == 0, process.text
     for address in (1, 2):
@@ -300,8 +306,8 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
     process = run()
     # a curve to the left
     with steered(client, 0.3, 0.2):
-        runs(drives, hertz(0.3 - 0.2 * _TRACK / 2), 1)
-        runs(drives, -hertz(0.3 + 0.2 * _TRACK / 2), 2)
+        runs(process, drives, hertz(0.3 - 0.2 * _TRACK / 2), 1)
+        runs(process, drives, -hertz(0.3 + 0.2 * _TRACK / 2), 2)
     # nobody steers any more
     for name in ('left', 'right'):
         wait_until(
@@ -309,14 +315,14 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
             f'the driver misses the set-points of {name}',
         )
     for address in (1, 2):
-        runs(drives, 0.0, address)
+        runs(process, drives, 0.0, address)
     with steered(client, math.nan, 0.0):
         says(process, 'a Twist that is not finite is ignored')
     # beyond the limit backwards, and it is enabled all the while
     assert client.latest('status').enabled
     with steered(client, -9.0, 0.0):
-        runs(drives, -_MOST, 1)
-        runs(drives, _MOST, 2)
+        runs(process, drives, -_MOST, 1)
+        runs(process, drives, _MOST, 2)
         process.signal(signal.SIGTERM)
         assert process.wait() == 0, process.text
     for address in (1, 2):
@@ -325,8 +331,8 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
 
     process = run()
     with steered(client, 0.0, -1.0):
-        runs(drives, hertz(_TRACK / 2), 1)
-        runs(drives, hertz(_TRACK / 2), 2)
+        runs(process, drives, hertz(_TRACK / 2), 1)
+        runs(process, drives, hertz(_TRACK / 2), 2)
         assert client.call('stop').success
         assert process.wait() == 1, process.text
     assert '/left: not enabled, or stopped by somebody else' in process.text
@@ -409,7 +415,7 @@ def test_the_cpp_client_turns_the_motor_and_stops_it(bench: Bench) -> None:
         log = bench.folder / f'cpp_client{status}.log'
         process = Process([*command, '-p', 'frequency:=-20.0'], environment, log)
         bench.callback(process.end)
-        runs(drive, -20.0)
+        runs(process, drive, -20.0)
         for number in signals:
             process.signal(number)
         assert process.wait() == status, process.text

@@ -109,7 +109,7 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
 def test_a_recorder_that_hears_nothing_says_what_to_check(bench: Bench) -> None:
     recorder = _recorder(bench, '--output', str(bench.folder / 'out'), '--for', '6')
     assert recorder.wait() == 1
-    assert 'nothing publishes /nfo_sinus/status yet' in recorder.text
+    assert 'nothing is heard of /nfo_sinus yet' in recorder.text
     assert f'in this ROS_DOMAIN_ID ({bench.domain})?' in recorder.text
     assert 'the bag is empty: nothing was heard' in recorder.text
     assert 'Traceback' not in recorder.text
@@ -118,7 +118,7 @@ def test_a_recorder_that_hears_nothing_says_what_to_check(bench: Bench) -> None:
 @needs('own')
 def test_a_signal_that_comes_to_another_thread_ends_a_recorder(bench: Bench) -> None:
     recorder = _recorder(bench, '--output', str(bench.folder / 'out'))
-    wait_until(lambda: 'nothing publishes' in recorder.text, 'it waits without end')
+    wait_until(lambda: 'nothing is heard' in recorder.text, 'it waits without end')
     # the system chooses one when the process was suspended, and Python does not wake the main one
     other = max(int(path.name) for path in Path(f'/proc/{recorder.pid}/task').iterdir())
     recorder.signal(signal.SIGTERM, thread=other)

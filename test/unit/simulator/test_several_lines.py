@@ -352,7 +352,8 @@ def test_sio_errors_and_torn_counters_on_request(open_master):
 
 
 @pytest.fixture
-def start():
+def start(folder):
+    # the folder goes after what runs in it, which may put something there until its end
     running = []
 
     def start_(*arguments):

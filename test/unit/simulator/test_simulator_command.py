@@ -35,7 +35,8 @@ READ_MODE = bytes.fromhex('0302940001')
 
 
 @pytest.fixture
-def start():
+def start(folder):
+    # the folder goes after what runs in it, which may put something there until its end
     running = []
 
     def start_(*arguments):
