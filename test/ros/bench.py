@@ -389,6 +389,11 @@ class Client(contextlib.ExitStack):
         messages = self.messages[key]
         return messages[-1] if messages else None
 
+    def newest(self, key: str) -> Any:
+        """Return the newest message of a topic; wait for the first."""
+        wait_until(lambda: self.messages[key], f'a message of {key}')
+        return self.messages[key][-1]
+
     def wait_for(
         self, key: str, condition: Callable[[Any], Any], what: str, timeout: float = PATIENCE
     ) -> Any:

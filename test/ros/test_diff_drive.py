@@ -214,7 +214,7 @@ def test_wheels_follow_the_controller_and_stop_when_it_is_gone(bench: Bench) -> 
         wait_until(lambda a=address: abs(turns(simulator, a)) < 1, 'it ramps to a stop')
     wait_until(lambda: bench.log.count(_RUNS_DRY) >= told + 2, 'the log says so of each')
     assert bench.log.count(_RUNS_DRY) == told + 2
-    assert client.latest('status').enabled
+    assert client.newest('status').enabled
     # it is back
     parts = components(_FOLDER / 'robot.urdf')
     with Hardware(client, parts, _RATE):

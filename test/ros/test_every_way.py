@@ -156,7 +156,7 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
             assert status.reverse == (frequency < 0)
         if 'direct' in rig.way.features:
             wait_until(
-                lambda: client.latest('inv_st').text == rig.drive.state()['inv_st_text'],
+                lambda: client.newest('inv_st').text == rig.drive.state()['inv_st_text'],
                 'the text on the display',
             )
         client.wait_for('telemetry', lambda m: abs(m.frequency - frequency) < 1, 'telemetry')

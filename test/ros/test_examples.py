@@ -319,7 +319,7 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
     with steered(client, math.nan, 0.0):
         says(process, 'a Twist that is not finite is ignored')
     # beyond the limit backwards, and it is enabled all the while
-    assert client.latest('status').enabled
+    assert client.newest('status').enabled
     with steered(client, -9.0, 0.0):
         runs(process, drives, -_MOST, 1)
         runs(process, drives, _MOST, 2)

@@ -184,7 +184,7 @@ def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -
 
     def turn_on() -> bool:
         return all(
-            client.latest('status').enabled and abs(client.latest('status').actual - 20.0) < 1.0
+            client.newest('status').enabled and abs(client.newest('status').actual - 20.0) < 1.0
             for client in (infeed, outfeed)
         )
 

@@ -134,7 +134,7 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
             assert telemetry.dc_link_voltage == pytest.approx(565, abs=40)
     with client.setpoints(-10.0):
         client.wait_for('status', lambda status: status.actual < -9, 'reverse')
-        assert client.latest('status').reverse == ('reverse' not in bench.way.untold)
+        assert client.newest('status').reverse == ('reverse' not in bench.way.untold)
 
 
 def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench) -> None:
@@ -143,7 +143,7 @@ def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench
     client = bench.client()
     wait_until(lambda: len(client.messages['statistics']) > 1, 'statistics')
     client.wait_for('status', lambda status: not status.connected, 'a status all the same')
-    assert math.isnan(client.latest('status').actual)
+    assert math.isnan(client.newest('status').actual)
     wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'diagnostics of the drive')
     wait_until(lambda: _diagnosis(client, 'nfo_sinus_bus: line'), 'diagnostics of the line')
     first, *others = bench.way.nobody
@@ -177,7 +177,7 @@ def test_diagnostics_of_an_address_where_nobody_is_are_steady(bench: Bench) -> N
     wait_until(shown, 'what to check')
     client.wait_for('statistics', lambda message: message.transactions > 0, 'it was asked')
     seen = len(client.messages['diagnostics'])
-    before = client.latest('statistics').transactions
+    before = client.newest('statistics').transactions
     # over several tries of autostart, each with a rest
     client.wait_for('statistics', lambda message: message.transactions >= before + 3, 'more tries')
     told = {
@@ -191,7 +191,7 @@ def test_diagnostics_of_an_address_where_nobody_is_are_steady(bench: Bench) -> N
         assert level == DiagnosticStatus.ERROR
         assert all(word in message for word in others)
     assert driver.text.count(first) == 1
-    assert client.latest('statistics').silent_drives == ['nfo_sinus']
+    assert client.newest('statistics').silent_drives == ['nfo_sinus']
 
 
 @needs('direct')
@@ -420,7 +420,7 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
         left.wait_for('statistics', lambda m: m.silent_drives == ['right'], 'it is named')
         seen = len(left.messages['status'])
         wait_until(lambda: len(left.messages['status']) > seen + 50, 'left is polled on')
-        assert left.latest('status').enabled
+        assert left.newest('status').enabled
         assert drive.state(1)['turning']
         response = left.call('stop')
         assert response.success, response.message

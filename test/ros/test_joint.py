@@ -86,10 +86,10 @@ def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio
             'the shaft turns as it was told',
         )
         assert list(state.name) == ['belt']
-        before = client.latest('joint_states').position[0]
+        before = client.newest('joint_states').position[0]
         way = math.copysign(1.0, velocity)
         wait_until(
-            lambda: way * (client.latest('joint_states').position[0] - before) > 1.0,
+            lambda: way * (client.newest('joint_states').position[0] - before) > 1.0,
             'the shaft gets on',
         )
 

@@ -74,7 +74,7 @@ def test_settings_are_written_while_the_motor_turns_by_the_bus(bench: Bench) -> 
     with client.run_at(10.0):
         assert set_one(client, 'freque.f_fix1', 12.5).successful
         assert drive.state()['driven']
-        assert client.latest('status').enabled
+        assert client.newest('status').enabled
     assert drive.state()['parameters']['freque.f_fix1'] == 12.5
 
 

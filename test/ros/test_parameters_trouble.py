@@ -182,7 +182,7 @@ def test_what_a_running_motor_forbids_keeps_the_others_from_being_written(
         assert registers.isdisjoint(write.register for write in wire.writes())
         assert stubborn.parameters() == before
         assert client.set_parameters(**{'freque.f_fix1': 60.0, 'motor.u_nom': 400}).successful
-        assert client.latest('status').enabled, 'and it runs on'
+        assert client.newest('status').enabled, 'and it runs on'
     assert client.call('stop').success
     _stands(stubborn)
     assert set_one(client, 'motor.u_nom', 230).successful
