@@ -80,7 +80,7 @@ _STACKS_PATIENCE = 5.0
 A_WHILE = 2.0
 
 #: How often a drive is polled where a test does not want it as fast as the line allows, Hz.
-POLL_RATE = 25.0
+POLL_RATE = 10.0
 #: For how long a PLC misses the driver, or the drive, before it stops the motor, s.
 _PLC_TIME = 5.0
 #: For a test that does.

@@ -46,7 +46,7 @@ EITHER_WAY = pytest.mark.parametrize(
 )
 _BOOT = ('--boot-time', '0.5')
 #: The computer has more to do than this one driver.
-_MODEST = ('-p', 'poll_rate:=25')
+_MODEST = ('-p', 'poll_rate:=10')
 
 _NAMES = {line.split(',')[2] for line in setting_names.SETTINGS.splitlines() if line}
 
@@ -255,6 +255,7 @@ def _deactivate_and_clean_up(rig: Rig) -> None:
         assert rig.client.change_state(transition)
 
 
+@pytest.mark.shared
 @pytest.mark.parametrize(
     'event',
     [

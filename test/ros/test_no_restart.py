@@ -34,7 +34,7 @@ from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 #: The computer has more to do than this one driver.
-_MODEST = ('-p', 'poll_rate:=20.0')
+_MODEST = ('-p', 'poll_rate:=10.0')
 
 #: One drive and its driver for all events: each test leaves it stopped.
 Rig = tuple[Bench, Simulated, Client]

@@ -23,6 +23,7 @@ import threading
 import time
 from typing import Any
 
+from drive_rig import MODEST
 from drive_rig import PATIENCE
 from drive_rig import QUICK
 from drive_rig import Notes
@@ -86,7 +87,9 @@ class CanopenRig(contextlib.ExitStack):
         self.notes = {address: Notes() for address in addresses}
         self.drives = {
             address: Drive(
-                self.bus, DriveSettings(address=address, **settings), self.notes[address]
+                self.bus,
+                DriveSettings(**{'address': address, 'poll_rate': MODEST, **settings}),
+                self.notes[address],
             )
             for address in addresses
         }

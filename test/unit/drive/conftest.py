@@ -23,6 +23,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
+from drive_rig import MODEST
 from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import patient
@@ -60,6 +61,7 @@ def make_rig(tmp_path: Path, unhurried: None) -> Iterator[MakeRig]:
             **settings: Any,
         ) -> Rig:
             settings.setdefault('lost_after', patient(settings.get('drive_timeout', 0.0)))
+            settings.setdefault('poll_rate', MODEST)
             rig = Rig(
                 tmp_path / 'trace',
                 DriveSettings(**settings),

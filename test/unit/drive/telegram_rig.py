@@ -27,6 +27,7 @@ import time
 from typing import Any
 from unittest import mock
 
+from drive_rig import MODEST
 from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
@@ -72,7 +73,12 @@ class TelegramRig:
         self.link = open_link('modbus_tcp', self.simulator.port, line)
         self.bus = Bus(self.link)
         self.notes = Notes()
-        usual = {'control_method': 'telegram1', 'lost_after': UNHURRIED, 'setpoint_timeout': 0.0}
+        usual = {
+            'control_method': 'telegram1',
+            'lost_after': UNHURRIED,
+            'setpoint_timeout': 0.0,
+            'poll_rate': MODEST,
+        }
         self.settings = DriveSettings(model=model, **{**usual, **settings})
         self.drive = Drive(self.bus, self.settings, self.notes)
         #: Somebody waits for less than a busy machine may rest.
@@ -118,7 +124,7 @@ class TelegramRig:
             while self._publishing.is_set():
                 with contextlib.suppress(DriveError):
                     self.drive.set_setpoint(value)
-                time.sleep(0.01)
+                time.sleep(1 / MODEST)
 
         self._publisher = threading.Thread(target=work, daemon=True)
         self._publisher.start()

@@ -30,6 +30,7 @@ from support.said import said
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.simulator.sinus_optimal import control_unit
 
 OVERLOAD = 5
@@ -122,7 +123,11 @@ def test_run_input_lost_and_back(rig: Rig) -> None:
     assert rig.enable().startswith('enabled')
 
 
-def test_without_the_run_input_it_is_not_enabled(rig: Rig) -> None:
+def test_without_the_run_input_it_is_not_enabled(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # what will not happen need not be waited for
+    monkeypatch.setattr(drive_state, 'TIMEOUT', 1.0)
     rig.connect()
     rig.simulator.inject('run', False)
     assert 'RUN input' in rig.refused(rig.drive.enable())

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 
+from drive_rig import MODEST
 from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
@@ -76,7 +77,10 @@ class Rig:
         self.bus.start()
         dialect = str(way.driver.get('classic_dialect', ''))
         settings = DriveSettings(
-            model=way.model, control_method=self.method, classic_dialect=dialect
+            model=way.model,
+            control_method=self.method,
+            classic_dialect=dialect,
+            poll_rate=MODEST,
         )
         self.drive = Drive(self.bus, settings, self.notes)
         self.drive.connect().result(PATIENCE)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from drive_rig import MODEST
 from drive_rig import PATIENCE
 from drive_rig import Notes
 from drive_rig import wait_until
@@ -37,6 +38,8 @@ from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.sinus_g2.classic import Server
 
+SETTINGS = DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0, poll_rate=MODEST)
+
 
 def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
     settings = {'control.accel': 2.0, 'control.retard': 20.0}
@@ -44,7 +47,7 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
     with Simulator(protocol='classic', dialect='5.0', boot_time=0.2, settings=settings) as far:
         bus = Bus(open_link('classic', far.port, line))
         notes = Notes()
-        drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
+        drive = Drive(bus, SETTINGS, notes)
         bus.start()
         try:
             drive.connect().result(PATIENCE)
@@ -82,7 +85,7 @@ def notes() -> Notes:
 def drive(far: Simulator, notes: Notes) -> Iterator[Drive]:
     """An active drive without a status word."""
     bus = Bus(open_link('classic', far.port, line_settings('classic', response_timeout=2.0)))
-    drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
+    drive = Drive(bus, SETTINGS, notes)
     bus.start()
     try:
         drive.connect().result(PATIENCE)
@@ -213,7 +216,7 @@ def test_current_limit_is_no_stop() -> None:
     with Simulator(protocol='classic', dialect='5.0', boot_time=0.2, settings=settings) as far:
         bus = Bus(open_link('classic', far.port, line))
         notes = Notes()
-        drive = Drive(bus, DriveSettings(classic_dialect='v5.0', setpoint_timeout=0.0), notes)
+        drive = Drive(bus, SETTINGS, notes)
         bus.start()
         try:
             drive.connect().result(PATIENCE)
