@@ -72,7 +72,7 @@ unit: setup ## tests without ROS, with the current and with the oldest pymodbus 
 
 ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
-	@tools/run python $(PYTEST) -n $$(tools/workers 6) $(if $(WAY),--way $(WAY)) test/ros
+	@tools/run python $(PYTEST) -n $$(tools/workers 8) $(if $(WAY),--way $(WAY)) test/ros
 
 mutants: setup ## break each law in a copy and see that a test fails (half an hour)
 	@tools/run python test/mutants/run.py

@@ -35,6 +35,8 @@ from typing import Any
 
 #: The longest path that a Unix socket takes, on Linux.
 _LONGEST = 107
+#: How often a state that is waited for is asked for, s: each time costs both ends a millisecond.
+_PERIOD = 0.02
 
 Handler = Callable[[str, dict[str, Any]], Any]
 
@@ -182,7 +184,7 @@ class Client:
             if time.monotonic() >= end:
                 shown = {key: state[key] for key in state if key != 'parameters'}
                 raise TimeoutError(f'not within {timeout:g} s; the drive is at {shown}')
-            time.sleep(0.005)
+            time.sleep(_PERIOD)
 
     def call(self, verb: str, **arguments: object) -> Any:
         """Send a request and return its result."""

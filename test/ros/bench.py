@@ -98,7 +98,7 @@ TOPICS = {
 
 
 def wait_until(
-    condition: Callable[[], Any], what: str, timeout: float = PATIENCE, period: float = 0.01
+    condition: Callable[[], Any], what: str, timeout: float = PATIENCE, period: float = 0.02
 ) -> Any:
     """Wait for a condition and return what it returned; not while a driver has crashed."""
     deadline = time.monotonic() + timeout
