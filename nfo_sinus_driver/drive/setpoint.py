@@ -20,6 +20,7 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import replace
 import enum
+import functools
 import math
 import time
 from typing import NamedTuple
@@ -112,6 +113,9 @@ class Setpoint:
         self._target: SetpointTarget | None = None
         #: The parameters that a set-point is written to, by where that is.
         self._keys: dict[Address, str] = {}
+        #: Encodes a set-point. A program that sends the same one again and again has it encoded
+        #: once: that takes longer than all else that is done for it.
+        self._encode = functools.lru_cache(maxsize=1)(self._encoded)
         self._armed_at = math.inf
         #: What stands in the drive and since when, by where; nothing where that is not known, and
         #: minus infinity where it may be what was written since.
@@ -175,6 +179,7 @@ class Setpoint:
         self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
         self._armed_at = time.monotonic()
         self._keys, self._written = {}, {}
+        self._encode.cache_clear()
         if self._target is not None:
             for step in self._target.writes(0.0):
                 address, data = self._registers.target(step)
@@ -302,14 +307,18 @@ class Setpoint:
         self._shared = request
         self._bus.request(self._slot)
 
+    def _encoded(self, value: float, before: float) -> tuple[tuple[Address, bytes], ...]:
+        """Return what is written, and where, for a set-point in place of the one before."""
+        assert self._target is not None
+        return tuple(map(self._registers.target, self._target.writes(value, before)))
+
     def due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
         assert self._target is not None
         now, period = time.monotonic(), self._rewrite_period
         found: list[tuple[Address, bytes]] = []
         before_all = self._meant(self._standing)
-        for step in self._target.writes(self._limited(request), before_all):
-            address, data = self._registers.target(step)
+        for address, data in self._encode(self._limited(request), before_all):
             before, since = self._written.get(address, (b'', -math.inf))
             if data != before or now - since >= period:
                 found.append((address, data))

@@ -59,6 +59,26 @@ def test_set_point_goes_where_the_control_mode_wants_it(
     wait_until(lambda: math.isfinite(rig.drive.snapshot.actual))
 
 
+def test_the_same_set_point_goes_elsewhere_in_another_control_mode(
+    make_virtual: MakeVirtual
+) -> None:
+    rig = make_virtual()
+    rig.ride(20.0)
+    rig.send(0.0)
+    rig.pass_time(1.0)
+    rig.answer(rig.drive.stop())
+    rig.pass_time(1.0)
+    rig.far.memory.set('control.mode', 'Speed')
+    rig.pass_time(3.0)
+    frequencies = rig.written(rig.register('status.frq_set'))
+    assert 'enabled' in rig.answer(rig.drive.enable())
+    rig.pass_time(0.5)
+    rig.send(20.0)
+    rig.pass_time(0.5)
+    assert rig.far.memory.raw('status.spd_set') == 20
+    assert rig.written(rig.register('status.frq_set')) == frequencies
+
+
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 def test_set_point_that_is_no_number(rig: Rig, value: float) -> None:
     rig.turn(10.0)
