@@ -21,7 +21,7 @@ import threading
 
 _INPUT = 0
 _STREAMS = (1, 2)
-_CHUNK = 65536
+_CHUNK = 4096
 _LAST_WORDS = 1.0
 
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Iterator
-import difflib
 import itertools
 from pathlib import Path
 import re
@@ -179,6 +178,9 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
 
 
 def _did_you_mean(name: str, known: Iterable[str]) -> str:
+    # loaded for a mistake alone: it takes 0.1 MB
+    import difflib
+
     close = difflib.get_close_matches(name, list(known), n=2)
     return f'; did you mean {" or ".join(close)}?' if close else ''
 

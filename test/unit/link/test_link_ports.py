@@ -42,10 +42,10 @@ from nfo_sinus_driver.link.interface import BAUD_RATES
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.port import UrlPort
 from nfo_sinus_driver.link.rtu import crc
 from nfo_sinus_driver.link.rtu import encode
 from nfo_sinus_driver.link.serial_port import SerialPort
+from nfo_sinus_driver.link.url_port import UrlPort
 
 #: No honest wait here takes this long, on any machine, s.
 PATIENCE = 30.0
