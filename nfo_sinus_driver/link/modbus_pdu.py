@@ -203,13 +203,11 @@ def write_and_read_of(unit: int, address: Address, data: bytes, source: Address)
     return WriteAndRead(unit, address.index, data, source.index, source.size // 2)
 
 
-@functools.lru_cache(PREPARED)
 def encode(request: Request[object]) -> bytes:
     """Return the message of a request."""
     return bytes((request.unit, request.function)) + request.body
 
 
-@functools.lru_cache(PREPARED)
 def refusal_head(request: Request[object]) -> bytes:
     """Return how a message begins by which the unit refuses a request."""
     return bytes((request.unit, request.function | _EXCEPTION))
