@@ -310,7 +310,7 @@ def _address(row: table.Row) -> Address:
         index=int(row['index'], 0),
         sub_index=table.number(row['sub_index']),
         codec=codec_of(row['codec']),
-        factor=Fraction(row['factor']),
+        factor=table.ratio(row['factor']),
         source=row['source'],
     )
 

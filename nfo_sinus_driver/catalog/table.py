@@ -21,7 +21,9 @@ from collections.abc import Callable
 from collections.abc import Iterable
 import csv
 from fractions import Fraction
+import functools
 from pathlib import Path
+import sys
 from typing import TypeVar
 
 _T = TypeVar('_T')
@@ -59,7 +61,8 @@ def read(
                 raise ValueError('too many or too few columns')
             if only and row['parameter'] != only:
                 continue
-            made = parse(row)
+            # what stands in many rows is kept once
+            made = parse({name: sys.intern(cell) for name, cell in row.items()})
             for name in unique(made):
                 if name in lines:
                     raise ValueError(f'{name} stands in line {lines[name]} already')
@@ -72,9 +75,15 @@ def read(
     return found
 
 
+@functools.lru_cache
+def ratio(text: str) -> Fraction:
+    """Return a number of a table; the same one for the same text."""
+    return Fraction(text)
+
+
 def fraction(text: str) -> Fraction | None:
     """Return a number of a table; ``None`` for an empty cell."""
-    return Fraction(text) if text else None
+    return ratio(text) if text else None
 
 
 def number(text: str) -> int | None:
