@@ -131,7 +131,8 @@ class Scheduler:
         """Take out what goes next, or ``None``; for a missing unit only with ``missing``."""
         self._release_found()
         for rank in self._order(missing):
-            entry = self._first(rank)
+            # most are empty, and this runs for every transaction
+            entry = self._first(rank) if self._queues[rank] else None
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank

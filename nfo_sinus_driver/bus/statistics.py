@@ -31,6 +31,8 @@ _ROUND_TRIPS = 1000
 _ROUND_TRIPS_OF_A_UNIT = 200
 #: Over how long the utilisation is taken, s.
 _WINDOW = 2.0
+#: What goes wrong, by the name under which it is counted.
+_FAILURES = {'timeouts': NoAnswer, 'damaged': DamagedAnswer, 'refused': Refused}
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Tally:
     """What is counted of a line, or of one unit; of round trips only the last are kept."""
 
     def __init__(self, round_trips: int = _ROUND_TRIPS) -> None:
-        self._counts = dict.fromkeys(('transactions', 'timeouts', 'damaged', 'refused'), 0)
+        self._counts = dict.fromkeys(('transactions', *_FAILURES), 0)
         self._retries = 0
         #: Every opening or connection but the first is a reconnect.
         self._opened = 0
@@ -81,9 +83,9 @@ class Tally:
         if error is None or isinstance(error, Refused):
             self._round_trips.append(seconds)
         self._counts['transactions'] += 1
-        self._counts['timeouts'] += isinstance(error, NoAnswer)
-        self._counts['damaged'] += isinstance(error, DamagedAnswer)
-        self._counts['refused'] += isinstance(error, Refused)
+        if error is not None:
+            for name, failure in _FAILURES.items():
+                self._counts[name] += isinstance(error, failure)
 
     def opened(self) -> None:
         """Count that the port was opened, or the unit connected to."""

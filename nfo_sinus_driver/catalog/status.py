@@ -30,7 +30,13 @@ from fractions import Fraction
 import functools
 
 
-class Kind(enum.Enum):
+class _LookedUp(enum.Enum):
+    """What is looked up with every poll, by identity: an enum's own hash is a call of its own."""
+
+    __hash__ = object.__hash__
+
+
+class Kind(_LookedUp):
     """How grave an inverter status is; the drive's fault bit has the last word [C95]."""
 
     STATUS = 'status'
@@ -38,7 +44,7 @@ class Kind(enum.Enum):
     FAULT = 'fault'
 
 
-class Meaning(enum.Enum):
+class Meaning(_LookedUp):
     """What an inverter status code means; one may mean several of these, or none."""
 
     #: Motor off, waiting for a command over the bus.
@@ -119,7 +125,7 @@ class Fact(enum.IntFlag):
     RUN_INPUT_MISSING = 1 << 16
 
 
-class State(enum.Enum):
+class State(_LookedUp):
     """States of the generic state machine [M0 table 16]."""
 
     UNKNOWN = 0
@@ -218,7 +224,7 @@ class StatusWord:
         return Fact(facts)
 
 
-class Role(enum.Enum):
+class Role(_LookedUp):
     """
     What a parameter is to the driver; a family without it lacks the feature.
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from collections.abc import Callable
 from collections.abc import Coroutine
-from dataclasses import replace
 import logging
 import math
 import time
@@ -518,14 +517,13 @@ def take_snapshot(
     actual: float = NAN,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
-    method = inverter.settings.method
-    snapshot = Snapshot(time.monotonic(), inverter.connected, setpoint.armed, method)
+    standing = (inverter.connected, setpoint.armed, inverter.settings.method)
     if seen is None:
-        return snapshot
+        return Snapshot(time.monotonic(), *standing)
     code = seen.listed
-    return replace(
-        snapshot,
-        at=seen.at,
+    return Snapshot(
+        seen.at,
+        *standing,
         status=seen,
         control_mode=inverter.control_mode,
         unit=inverter.unit,

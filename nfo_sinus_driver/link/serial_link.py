@@ -295,10 +295,11 @@ class SerialLink(ModbusLink):
             self._late.note(request, reader.frame, time.monotonic(), length)
             raise
         finally:
+            other = reader.other
             # what comes back before the answer to a write may be its answer
-            if not isinstance(request, Write) and frame in reader.other:
+            if not isinstance(request, Write) and frame in other:
                 self._echo.present = True
-            self._stray = bool(self._echo.before or reader.other.replace(frame, b'', 1))
+            self._stray = bool(self._echo.before or other.replace(frame, b'', 1))
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)

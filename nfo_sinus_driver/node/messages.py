@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping
 import math
 
 from builtin_interfaces.msg import Time
@@ -74,7 +75,7 @@ _TELEMETRY = {
 
 def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -> DriveStatus:
     """Return the DriveStatus of a poll, in the unit of a scale."""
-    message = DriveStatus(
+    return DriveStatus(
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
         enabled=snapshot.enabled,
@@ -85,20 +86,21 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -
         setpoint_age=snapshot.setpoint_age,
         setpoint_clamped=snapshot.setpoint_clamped,
         actual=scale.shown(snapshot.actual),
-        state=DriveStatus.UNKNOWN,
+        **_told_by(snapshot.status),
     )
-    if snapshot.status is not None:
-        _fill_facts(message, snapshot.status)
-    return message
 
 
-def _fill_facts(message: DriveStatus, seen: InverterStatus) -> None:
+def _told_by(seen: InverterStatus | None) -> Mapping[str, int | bool]:
+    """Return the fields that say what the drive says of itself."""
+    if seen is None:
+        return {'state': DriveStatus.UNKNOWN}
     facts = int(seen.facts)
-    message.state = _STATES[seen.state]
-    message.status_word = seen.shown_word
-    message.valid = seen.valid.value
-    for name, bit in _FACTS:
-        setattr(message, name, bool(facts & bit))
+    return {
+        'state': _STATES[seen.state],
+        'status_word': seen.shown_word,
+        'valid': seen.valid.value,
+        **{name: bool(facts & bit) for name, bit in _FACTS},
+    }
 
 
 def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:

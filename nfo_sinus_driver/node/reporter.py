@@ -147,7 +147,7 @@ class Reporter:
     def _publish_snapshot(self, snapshot: Snapshot) -> None:
         stamp = _message(self._status_stamps.next(snapshot.at))
         frame_id = self._frame_id()
-        self._publish_status(snapshot, stamp)
+        self._publish_status(snapshot, stamp, frame_id)
         self._diagnose(snapshot, on_change=True)
         if snapshot.status is None:
             return
@@ -159,9 +159,9 @@ class Reporter:
             self._last_inv_st = inv_st
             self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
 
-    def _publish_status(self, snapshot: Snapshot, stamp: Time) -> None:
+    def _publish_status(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> None:
         scale = self._managed().scale
-        self._status.publish(messages.drive_status(snapshot, stamp, self._frame_id(), scale))
+        self._status.publish(messages.drive_status(snapshot, stamp, frame_id, scale))
 
     def _publish_telemetry(self, telemetry: Telemetry) -> None:
         stamp = _message(self._telemetry_stamps.next(telemetry.at))
@@ -174,7 +174,7 @@ class Reporter:
         snapshot = self._managed().drive.snapshot
         if not snapshot.connected:
             stamp = _message(self._status_stamps.next(time.monotonic()))
-            self._publish_status(snapshot, stamp)
+            self._publish_status(snapshot, stamp, self._frame_id())
         self._diagnose(snapshot, on_change=False)
         self._publish_statistics()
 
