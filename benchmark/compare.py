@@ -20,13 +20,15 @@ runs of the same driver differ by a fifth on a shared machine; at the same time,
 
     tools/run python benchmark/compare.py ../other_clone [--drives 8] [--setpoints] [--turns 3]
 
-The other clone has been set up (make setup). The last line is the median of the turns.
+The other clone has been set up (make setup). The last lines are medians of the turns; the ratio is
+the median of their ratios, for only the two figures of one turn are of the same seconds.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import operator
 import os
 from pathlib import Path
 import statistics
@@ -41,6 +43,7 @@ from rig import use_domain
 import setpoints
 import speed
 
+_UNCOMPILED = 'PYTHONDONTWRITEBYTECODE'
 #: What is compared, and how it is shown.
 _SHOWN = {
     'cpu': 'CPU, % of a core',
@@ -71,19 +74,20 @@ def main() -> None:
         for turn in range(1, options.turns + 1):
             found.append(_turn(options, paths))
             _show(str(turn), options.drives, *found[-1])
-    medians = [
-        {what: statistics.median(one[what] for one in turns) for what in _SHOWN}
-        for turns in zip(*found, strict=True)
-    ]
-    _show('median', options.drives, *medians)
+    for what in _SHOWN:
+        own, other = ([turn[what] for turn in turns] for turns in zip(*found, strict=True))
+        ratios = map(operator.truediv, own, other)
+        _row('median', options.drives, what, *map(statistics.median, (own, other, ratios)))
 
 
 def _turn(options: argparse.Namespace, paths: list[str]) -> list[dict[str, float]]:
     """Watch both at the same time; return the figures of each."""
     command = [sys.executable, str(FOLDER / 'compare.py'), *sys.argv[1:], '--own']
+    # who compiles at every start takes other memory than who does not, as an installed driver
+    environment = {name: value for name, value in os.environ.items() if name != _UNCOMPILED}
     watchers = [
         subprocess.Popen(
-            command, env={**os.environ, 'PATH': path}, text=True,
+            command, env={**environment, 'PATH': path}, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )
         for path in paths
@@ -115,9 +119,13 @@ def _watch_own(options: argparse.Namespace) -> None:
 
 
 def _show(turn: str, drives: int, own: dict[str, float], other: dict[str, float]) -> None:
-    for what, shown in _SHOWN.items():
-        a, b = own[what], other[what]
-        print(f'| {turn} | {drives} | {shown} | {a:.2f} | {b:.2f} | {a / b:.3f} |', flush=True)
+    for what in _SHOWN:
+        _row(turn, drives, what, own[what], other[what], own[what] / other[what])
+
+
+def _row(turn: str, drives: int, what: str, own: float, other: float, ratio: float) -> None:
+    shown = _SHOWN[what]
+    print(f'| {turn} | {drives} | {shown} | {own:.2f} | {other:.2f} | {ratio:.3f} |', flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:
