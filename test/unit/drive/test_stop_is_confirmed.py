@@ -314,3 +314,28 @@ def test_many_callers_share_one_stop(make_virtual: MakeVirtual) -> None:
     assert rig.said(Cause.CANNOT_STOP, Severity.ERROR)
     assert RUN not in rig.written(SCMD)[asked:]
     assert Mode.EXT not in rig.written(MODE)
+
+
+@pytest.mark.parametrize('way', ['stop', 'quick stop', 'deactivate', 'clean up', 'keypad'])
+def test_who_sees_a_drive_disarmed_sees_that_its_stop_is_not_confirmed(
+    make_virtual: MakeVirtual, way: str
+) -> None:
+    # other threads look at any moment, and take "not armed, no stop pending" for the end of a stop
+    rig = make_virtual()
+    rig.ride()
+    seen = []
+    disarm = rig.drive.setpoint.disarm
+
+    def note() -> None:
+        disarm()
+        seen.append(rig.drive.stop_unconfirmed)
+
+    with mock.patch.object(rig.drive.setpoint, 'disarm', note):
+        if way == 'keypad':
+            rig.far.control_unit.press('stop')
+            rig.pass_time(1.0)
+        else:
+            answered(rig, WAYS[way](rig.drive))
+    assert seen == [True]
+    rig.pass_time(1.0)
+    assert not rig.drive.stop_unconfirmed
