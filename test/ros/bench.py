@@ -32,6 +32,7 @@ import sys
 import threading
 import time
 from typing import Any
+import warnings
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
@@ -72,8 +73,9 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 PATIENCE = 90.0
 #: All settings of a drive are read before its node is active, of some over 9600 bit/s.
 _STARTING = 3 * PATIENCE
-#: After how long a question is asked anew, s.
+#: After how long a question is asked anew, s, and a command given anew.
 _ASK_ANEW = 10.0
+_CALL_ANEW = 40.0
 #: How long a process may take to say where its threads are, s.
 _STACKS_PATIENCE = 5.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
@@ -461,22 +463,26 @@ class Client(contextlib.ExitStack):
         return client.call_async(type_.Request(**fields))
 
     def call(self, service: str, type_: type = Trigger, **fields: Any) -> Any:
-        """Call a service of the node and return its response."""
-        future = self.call_async(service, type_, **fields)
-        wait_until(future.done, f'{service} answers')
-        return future.result()
+        """
+        Call a service of the node and return its response.
+
+        A client is told that it is matched before the server knows of it, and then Fast DDS can
+        lose its request (Fast-DDS issues 2641 and 3009). So a command that is not answered for
+        long is called anew, and the run says so.
+        """
+        return self._call(service, type_, fields, _CALL_ANEW)
 
     def ask(self, service: str, type_: type, **fields: Any) -> Any:
-        """
-        Call a service that only tells something, anew if need be, and return its response.
+        """Call a service that only tells something, anew if need be, and return its response."""
+        return self._call(service, type_, fields, _ASK_ANEW)
 
-        Who has just come may be unknown to the other end yet, and then the middleware drops what
-        is answered to him.
-        """
+    def _call(self, service: str, type_: type, fields: dict[str, Any], anew: float) -> Any:
         futures = []
 
         def answered() -> Any:
-            if not futures or time.monotonic() > futures[-1][0] + _ASK_ANEW:
+            if not futures or time.monotonic() > futures[-1][0] + anew:
+                if futures:
+                    warnings.warn(f'{service} is called anew: a request was lost', stacklevel=2)
                 futures.append((time.monotonic(), self.call_async(service, type_, **fields)))
             return next((future for _, future in futures if future.done()), None)
 

@@ -33,8 +33,7 @@ from nfo_sinus_driver.demo.bench import own_domain
 
 # before any context exists, in this process and in those it starts
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-# shared memory is one for all domains: a process that is killed there, as tests do, leaves what
-# others then come upon who are just beginning or ending, and what they send may be lost
+# shared memory is one for all domains, and a process that is killed, as tests do, leaves its files
 os.environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
 # a field of a wrong type is an exception then, and not the end of the process
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
