@@ -125,8 +125,7 @@ class Controller:
     @property
     def stopping(self) -> bool:
         """A stop is not confirmed yet."""
-        # by the state, too: another thread may look between the reason and the first attempt
-        return self._state is ControlState.STOPPING or self._sequence.active
+        return self._sequence.active
 
     @property
     def blocked_by_fault(self) -> bool:

@@ -164,7 +164,11 @@ class Drive:
     @property
     def stop_unconfirmed(self) -> bool:
         """A stop was asked for that the drive has not confirmed yet."""
-        return self._controller is not None and self._controller.stopping
+        controller = self._controller
+        if controller is None:
+            return False
+        # another thread may look between the reason for a stop and its first attempt
+        return controller.stopping or controller.state is ControlState.STOPPING
 
     @property
     def blocked_by_fault(self) -> bool:
