@@ -21,6 +21,7 @@ import threading
 
 _INPUT = 0
 _STREAMS = (1, 2)
+#: Each stream keeps a buffer of this size.
 _CHUNK = 4096
 _LAST_WORDS = 1.0
 

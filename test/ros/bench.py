@@ -22,6 +22,7 @@ import contextlib
 import ctypes
 import itertools
 import json
+import math
 import os
 from pathlib import Path
 import shutil
@@ -73,7 +74,7 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 PATIENCE = 90.0
 #: All settings of a drive are read before its node is active, of some over 9600 bit/s.
 _STARTING = 3 * PATIENCE
-#: After how long a question is asked anew, s, and a command given anew.
+#: After how long a question is asked anew, s, and the first call of a client made anew.
 _ASK_ANEW = 10.0
 _CALL_ANEW = 40.0
 #: How long a process may take to say where its threads are, s.
@@ -358,6 +359,8 @@ class Client(contextlib.ExitStack):
         self.listen('statistics', BusStatistics, '/nfo_sinus_bus/statistics', 10)
         self._setpoint = self.node.create_publisher(Float32, f'{name}/setpoint', 1)
         self._clients: dict[str, Any] = {}
+        #: The services that have answered a call.
+        self._answered: set[str] = set()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         # the thread ends by itself before what it waits for is gone
@@ -467,10 +470,13 @@ class Client(contextlib.ExitStack):
         Call a service of the node and return its response.
 
         A client is told that it is matched before the server knows of it, and then Fast DDS can
-        lose its request (Fast-DDS issues 2641 and 3009). So a command that is not answered for
-        long is called anew, and the run says so.
+        lose its first request (Fast-DDS issues 2641 and 3009). So that is made anew when it is
+        not answered for long, and the run says so; every other one has to be answered.
         """
-        return self._call(service, type_, fields, _CALL_ANEW)
+        anew = math.inf if service in self._answered else _CALL_ANEW
+        response = self._call(service, type_, fields, anew)
+        self._answered.add(service)
+        return response
 
     def ask(self, service: str, type_: type, **fields: Any) -> Any:
         """Call a service that only tells something, anew if need be, and return its response."""
@@ -482,7 +488,7 @@ class Client(contextlib.ExitStack):
         def answered() -> Any:
             if not futures or time.monotonic() > futures[-1][0] + anew:
                 if futures:
-                    warnings.warn(f'{service} is called anew: a request was lost', stacklevel=2)
+                    warnings.warn(f'{service} is called anew: no answer in {anew} s', stacklevel=2)
                 futures.append((time.monotonic(), self.call_async(service, type_, **fields)))
             return next((future for _, future in futures if future.done()), None)
 
