@@ -127,10 +127,21 @@ class Scheduler:
         """Something waits that is for a missing unit."""
         return bool(self._queues[_MISSING])
 
-    def take(self, *, missing: bool = True) -> LatestValue | Waiting | None:
-        """Take out what goes next, or ``None``; for a missing unit only with ``missing``."""
+    @property
+    def waits(self) -> bool:
+        """Anything waits that is not for a missing unit."""
+        return any(queue for rank, queue in self._queues.items() if rank != _MISSING)
+
+    def take(
+        self, *, missing: bool = True, only_stops: bool = False
+    ) -> LatestValue | Waiting | None:
+        """
+        Take out what goes next, or ``None``; for a missing unit only with ``missing``.
+
+        :param only_stops: everything but a stop has to wait.
+        """
         self._release_found()
-        for rank in self._order(missing):
+        for rank in _STOPS if only_stops else self._order(missing):
             # most are empty, and this runs for every transaction
             entry = self._first(rank) if self._queues[rank] else None
             if entry is not None:
@@ -143,7 +154,7 @@ class Scheduler:
             return None
         # nobody else waits
         self._unheard = None
-        return self.take(missing=missing)
+        return self.take(missing=missing, only_stops=only_stops)
 
     def _release_found(self) -> None:
         """Put what waits for a unit that answers again where it belongs: it may be a stop."""

@@ -79,11 +79,15 @@ class Bus:
 
     What is read and written with it is awaited by coroutines on the worker.
 
+    :param max_requests: how many are sent a second at most, stops aside; 0: no limit.
     :raises LinkError: a transaction fails, as the link does.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, max_requests: float = 0.0) -> None:
         self._link = link
+        self._request_period = 1 / max_requests if max_requests else 0.0
+        #: Until then only stops are sent.
+        self._paced_until = -math.inf
         self._port = Reconnect(link)
         self._inbox: deque[Task | LatestValue | Callable[[], None]] = deque()
         self._awake = threading.Event()
@@ -345,8 +349,9 @@ class Bus:
             return min(self._sleepers.next_moment, self._port.reopen_at)
         if self._send_next():
             return -math.inf
+        paced_until = self._paced_until if self._scheduler.waits else math.inf
         missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
-        return min(self._sleepers.next_moment, missing_from, supervised_at)
+        return min(self._sleepers.next_moment, paced_until, missing_from, supervised_at)
 
     def _supervise(self) -> float:
         """Serve what lives on the line beside questions; return when that is due again, s."""
@@ -410,7 +415,10 @@ class Bus:
             self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
-        entry = self._scheduler.take(missing=time.monotonic() >= self.silences.missing_from)
+        now = time.monotonic()
+        entry = self._scheduler.take(
+            missing=now >= self.silences.missing_from, only_stops=now < self._paced_until
+        )
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
         elif entry is not None:
@@ -456,6 +464,8 @@ class Bus:
 
     def _transact(self, transfer: Transfer) -> Reply:
         started = time.monotonic()
+        paced_until = self._paced_until
+        self._paced_until = started + self._request_period
         try:
             if transfer.send is not None:
                 reply = transfer.send()
@@ -476,6 +486,8 @@ class Bus:
             # a mistake in the link must reach the one who asked, not leave him waiting
             _log.exception('error in the link')
             raise LinkError(f'error in the link: {error!r}') from error
+        if not reply.requests:
+            self._paced_until = paced_until
         self._account(transfer.unit, started, None)
         return reply
 

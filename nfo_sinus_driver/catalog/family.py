@@ -26,6 +26,7 @@ from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import replace
 from fractions import Fraction
 import functools
 import importlib
@@ -204,16 +205,22 @@ def load_profile(name: str, method: str = '') -> Profile:
     return profile
 
 
-def load_family(name: str, method: str = '') -> Family:
+def load_family(name: str, method: str = '', words: str = '') -> Family:
     """
     Read and check the tables of one drive family.
 
     :param method: as for :func:`load_profile`.
+    :param words: which of the ``words`` of its profile a PLC maps; ``''``: the first.
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
     # the same family for all the methods that share its tables
-    return _read_family(name, method if _has_tables(name, method) else '')
+    return _speaking(_read_family(name, method if _has_tables(name, method) else ''), words)
+
+
+@functools.cache
+def _speaking(family: Family, words: str) -> Family:
+    return replace(family, profile=family.profile.words[words]) if words else family
 
 
 @functools.cache

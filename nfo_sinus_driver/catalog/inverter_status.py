@@ -57,8 +57,8 @@ class InverterStatus:
     :ivar by_mode: where neither word nor code says who controls: the control source, such as MODE,
         says that the bus does.
     :ivar by_mode_at: when it said so, likewise.
-    :ivar frequency: Hz, read with it where the family's status word tells no stop; NaN elsewhere,
-        and where the drive refuses to tell it.
+    :ivar frequency: Hz, where it is read with the status word; NaN elsewhere, and where the drive
+        refuses to tell it.
     :ivar crest: from which size of it on it may be falling, and when that was last seen.
     :ivar fell: when the last fall by more than a wobble began, and when it was seen; minus infinity
         if there was none, or if it has risen since.
@@ -146,8 +146,11 @@ class InverterStatus:
 
     @property
     def from_bus(self) -> bool:
-        """The bus has control."""
-        return self._from_bus_by_code or Fact.NETWORK_CONTROL in self.facts
+        """The bus has control, or may have it: where the word only echoes, a motor that turns."""
+        if self._from_bus_by_code or Fact.NETWORK_CONTROL in self.facts:
+            return True
+        turns = self._only_frequency and abs(self.frequency) > 0
+        return turns and not self.means(Meaning.WITHHELD)
 
     @property
     def runs(self) -> bool:
@@ -179,8 +182,11 @@ class InverterStatus:
         if not self.by_frequency:
             return self.keeps_running
         stands = self.at > told and self.frequency == 0
-        turns = self.runs_by_bus or (self._only_frequency and self.from_bus)
-        return turns and not stands and not self.fell[0] > told
+        stops = stands or self.fell[0] > told
+        if self._only_frequency:
+            # energised at set-point 0 it stands, too
+            return self.from_bus and not (stops and not self.runs)
+        return self.runs_by_bus and not stops
 
     @property
     def by_frequency(self) -> bool:

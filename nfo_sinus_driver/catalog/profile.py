@@ -126,7 +126,7 @@ class AcknowledgeThenWrite:
 @dataclass(frozen=True)
 class Until:
     """
-    Wait until the drive's status fulfils a condition; if it does not, the sequence ends.
+    Wait until a status from after the last write fulfils a condition; else the sequence ends.
 
     Only when control is taken and when the motor is started.
     """
@@ -137,7 +137,7 @@ class Until:
 @dataclass(frozen=True)
 class Hold:
     """
-    Wait until the drive's status fulfils a condition, and go on even if it does not.
+    Wait until a status from after the last write fulfils a condition, and go on if none does.
 
     Only when a fault is acknowledged. Brings whether it does.
 
@@ -417,6 +417,8 @@ class Profile:
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
+    :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
+        its name; this one is the first.
     :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
         the protocol over which that is so.
     """
@@ -436,6 +438,7 @@ class Profile:
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
     holds_control: Mapping[str, str] = field(default_factory=dict)
+    words: Mapping[str, Profile] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

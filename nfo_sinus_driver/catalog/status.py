@@ -158,6 +158,8 @@ class StatusWord:
         the frequency has to tell; it is read with every status.
     :ivar only_frequency: it may say that the motor runs, or that it does not, while it does the
         other: whether it turns is for the frequency alone to tell.
+    :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
+        every status.
     :ivar tells_sign: frequency and speed are measured without a sign; REVERSE tells it.
     """
 
@@ -170,6 +172,7 @@ class StatusWord:
     shown: int = 0xFFFFFFFF
     by_frequency: bool = False
     only_frequency: bool = False
+    frequency_beside: bool = False
     tells_sign: bool = False
 
     def may_say(self, word: int) -> bool:

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Awaitable
 from collections.abc import Callable
 import math
+import time
 from typing import Any
 from typing import TypeVar
 
@@ -47,19 +48,18 @@ from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
 
+_Condition = Callable[[InverterStatus], bool]
 #: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
-Reached = Callable[[Callable[[InverterStatus], bool]], Awaitable[None]]
-
-
+Reached = Callable[[_Condition], Awaitable[None]]
 #: Waits so long for that at most, s; tells whether it does.
-Held = Callable[[Callable[[InverterStatus], bool], float], Awaitable[bool]]
+Held = Callable[[_Condition, float], Awaitable[bool]]
 
 
-async def _not_reached(condition: Callable[[InverterStatus], bool]) -> None:
+async def _not_reached(condition: _Condition) -> None:
     raise AssertionError('nothing is awaited here')
 
 
-async def _not_held(condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
+async def _not_held(condition: _Condition, seconds: float) -> bool:
     raise AssertionError('nothing is held here')
 
 
@@ -86,6 +86,12 @@ async def carry_out(
     """
     brought: Any = None
     refusal: Refusal | None = None
+    written_at = -math.inf
+
+    def after_write(condition: _Condition) -> _Condition:
+        # behind a PLC a status from before is shown for a while [C117]
+        return lambda seen: seen.at > written_at and condition(seen)
+
     while True:
         try:
             step = steps.send(brought) if refusal is None else steps.throw(refusal)
@@ -111,12 +117,14 @@ async def carry_out(
             elif isinstance(step, profile.AcknowledgeThenWrite):
                 await registers.acknowledge_and_write(step.key, step.write)
             elif isinstance(step, profile.Hold):
-                brought = await held(step.condition, step.seconds)
+                brought = await held(after_write(step.condition), step.seconds)
             else:
-                await reached(step.condition)
+                await reached(after_write(step.condition))
         except Refused as error:
             refusal = Refusal(str(error))
             refusal.__cause__ = error
+        if isinstance(step, profile.Write):
+            written_at = time.monotonic()
 
 
 async def read_nominal(inverter: DriveState, control_mode: str) -> float:
@@ -172,6 +180,11 @@ class Commands:
     def coasts(self) -> bool:
         """It can release the motor at once."""
         return self._method.coasts
+
+    @property
+    def plc_time(self) -> float:
+        """After so long without a word of the driver a PLC stops the drive, s; 0: no PLC."""
+        return self._method.plc_time
 
     @property
     def keeps_control(self) -> str:

@@ -465,6 +465,18 @@ class Controller:
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
+    async def leave(self, timeout: float) -> None:
+        """
+        Behind a PLC, whose block keeps the last word, leave it that of a motor that stands.
+
+        :param timeout: how long the motor may take to stand, s.
+        """
+        if not self.method.plc_time or self.blocked_by_fault:
+            return
+        with contextlib.suppress(DriveError, LinkError):
+            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP, timeout)
+            await self.method.release()
+
     def close(self) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
         may_run = self.may_run
@@ -478,7 +490,8 @@ class Controller:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
         inverter, seen = self._inverter, self._inverter.seen
         if await self.method.in_control(Priority.SERVICE):
-            if seen is not None and seen.runs_by_bus and not self.stopping:
+            turns = seen is not None and (seen.runs_by_bus or abs(seen.frequency) > 0)
+            if turns and not self.stopping:
                 inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)
         elif self._lost_in_use and seen is not None and not seen.faulted:

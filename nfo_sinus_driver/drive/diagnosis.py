@@ -128,10 +128,14 @@ def explain_fall(
     :param least: Hz, the slowest that the drive can have been told to turn since then.
     """
     was = min(abs(before.frequency), least)
-    silent = inverter.was_silent and seen.at - before.at >= _SHORTEST_POWER_OFF
-    if not (silent and seen.by_frequency and was >= _LEAST_FALL):
-        return None
-    if not abs(seen.frequency) < was / 2:
+    away = seen.at - before.at
+    if inverter.plc_time:
+        # the PLC answers all the while, and a drive that is back may catch a motor that coasts
+        silent, most = away >= _LIFE_STOOD, min(was - _LEAST_FALL, was * _CAUGHT)
+    else:
+        silent, most = inverter.was_silent and away >= _SHORTEST_POWER_OFF, was / 2
+    # where the frequency is not read with the status, nothing falls
+    if not (silent and was >= _LEAST_FALL and abs(seen.frequency) < most):
         return None
     return inverter.report(
         Cause.SLOWER_AFTER_SILENCE, before=abs(before.frequency), now=abs(seen.frequency)
@@ -140,6 +144,10 @@ def explain_fall(
 
 #: No drive is off and on again, and answers, within less, s; a single lost answer takes less.
 _SHORTEST_POWER_OFF = 0.4
+#: A PLC's life counter that stands for so long is a silence of the drive, s [C125].
+_LIFE_STOOD = 0.2
+#: A motor that is caught turns at no more than this share of what it did.
+_CAUGHT = 0.95
 #: A frequency from which on a fall is looked at, Hz: what is less may be a wobble.
 _LEAST_FALL = 0.5
 #: What comes and goes is told again only when it was away for so long, s.

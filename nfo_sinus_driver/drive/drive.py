@@ -22,6 +22,7 @@ from collections.abc import Coroutine
 from collections.abc import Sequence
 from concurrent.futures import Future
 import math
+import time
 from typing import Any
 from typing import TypeVar
 
@@ -286,7 +287,11 @@ class Drive:
         if not self.heard:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)
-        return await self._deactivate(patience)
+        until = time.monotonic() + patience
+        answer = await self._deactivate(patience)
+        if self._controller is not None and answer is not None:
+            await self._controller.leave(until - time.monotonic())
+        return answer
 
     @on_bus
     async def enable(self, asked_at: float = math.inf) -> Report:

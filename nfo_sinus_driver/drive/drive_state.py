@@ -64,6 +64,10 @@ _LONGEST_START_DELAY = 3600.0
 _SOON = 2.0
 #: How long it counts that the bus had control, s, where that has to be asked for by itself.
 _BY_MODE_FOR = 1.0
+#: What makes another drive of it, or another way to command it.
+_FIXED = (
+    'address', 'block_address', 'telegram_words', 'model', 'control_method', 'reference'
+)
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -109,7 +113,7 @@ class DriveState:
         self.bus = bus
         self.settings = settings
         #: What the catalog knows of its family.
-        self.model = load_family(settings.model, settings.method)
+        self.model = load_family(settings.model, settings.method, settings.telegram_words)
         method = settings.method_class
         #: Who is between stops the drive after so long without a word of ours, s; 0: nobody is.
         self.plc_time = method.plc_time
@@ -251,8 +255,8 @@ class DriveState:
     async def _with_frequency(
         self, seen: InverterStatus, priority: Priority, once: bool
     ) -> InverterStatus:
-        """Complete a status by the frequency, where its word alone does not tell a stop."""
-        if not seen.by_frequency:
+        """Complete a status by the frequency, where its word alone tells no stop, or it is free."""
+        if not (seen.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._saw(seen)
         try:
             frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
@@ -378,7 +382,7 @@ class DriveState:
 
         :raises ValueError: they are those of another drive, or of another way to command it.
         """
-        for name in ('address', 'block_address', 'model', 'control_method', 'reference'):
+        for name in _FIXED:
             if getattr(settings, name) != getattr(self.settings, name):
                 raise ValueError(f'{name} cannot change within a session: make another Drive')
         self.settings = settings
@@ -511,6 +515,9 @@ class DriveState:
     async def introduce(self) -> Identity:
         """Ask for more of who it is; nothing depends on that, for many do not tell [C57]."""
         assert self.identity is not None
+        if self.registers.in_block:
+            # a PLC would answer for itself [C118]
+            return self.identity
         told = await self.registers.identify(Priority.SERVICE)
         self.identity = replace(
             self.identity,

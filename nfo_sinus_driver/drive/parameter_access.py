@@ -81,6 +81,8 @@ class ParameterAccess:
         self._addresses: dict[str, Address] = {}
         #: How parameters are addressed on this line.
         self.protocol = addressing or bus.protocol.addressing
+        #: They stand in the registers of a PLC.
+        self.in_block = self.protocol != bus.protocol.addressing
         self._block_address = block_address
         reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
         bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))

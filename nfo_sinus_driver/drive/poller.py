@@ -409,7 +409,8 @@ class Poller:
     async def _measure(self, role: Role) -> float:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
         inverter = self._inverter
-        if role is Role.ACTUAL_FREQUENCY and inverter.seen and inverter.seen.by_frequency:
+        seen = inverter.seen
+        if role is Role.ACTUAL_FREQUENCY and seen and not math.isnan(seen.frequency):
             # it came with the status
             return inverter.frequency
         asked_at = time.monotonic()
@@ -437,13 +438,13 @@ class Poller:
         Repeat a read at once until the drive answers; what was read before it stays good.
 
         :raises LinkError: the drive has been silent for too long, or has answered everything but
-            this; it refuses; or the port is gone.
+            this; it refuses; the port is gone; or the PLC has no valid data of it.
         """
         failing_since = math.inf
         while True:
             try:
                 answer = await read()
-            except (PortError, Refused, Interrupted):
+            except (PortError, Refused, Interrupted, NoData):
                 raise
             except LinkError:
                 self._inverter.unanswered()

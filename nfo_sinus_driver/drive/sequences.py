@@ -50,6 +50,8 @@ from nfo_sinus_driver.link import Refused
 _RETRY_PERIOD = 0.2
 #: How often one is that a lost drive does not hear, for its neighbours' sake, s.
 _LOST_RETRY_PERIOD = 1.0
+#: How long all that a start waits for may take together, s, the start delay of the drive aside.
+_START_TIMEOUT = 4.0
 #: How often it is said that a stop is not confirmed, s.
 _COMPLAINT_PERIOD = 5.0
 #: Each time it is said after a longer while, up to this, s.
@@ -314,6 +316,8 @@ class StartSequence:
     def __init__(self, inverter: DriveState, method: Commands) -> None:
         self._inverter = inverter
         self._method = method
+        #: When the start has to be over, s of ``time.monotonic``.
+        self._deadline = math.inf
 
     async def check(self) -> tuple[str, float]:
         """
@@ -341,16 +345,23 @@ class StartSequence:
         :param prepare: does what has to be done before a run command, once the bus has control.
         """
         await self.take_control(control_mode)
-        await self._inverter.wait_until(lambda now: now.from_bus)
+        await self._await_status(lambda now: now.from_bus)
         if self._inverter.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
         await self._method.run(self._await_start)
-        await self._await_start(lambda now: now.runs)
+        run_at = time.monotonic()
+        # behind a PLC a status from before the run command is shown for a while
+        await self._await_start(lambda now: now.runs and now.at > run_at)
+
+    async def _await_status(self, wanted: Callable[[InverterStatus], bool]) -> None:
+        """Wait for a step that every drive makes soon."""
+        left = self._deadline - time.monotonic()
+        await self._inverter.wait_until(wanted, timeout=min(left, drive_state.TIMEOUT))
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait until the drive has made a step on its way to run."""
-        deadline = time.monotonic() + drive_state.TIMEOUT
+        deadline = min(time.monotonic() + drive_state.TIMEOUT, self._deadline)
         delayed = False
         while True:
             seen = await self._inverter.look(Priority.SERVICE)
@@ -364,7 +375,9 @@ class StartSequence:
                 raise DriveError(Cause.NO_RUN_INPUT)
             if seen.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
-                deadline += await self._inverter.read_start_delay()
+                delay = await self._inverter.read_start_delay()
+                self._deadline += delay
+                deadline += delay
             if time.monotonic() > deadline:
                 cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
                 raise DriveError(self._inverter.report(cause))
@@ -377,7 +390,8 @@ class StartSequence:
         The set-point of an earlier session is removed before, where the drive lets us: one that has
         kept its run command, too, would turn the motor at once.
         """
+        self._deadline = time.monotonic() + _START_TIMEOUT
         if not self._inverter.settings_need_control:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control(self._inverter.wait_until)
+        await self._method.take_control(self._await_status)

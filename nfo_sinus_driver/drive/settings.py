@@ -66,6 +66,13 @@ def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
     return tuple(dict.fromkeys(mode for profile in profiles for mode in profile.setpoints))
 
 
+def _telegram_words(model: str, method: str) -> tuple[str, ...]:
+    """Return the sets of words that a PLC may map for a model; any while that is not known."""
+    names = families() if model == AUTO else (model,)
+    found = (words for name in names for words in load_profile(name, method).words)
+    return ('', *dict.fromkeys(found))
+
+
 def _own_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
     """Return the longest time-out of a model's own, and its step, s; of all while not known."""
     found = []
@@ -101,6 +108,8 @@ class DriveSettings:
 
     :ivar address: one that the protocol of the line has.
     :ivar block_address: the first register of the block that a PLC shows, with ``telegram1``.
+    :ivar telegram_words: which words a PLC maps for a drive that may have several, by name; '': the
+        usual ones of the model.
     :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
     :ivar control_method: as it was chosen; ``''`` stands for the usual one of the model.
     :ivar reference: where a running drive takes its reference from; set-points are only followed
@@ -123,10 +132,11 @@ class DriveSettings:
 
     address: int = 1
     block_address: int = 0
+    telegram_words: str = ''
     model: str = usual_family()
     control_method: str = ''
     reference: str = 'fieldbus'
-    poll_rate: float = 0.0
+    poll_rate: float = 50.0
     idle_poll_rate: float = 0.0
     telemetry_rate: float = 2.0
     lost_after: float = 1.0
@@ -191,6 +201,8 @@ class DriveSettings:
             )
         _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
         self._require_known_method()
+        if self.telegram_words:
+            _one_of('telegram_words', self.telegram_words, _telegram_words(self.model, self.method))
         modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         if not any(self.address in protocol.units for protocol in PROTOCOLS.values()):

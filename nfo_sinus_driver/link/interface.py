@@ -59,10 +59,12 @@ class Reply(NamedTuple):
 
     :ivar data: the bytes read, as they stand on the bus; empty for a write.
     :ivar arrived: when the last byte came, in seconds of ``time.monotonic``.
+    :ivar requests: how many were sent for it; 0: it came with an answer before.
     """
 
     data: bytes
     arrived: float
+    requests: int = 1
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,8 @@ class LineProtocol:
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
     :ivar identifies: a drive can be asked who it is.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
+    :ivar most_requests: how many a second what serves the line is sent at most by default, a PLC or
+        a gateway [C118]; 0: the line itself is the limit.
     :ivar carries: what else it reaches parameters by, that stand at who is between: a PLC.
     :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
         is tried.
@@ -196,6 +200,7 @@ class LineProtocol:
     point_to_point: int | None = None
     identifies: bool = False
     writes_and_reads: bool = False
+    most_requests: float = 0.0
     carries: frozenset[str] = frozenset()
     rates_disturb: bool = False
     check: str = _CHECK

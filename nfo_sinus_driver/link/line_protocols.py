@@ -59,6 +59,7 @@ MODBUS_TCP = LineProtocol(
     char_format='8E1',
     identifies=True,
     writes_and_reads=True,
+    most_requests=50.0,
     carries=frozenset(('telegram1',)),
 )
 CLASSIC = LineProtocol(

@@ -24,8 +24,12 @@ one moment, and a life counter each way says who is alive.
 What is written goes out with every transaction from then on: our counter moves while the driver
 lives, and so the PLC knows that the command words are meant still. After so long without it as
 :data:`PLC_TIME` the PLC stops the drive, and would let it go on at the next word that moves the
-counter [C108]. So words that let a motor run are forgotten after such a gap, or with the
-connection; nothing is written then until somebody begins anew. Before anybody has, it is only read.
+counter [C108]. So all words are forgotten after such a gap, or with the connection: nothing is
+written then until a command begins anew. Before that, the block is only read.
+
+A word reaches the drive when the PLC exchanges the next telegram with it, and the answer to that
+one is in the block when the PLC's life counter has moved twice [C117]. A status from before has the
+time of the last one before the word, so that it is never taken for an answer to it.
 """
 
 from __future__ import annotations
@@ -69,6 +73,11 @@ SETPOINT = 5
 
 #: Without a new count from us for so long the PLC stops the drive, s.
 PLC_TIME = 1.0
+#: The life counter of the PLC moves so often until a word has reached the drive, and the drive's
+#: answer the block [C117].
+_MOVES = 2
+#: So long the actual value is that of the status read before it, s; the block has both.
+_SHARED_FOR = 0.1
 #: Of the block.
 LAYOUT_VERSION = 1
 #: From where on the driver writes.
@@ -109,24 +118,43 @@ class Block:
         #: When the last transaction with them began that was answered.
         self._sent_at = 0.0
         self._count = 0
-        #: The PLC's life counter, and when it was first seen.
+        #: STW1 that the PLC has last acknowledged.
+        self._acknowledged: int | None = None
+        #: The PLC's life counter, and how often it has to move until a status is dated anew.
         self._life: int | None = None
+        self._moves = 0
+        #: When what the block shows was first seen.
         self._life_at = 0.0
+        #: What came with the last status, and when; ``None`` once its actual value was taken.
+        self._beside: tuple[_Told, float] | None = None
         #: The layout was looked at.
         self._known = False
         #: Function 23 was refused.
         self._apart = False
 
     def forget(self) -> None:
-        """Write no words any more that may let a motor run; the connection is another one."""
+        """Write nothing any more, only read: the connection is another one."""
         self._known = False
-        if self._live:
-            self._command, self._live = None, False
+        self._command, self._live = None, False
+        self._acknowledged = None
 
     def read(self, address: Address) -> Reply:
-        """Read a part of it; arrived has it when the PLC first had it from the drive."""
+        """
+        Read a part of it; ``arrived`` is when the PLC first had it from the drive.
+
+        The actual value is that of the status that was read just before: the two are of one
+        telegram, and the PLC is not asked twice.
+        """
+        beside, self._beside = self._beside, None
+        if address.sub_index == ACTUAL and beside is not None:
+            shared, at = beside
+            if time.monotonic() - at <= _SHARED_FOR:
+                return Reply(self._part(shared[0], address), shared[1], requests=0)
         told, arrived = self._exchange()
-        return Reply(self._part(told, address), arrived)
+        reply = Reply(self._part(told, address), arrived)
+        if address.sub_index == STATUS:
+            self._beside = (told, arrived), time.monotonic()
+        return reply
 
     def write(self, address: Address, data: bytes) -> Reply:
         """Write a part of it."""
@@ -137,10 +165,12 @@ class Block:
         """Write a part of it and read another; nothing where the PLC has no valid data."""
         told, arrived = self._exchange((address, data))
         try:
-            return Reply(self._part(told, source), arrived)
+            reply = Reply(self._part(told, source), arrived)
         except NoData:
             # it was written all the same
             return Reply(b'', arrived)
+        self._beside = (told, arrived), time.monotonic()
+        return reply
 
     def _part(self, told: tuple[int, ...], address: Address) -> bytes:
         word, actual, _, flags, _ = told
@@ -155,9 +185,11 @@ class Block:
     def _exchange(self, write: _Written | None = None) -> _Told:
         """Carry out a transaction; return the five registers, and since when they were seen."""
         began = time.monotonic()
-        if self._live and began - self._sent_at > PLC_TIME:
+        self._beside = None
+        if self._command is not None and began - self._sent_at > PLC_TIME:
+            live = self._live
             self._command, self._live = None, False
-            if write is None or write[0].sub_index != BEGIN:
+            if live and (write is None or write[0].sub_index != BEGIN):
                 raise self._interrupted(began - self._sent_at, maybe_done=False)
         if write is None and self._command is None:
             return self._look()
@@ -168,9 +200,9 @@ class Block:
         command, live = self._command_after(write)
         # it may be carried out even if no answer comes
         before = self._sent_at, self._live, self._command
-        last, was_live, _ = before
+        last, was_live, stood = before
         self._command, self._live = command, live
-        if live and not was_live:
+        if stood is None or (live and not was_live):
             last = self._sent_at = began
         self._count = self._count % 0xFFFF + 1
         try:
@@ -181,11 +213,14 @@ class Block:
                 self._sent_at, self._live, self._command = before
             raise
         self._sent_at = began
+        taken = self._take(told, arrived)
+        if command[0] != self._acknowledged:
+            self._acknowledged, self._moves = command[0], _MOVES
         if live and arrived - last > PLC_TIME:
             # the PLC may have stopped the drive before it came, and let it go on now
             self._command, self._live = None, False
             raise self._interrupted(arrived - last, maybe_done=True)
-        return self._take(told, arrived)
+        return taken
 
     def _command_after(self, write: _Written | None) -> tuple[tuple[int, int], bool]:
         """Return STW1 and set-point as they shall be, and whether a motor may run by them."""
@@ -247,7 +282,10 @@ class Block:
                 'and that the program of the PLC is that of docs/telegram1.md'
             )
         if told[2] != self._life:
-            self._life, self._life_at = told[2], arrived
+            self._life = told[2]
+            self._moves = max(self._moves - 1, 0)
+            if not self._moves:
+                self._life_at = arrived
         return told, self._life_at
 
     def _of_block(self, refusal: Refused) -> LinkError:

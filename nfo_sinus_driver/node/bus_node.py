@@ -60,7 +60,8 @@ class BusNode(Node):
         self.drive_names: list[str] = list(values['drives'])
         self._port: str = values['port']
         link = open_link(values['protocol'], self._port, settings)
-        self.bus_context = BusContext(Bus(link), values['retries'])
+        limit = values['max_requests'] if link.protocol.most_requests else 0.0
+        self.bus_context = BusContext(Bus(link, limit), values['retries'])
         AllDrives(self, self.bus_context)
         SetpointsForAll(self, self.bus_context)
         self._logged_port: str | None = ''

@@ -33,7 +33,13 @@ from nfo_sinus_driver.node.wording import Wording
 
 #: What identifies a drive or how it is commanded cannot change under way.
 ONLY_UNCONFIGURED = (
-    'address', 'block_address', 'model', 'control_method', 'reference', 'classic_dialect'
+    'address',
+    'block_address',
+    'telegram_words',
+    'model',
+    'control_method',
+    'reference',
+    'classic_dialect',
 )
 
 

@@ -152,6 +152,16 @@ BUS_SETTINGS = (
         'by themselves',
         fixed=True,
     ),
+    Setting(
+        'max_requests',
+        50.0,
+        'With modbus_tcp: how many requests the PLC or gateway is sent a second at most, stops '
+        'aside, Hz; 0: no limit',
+        0,
+        10000,
+        fixed=True,
+        unit='Hz',
+    ),
     Setting('drives', ['nfo_sinus'], 'Names of the drive nodes', fixed=True),
 )
 
@@ -171,6 +181,13 @@ DRIVE_SETTINGS = (
         'drive',
         0,
         LAST_BLOCK,
+    ),
+    Setting(
+        'telegram_words',
+        '',
+        'With control_method telegram1 on sinus_g2: the words that the PLC maps, profidrive or '
+        "drivecontrol; '': profidrive",
+        constraints="'', profidrive or drivecontrol",
     ),
     Setting(
         'model',
@@ -198,7 +215,7 @@ DRIVE_SETTINGS = (
     ),
     Setting(
         'poll_rate',
-        0.0,
+        50.0,
         'Status and actual value, Hz; 0: as fast as the bus allows',
         0,
         1000,

@@ -162,6 +162,14 @@ class Plc:
             for (address, drive), block in zip(drives.items(), blocks, strict=True)
         }
 
+    def restart(self, until: float) -> None:
+        """Be off until then (s), and begin anew: the registers of all blocks are 0."""
+        self.stopped_until = until
+        for address, channel in self.channels.items():
+            fresh = self._channel(channel.drive, channel.unit, channel.register)
+            self.channels[address].block = fresh.block
+            self.channels[address].program = fresh.program
+
     def _channel(self, drive: SimulatedDrive, unit: int, register: int) -> Channel:
         server = drive.servers.get(TELEGRAM)
         if not isinstance(server, telegram1.Server):

@@ -17,7 +17,7 @@
 Judges the control words in the block of a PLC, by the tables of the manuals and nothing else.
 
 It knows no profile: which bit may come when is written down here once more, as [M1], [M3 §6, §7.2]
-and [M0 tables 14 to 16] print it, with [C107] and [C109].
+and [M0 tables 14 to 16] print it, with [C107], [C109] and [C111].
 """
 
 from __future__ import annotations
@@ -73,8 +73,10 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
             if written is not None:
                 yield written
             if reads:
-                zsw1, _, _, flags, version = struct.unpack_from('>5H', data, 9)
-                assert version == 1
+                told, _, _, told_flags, version = struct.unpack_from('>5H', data, 9)
+                # a PLC that has just started shows nothing yet
+                if version:
+                    zsw1, flags = told, told_flags
 
 
 class Judge(abc.ABC):
@@ -163,6 +165,26 @@ class HJudge(Judge):
 
 
 class G2Judge(Judge):
+    """PROFIdrive, standard telegram 1 [C111]."""
+
+    known = 0x04FF
+    run = 1 << 0
+
+    def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
+        """Yield what is wrong with the order of the bits."""
+        rises, falls = word & ~stood, stood & ~word
+        pattern = zsw1 & 0x47
+        if not word & 1 << 10:
+            yield 'without bit 10 all of it is ignored'
+        if rises & 1 << 0 and pattern != 0x01:
+            yield 'ON before "ready to switch on" was shown'
+        if word & 1 << 0 and rises & 1 << 3 and pattern != 0x03:
+            yield 'operation enabled before "switched on" was shown'
+        if word & 1 << 1 and falls & 1 << 3 and zsw1 & 1 << 2:
+            yield 'operation is taken from a motor that is driven: it coasts'
+
+
+class DriveControlJudge(Judge):
     """[M0 tables 14 to 16]."""
 
     known = 0xE8FF
@@ -185,7 +207,10 @@ class G2Judge(Judge):
 
 
 JUDGES: Mapping[str, type[Judge]] = {
-    'sinus_optimal': OptimalJudge, 'sinus_h': HJudge, 'sinus_g2': G2Judge
+    'sinus_optimal': OptimalJudge,
+    'sinus_h': HJudge,
+    'sinus_g2': G2Judge,
+    'drivecontrol': DriveControlJudge,
 }
 
 

@@ -58,8 +58,8 @@ SETPOINT = 'telegram.setpoint'
 VALID = 1 << 16
 RELEASED = 1 << 17
 FAULT_ACK = 1 << 7
-#: How long a fault is given to go while the bit stands that acknowledges it, s.
-_ACKNOWLEDGED_IN = 0.5
+#: How long a word is given to reach the drive, and a fault to go by it, s.
+_TAKEN_IN = 1.0
 
 NOT_RELEASED = 190
 FAULT = 191
@@ -99,6 +99,9 @@ class Telegram1(ControlMethod):
     :cvar ready: STW1 with which the bus has control and the motor stands.
     :cvar runs: the bits of it by which the motor runs; a stop clears them.
     :cvar control: the bit of ZSW1 that confirms control.
+    :cvar echoes: that bit says nothing of who commands: without control by PLC the drive ignores
+        the whole word and goes on as before, so that a motor that turns may do so by the bus
+        ([C107], [C116]).
     """
 
     means = 'telegram 1'
@@ -111,11 +114,16 @@ class Telegram1(ControlMethod):
     ready: ClassVar[int]
     runs: ClassVar[int]
     control: ClassVar[int] = 1 << 9
+    echoes: ClassVar[bool] = False
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control, by us or by whom was here before."""
+        """Tell whether the bus has control, by this driver or an earlier session."""
         word = int((yield Read(STATUS)))
-        return bool(word & self.control and word & RELEASED)
+        if not word & RELEASED:
+            return False
+        if word & self.control or not self.echoes:
+            return bool(word & self.control)
+        return bool((yield Read(ACTUAL)))
 
     def holder(self) -> Steps[Holder]:
         """Tell who has control of the drive."""
@@ -141,24 +149,26 @@ class Telegram1(ControlMethod):
         """
         Clear the run bits of what stands, and the set-point with them, in one telegram.
 
-        Where none of ours stands, who has control stays as it is, and a drive that the bus has
-        keeps it.
+        Where no word of this driver stands, a drive that the bus controls, or may control, is given
+        the one by which it stops; a drive that keypad or terminals control is left alone.
         """
         try:
             yield Write(CLEAR, self.runs | FAULT_ACK, once=True)
         except Refusal:
             word = int((yield Read(STATUS, once=True)))
-            if word & self.control and word & RELEASED:
-                yield begin(self.standing(word), once=True)
+            if word & RELEASED and (word & self.control or self.echoes):
+                yield begin(self.stopping(word), once=True)
 
-    def standing(self, word: int) -> int:
+    def stopping(self, word: int) -> int:
         """Return STW1 by which a drive with this status stops as usual, and keeps control."""
         return self.ready
 
     def release(self) -> Steps[None]:
         """Leave the drive ready, under control of the bus; it stands, or its ramp ends first."""
         if (yield from self.in_control()):
-            yield begin(self.standing(int((yield Read(STATUS)))))
+            word = int((yield Read(STATUS)))
+            turns = yield Read(ACTUAL)
+            yield begin(self.stopping(word) if turns else self.ready)
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run bits and set-point."""
@@ -169,14 +179,16 @@ class Telegram1(ControlMethod):
         """
         Acknowledge a fault by one edge of bit 7, the run bits clear, and set-point 0.
 
-        The bit stands until the fault is gone, for a while, so that the drive has seen it.
+        Each word stands until it has reached the drive, and the bit until the fault is gone, for a
+        while.
 
         :raises NotPossible: the PLC does not let us command the drive.
         """
         yield from self.require_startable()
         yield begin(self.ready)
+        yield Hold(lambda status: True, _TAKEN_IN)
         yield begin(self.ready | FAULT_ACK)
-        yield Hold(self._without_fault, _ACKNOWLEDGED_IN)
+        yield Hold(self._without_fault, _TAKEN_IN)
         yield begin(self.ready)
         return ''
 

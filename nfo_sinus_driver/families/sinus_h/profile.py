@@ -30,21 +30,12 @@ from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
-from nfo_sinus_driver.families.sinus_h import words
-from nfo_sinus_driver.families.sinus_h.words import Control
-
-#: SwitchOFF, which leads to S2.
-_OFF = (
-    Control.NO_COAST_STOP
-    | Control.NO_QUICK_STOP
-    | Control.ENABLE_RAMP
-    | Control.UNFREEZE_RAMP
-    | Control.ENABLE_SETPOINT
-    | Control.CONTROL_BY_PLC
-)
-#: SwitchON, or OperationDisable: S3. OperationEnable: S4.
-_ON = _OFF | Control.ON
-_RUN = _ON | Control.ENABLE_OPERATION
+from nfo_sinus_driver.families._telegram1.profidrive import OFF
+from nfo_sinus_driver.families._telegram1.profidrive import ON
+from nfo_sinus_driver.families._telegram1.profidrive import RUN
+from nfo_sinus_driver.families._telegram1.profidrive import Control
+from nfo_sinus_driver.families._telegram1.profidrive import state_of
+from nfo_sinus_driver.families.sinus_h.words import STATUS_WORD
 
 
 class HTelegram1(Telegram1):
@@ -55,14 +46,16 @@ class HTelegram1(Telegram1):
         'at its keypad set PRT-12 Lost Cmd Mode to Free-Run or Dec (from the factory it is None, '
         'and the motor runs on), and PRT-13 to the time after which it does that'
     )
-    ready = int(_OFF)
+    ready = int(OFF)
     runs = int(Control.ENABLE_OPERATION)
+    # bit 9 of ZSW1 is bit 10 of STW1 [C104]
+    echoes = True
 
     def take_control(self) -> Steps[None]:
-        """Go to S2, from S4 by way of S3."""
+        """Go to S2, from S4 by way of S3; without its echo S4 does not show [C116]."""
         word = int((yield Read(method.STATUS)))
-        if words.state_of(word) is State.OPERATION_ENABLED:
-            yield method.begin(int(_ON))
+        if state_of(word & 0xFFFF) is State.OPERATION_ENABLED or not word & self.control:
+            yield method.begin(int(ON))
             yield Until(lambda status: status.state is not State.OPERATION_ENABLED)
         yield method.begin(self.ready)
         yield Until(
@@ -71,23 +64,22 @@ class HTelegram1(Telegram1):
 
     def run(self) -> Steps[None]:
         """SwitchON, then OperationEnable when the drive shows S3."""
-        yield method.following(int(_ON))
+        yield method.following(int(ON))
         yield Until(lambda status: status.state is State.SWITCHED_ON)
-        yield method.following(int(_RUN), once=True)
+        yield method.following(int(RUN), once=True)
 
-    def standing(self, word: int) -> int:
-        """Return OperationDisable where it may be in S4, which SwitchOFF does not leave."""
-        state = words.state_of(word)
-        return int(_ON) if state in (State.OPERATION_ENABLED, State.SWITCHED_ON) else self.ready
+    def stopping(self, word: int) -> int:
+        """Return OperationDisable: SwitchOFF does not leave S4, whatever ZSW1 shows [C116]."""
+        return int(ON)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by CoastStop; control is kept."""
-        yield method.begin(int(_OFF & ~Control.NO_COAST_STOP))
+        yield method.begin(int(OFF & ~Control.NO_COAST_STOP))
 
 
 PROFILE = Profile(
     title='Sinus H',
-    status_word=words.STATUS_WORD,
+    status_word=STATUS_WORD,
     holders={},
     methods={'telegram1': HTelegram1},
     setpoints=method.setpoints(327.67, forward_only=True),

@@ -56,6 +56,12 @@ OPTIONS = (
         CHOICES['stop_in_tuning'],
     ),
 )
+#: For the families that have telegram 1.
+COMMANDS = Option(
+    'commands',
+    'on telegram 1: a command counts when its bit rises, or as long as it stands (default: edges)',
+    ('edges', 'levels'),
+)
 
 
 def _unit(target: Target) -> SinusControlUnit:

@@ -104,6 +104,11 @@ _SOURCES: Mapping[int, Source] = {
 }
 #: What hands control to the bus.
 _COMMANDS = frozenset({'fieldbus.mode', 'fieldbus.drive_control'})
+#: Telegram 1: which words it has, and how commands count that stand in it: when a bit rises, or as
+#: long as it stands.
+PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
+EDGES, LEVELS = 'edges', 'levels'
+TELEGRAM_CHOICES = {'telegram_words': (PROFIDRIVE, DRIVECONTROL), 'commands': (EDGES, LEVELS)}
 #: The states that the state machine leaves by itself.
 _PASSING = frozenset(
     {
@@ -132,7 +137,7 @@ class G2ControlUnit(SinusControlUnit):
     Runs the motor of a G2, and tunes it.
 
     :param dialect: the manual that describes its firmware; by default as SWVer says.
-    :param options: those of every Sinus, and those of :class:`CanopenShape`.
+    :param options: those of every Sinus, of :class:`CanopenShape`, and :data:`TELEGRAM_CHOICES`.
     :raises ValueError: there is no such manual, or SWVer was given and is of another firmware; or
         an option cannot be that.
 
@@ -162,6 +167,13 @@ class G2ControlUnit(SinusControlUnit):
         faults = SinusFaults(memory.model, log_size=self.firmware.log_size)
         shape = {name: options.pop(name) for name in CANOPEN_OPTIONS & options.keys()}
         self.canopen = CanopenShape(**shape)
+        #: What is chosen of telegram 1.
+        self.telegram = {
+            name: options.pop(name, choices[0]) for name, choices in TELEGRAM_CHOICES.items()
+        }
+        for name, choices in TELEGRAM_CHOICES.items():
+            if self.telegram[name] not in choices:
+                raise ValueError(f'{name}: choose one of {", ".join(choices)}')
         super().__init__(memory, address, faults, **options)
         #: The module of CANopen holds it in bus mode.
         self._is_held = False

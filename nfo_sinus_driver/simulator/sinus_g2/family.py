@@ -32,6 +32,7 @@ from nfo_sinus_driver.simulator.sinus_g2 import canopen_shape
 from nfo_sinus_driver.simulator.sinus_g2 import classic
 from nfo_sinus_driver.simulator.sinus_g2 import telegram1
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import TELEGRAM_CHOICES
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.firmware import DIALECTS
 
@@ -104,6 +105,13 @@ FAMILY = SimulatedFamily(
         ),
         *parts.OPTIONS,
         *canopen_shape.OPTIONS,
+        Option(
+            'telegram_words',
+            'of the G2 on telegram 1: the words are those of PROFIdrive, or DriveControl and '
+            'DriveStatus (default: profidrive)',
+            TELEGRAM_CHOICES['telegram_words'],
+        ),
+        parts.COMMANDS,
     ),
     verbs={
         **parts.VERBS,

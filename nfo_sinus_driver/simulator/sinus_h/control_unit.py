@@ -28,6 +28,7 @@ from typing import Any
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus_h import keypad
+from nfo_sinus_driver.simulator.sinus_h.state_machine import LEVELS
 from nfo_sinus_driver.simulator.sinus_h.state_machine import NONE
 from nfo_sinus_driver.simulator.sinus_h.state_machine import PATTERNS
 from nfo_sinus_driver.simulator.sinus_h.state_machine import PROFIDRIVE
@@ -44,7 +45,7 @@ STATE, WORD = 'state', 'word'
 #: What STOP at the keypad does while the fieldbus commands: no manual says.
 STOPS, IGNORED = 'stops', 'ignored'
 CHOICES = {
-    'unlisted_exits': (NONE, PROFIDRIVE),
+    'unlisted_exits': (NONE, PROFIDRIVE, LEVELS),
     'echo_bits': (STATE, WORD),
     'keypad_stop': (STOPS, IGNORED),
 }

@@ -71,8 +71,9 @@ class Stop(enum.Enum):
     COAST = 'coast'
 
 
-#: What follows only where unlisted exits are taken as other drives of the profile have them.
-NONE, PROFIDRIVE = 'none', 'profidrive'
+#: What follows only where unlisted exits are taken as other drives of the profile have them; with
+#: LEVELS S1 is left, too, by a word that has been there all the time.
+NONE, PROFIDRIVE, LEVELS = 'none', 'profidrive', 'levels'
 
 _NO_STOP = Control.NO_COAST_STOP | Control.NO_QUICK_STOP
 _SWITCH_ON = _NO_STOP | Control.ON
@@ -114,7 +115,8 @@ class StateMachine:
     The state of the module; one telegram leads to the next state at most.
 
     :param unlisted: exits that the table does not print: ``none``, or those of ``profidrive``:
-        QuickStop and CoastStop lead out of S3, and SwitchOFF out of S4.
+        QuickStop and CoastStop lead out of S3, and SwitchOFF out of S4; with ``levels`` SwitchON
+        leads out of S1, too.
 
     :ivar state: where it is.
     :ivar stop: how the motor was stopped that ran last.
@@ -123,7 +125,8 @@ class StateMachine:
     def __init__(self, unlisted: str = NONE) -> None:
         self.state = State.SWITCHING_ON_INHIBITED
         self.stop = Stop.COAST
-        self._unlisted = unlisted == PROFIDRIVE
+        self._unlisted = unlisted in (PROFIDRIVE, LEVELS)
+        self._by_level = unlisted == LEVELS
 
     def update(self, word: Control, *, inhibited: bool = False) -> None:
         """
@@ -137,7 +140,8 @@ class StateMachine:
         if coast_stop(word):
             self.stop = Stop.COAST
         if self.state is State.SWITCHING_ON_INHIBITED:
-            if switch_off(word) and not inhibited:
+            leaves = switch_off(word) or (self._by_level and switch_on(word))
+            if leaves and not inhibited:
                 self.state = State.READY_FOR_SWITCHING_ON
         elif self.state is State.READY_FOR_SWITCHING_ON:
             if quick_stop(word) or coast_stop(word):

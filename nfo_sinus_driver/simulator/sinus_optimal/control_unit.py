@@ -57,8 +57,20 @@ _FULL_FREQUENCY = 50.0
 _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
 
+#: How a command of the control word is taken: when its bit rises, or as long as it stands.
+EDGES, LEVELS = 'edges', 'levels'
+COMMANDS = (EDGES, LEVELS)
+
+
 class OptimalControlUnit(SinusControlUnit):
-    """Runs the motor of an Optimal (options: those of every Sinus)."""
+    """
+    Runs the motor of an Optimal.
+
+    :param commands: bits of the control word count as ``edges`` or as ``levels``: no manual says.
+        One that takes levels goes on by what stands when it has power again.
+    :param options: those of every Sinus.
+    :raises ValueError: an option cannot be that.
+    """
 
     setpoint_of: ClassVar[Mapping[int, str]] = {
         _FREQUENCY: 'fieldbus.input_freq_setpoint',
@@ -71,9 +83,14 @@ class OptimalControlUnit(SinusControlUnit):
     run_command = 'fieldbus.smode'
     run_codes = frozenset(Smode)
 
-    def __init__(self, memory: Memory, address: int, **options: Any) -> None:
+    def __init__(
+        self, memory: Memory, address: int, *, commands: str = EDGES, **options: Any
+    ) -> None:
+        if commands not in COMMANDS:
+            raise ValueError(f'commands: choose one of {", ".join(COMMANDS)}')
         super().__init__(memory, address, SinusFaults(memory.model), **options)
-        self._steps = ControlSteps()
+        self._by_level = commands == LEVELS
+        self._steps = ControlSteps(by_level=self._by_level)
         self._running = False
         self._sleeping = False
         self._telegram_setpoint = 0
@@ -92,7 +109,7 @@ class OptimalControlUnit(SinusControlUnit):
 
     def restart(self) -> None:
         """Begin as after power-on."""
-        self._steps = ControlSteps()
+        self._steps = ControlSteps(by_level=self._by_level)
         self._running = self._sleeping = False
         super().restart()
 
@@ -148,14 +165,15 @@ class OptimalControlUnit(SinusControlUnit):
     def wait(self, dt: float) -> None:
         """Let the start delay run, and the drive respond to Drive Control."""
         super().wait(dt)
-        self._steps.wait(dt)
+        self._steps.wait(dt, self.status_word)
         if self._steps.has_control and not self.on_bus:
             self.take(Source.CONTROL_WORD)
 
     @property
     def settled(self) -> bool:
         """Whether all stays as it is: no stop goes on, and the control word has had its effect."""
-        return super().settled and not self.stopping and not self._steps.waiting
+        going_on = self._steps.waiting or self._steps.next_due(self.status_word)
+        return super().settled and not self.stopping and not going_on
 
     def settle(self) -> None:
         """Carry out what stands: run, brake to a stop, sleep, or let the motor go."""
@@ -290,11 +308,13 @@ class ControlSteps:
     does nothing until it is removed and given again; what is removed ends at once, and all
     that came after it.
 
+    :param by_level: a command is taken as soon as its bit stands and the status word is ready.
     :ivar word: the last control word.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, by_level: bool = False) -> None:
         self.word = Control(0)
+        self._by_level = by_level
         self._asked = 0
         self._reached = 0
         self._left = 0.0
@@ -314,8 +334,15 @@ class ControlSteps:
                 self._asked += 1
                 self._left = _RESPONSE
 
+    def next_due(self, shown: Status) -> bool:
+        """Tell whether the next command is taken because its bit stands."""
+        if not self._by_level or self.waiting or self._asked == len(_STEPS):
+            return False
+        command, needed = _STEPS[self._asked]
+        return bool(self.word & command) and shown & needed == needed
+
     def give_up(self) -> None:
-        """Lose control to somebody else; the word stays as it was written."""
+        """Lose control to another source; the word stays as it was written."""
         self._asked = self._reached = 0
 
     def drop_run(self) -> None:
@@ -324,8 +351,11 @@ class ControlSteps:
         self._asked = min(self._asked, before_run)
         self._reached = min(self._reached, before_run)
 
-    def wait(self, dt: float) -> None:
-        """Let ``dt`` seconds pass."""
+    def wait(self, dt: float, shown: Status) -> None:
+        """Let ``dt`` seconds pass; ``shown`` is the status word."""
+        if self.next_due(shown):
+            self._asked += 1
+            self._left = _RESPONSE
         self._left = max(0.0, self._left - dt)
         if not self._left:
             self._reached = self._asked

@@ -57,6 +57,6 @@ FAMILY = SimulatedFamily(
     factory=FACTORY,
     machine=_machine,
     servers={'modbus': ModbusServer, 'telegram1': telegram1.Server},
-    options=parts.OPTIONS,
+    options=(parts.COMMANDS, *parts.OPTIONS),
     verbs=parts.VERBS,
 )

@@ -16,12 +16,13 @@
 """
 How a G2 is commanded by telegram 1, through a PLC on PROFIBUS [M0 §6.3].
 
-Nobody knows how the words of PROFIdrive are translated [C38]: they are taken for DriveControl and
-DriveStatus, which they stand for [M0 §7.3, tables 14 to 16]. A G2 that has others gives no control
-away by these, and so nothing runs.
+The words are those of PROFIdrive [C111]. A master that maps DriveControl and DriveStatus in their
+place [M0 §7.3, tables 14 to 16] is chosen by name: :data:`PROFILE` has it among its ``words``.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from nfo_sinus_driver.catalog.profile import Profile
 from nfo_sinus_driver.catalog.profile import Steps
@@ -30,30 +31,71 @@ from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.families._telegram1 import method
+from nfo_sinus_driver.families._telegram1 import profidrive
 from nfo_sinus_driver.families._telegram1.method import Telegram1
 from nfo_sinus_driver.families._telegram1.method import Words
-from nfo_sinus_driver.families.sinus_g2.words import STATUS_WORD
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Status
-from nfo_sinus_driver.families.sinus_g2.words import state_of
+from nfo_sinus_driver.families.sinus_g2 import words as drivecontrol
 
-_READY = (
-    Control.ENABLE_VOLTAGE
-    | Control.DISABLE_QUICK_STOP
-    | Control.ENABLE_RFG
-    | Control.UNLOCK_RFG
-    | Control.USE_REF_FOR_RFG
-    | Control.NET_CTRL
-    | Control.NET_REF
-)
+_STARTABLE = (State.READY_TO_SWITCH_ON, State.STOPPING)
 
 
 class G2Telegram1(Telegram1):
-    """Control by telegram 1: switched on, then enabled [C54]."""
+    """
+    Control by STW1 of PROFIdrive: switched on, then enabled; the sign of the set-point reverses.
+
+    A stop clears ON and leaves operation enabled: so the motor stops as StMode says.
+    """
+
+    coasts = True
+    ready = int(profidrive.OFF)
+    runs = int(profidrive.Control.ON)
+    # bit 9 of ZSW1 asks for control, and does not say that the bus has it
+    echoes = True
+
+    def take_control(self) -> Steps[None]:
+        """Go to "ready to switch on", with bit 0 low, so that a run command is an edge later."""
+        yield method.begin(self.ready)
+        yield Until(
+            lambda status: status.state is State.READY_TO_SWITCH_ON
+            and bool((status.word or 0) & self.control)
+        )
+
+    def run(self) -> Steps[None]:
+        """Switch on, then enable operation when the drive shows that it is switched on."""
+        yield method.following(int(profidrive.ON))
+        yield Until(lambda status: status.state is State.SWITCHED_ON)
+        yield method.following(int(profidrive.RUN), once=True)
+
+    def stopping(self, word: int) -> int:
+        """Return the word that leaves operation enabled: without it the motor would coast."""
+        return self.ready | profidrive.Control.ENABLE_OPERATION
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Release the motor at once, by the coast stop; control is kept."""
+        yield method.begin(self.ready & ~profidrive.Control.NO_COAST_STOP)
+
+
+_READY = (
+    drivecontrol.Control.ENABLE_VOLTAGE
+    | drivecontrol.Control.DISABLE_QUICK_STOP
+    | drivecontrol.Control.ENABLE_RFG
+    | drivecontrol.Control.UNLOCK_RFG
+    | drivecontrol.Control.USE_REF_FOR_RFG
+    | drivecontrol.Control.NET_CTRL
+    | drivecontrol.Control.NET_REF
+)
+
+
+class G2DriveControl(Telegram1):
+    """Control by DriveControl: switched on, then enabled [C54]."""
 
     coasts = True
     ready = int(_READY)
-    runs = int(Control.SWITCH_ON | Control.ENABLE_OP | Control.ENABLE_REV_OP)
+    runs = int(
+        drivecontrol.Control.SWITCH_ON
+        | drivecontrol.Control.ENABLE_OP
+        | drivecontrol.Control.ENABLE_REV_OP
+    )
 
     def take_control(self) -> Steps[None]:
         """Request control with bit 0 low, so that a run command is an edge later [C35]."""
@@ -66,27 +108,45 @@ class G2Telegram1(Telegram1):
 
         The sign of the set-point reverses; both direction bits at once mean no change [C36].
         """
-        yield Until(lambda status: status.state in (State.READY_TO_SWITCH_ON, State.STOPPING))
-        yield method.following(self.ready | Control.SWITCH_ON, once=True)
+        yield Until(lambda status: status.state in _STARTABLE)
+        on = self.ready | drivecontrol.Control.SWITCH_ON
+        yield method.following(on, once=True)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
-        run = self.ready | Control.SWITCH_ON | Control.ENABLE_OP
-        yield method.following(int(run), once=True)
+        yield method.following(on | drivecontrol.Control.ENABLE_OP, once=True)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
-        word = self.ready & ~Control.DISABLE_QUICK_STOP | Control.OVERRIDE_COAST
-        yield method.begin(int(word))
+        word = self.ready & ~drivecontrol.Control.DISABLE_QUICK_STOP
+        yield method.begin(int(word | drivecontrol.Control.OVERRIDE_COAST))
 
 
+_Bits = profidrive.Status
 PROFILE = Profile(
     title='NFO Sinus G2',
     status_word=Words(
-        state=lambda word: state_of(word & 0xFFFF),
-        # by the sign of the set-point it reverses under the forward run command, so that the bit
-        # of the reverse one tells no direction
-        by_bit={bit: fact & ~Fact.REVERSE for bit, fact in STATUS_WORD.by_bit.items()},
-        by_state=STATUS_WORD.by_state,
-        code=lambda word: method.code_of(word, state_of(word & 0xFFFF), fault=Status.FAULTED),
+        state=lambda word: profidrive.state_of(word & 0xFFFF),
+        by_bit={
+            _Bits.READY_ON: Fact.READY,
+            _Bits.READY_OPERATE: Fact.SWITCHED_ON,
+            _Bits.OPERATION_ENABLED: Fact.OPERATION_ENABLED,
+            _Bits.FAULT: Fact.FAULT,
+            _Bits.SWITCHING_ON_INHIBITED: Fact.SWITCH_ON_DISABLED,
+            _Bits.WARNING: Fact.ALARM,
+            _Bits.SETPOINT_REACHED: Fact.SETPOINT_REACHED,
+            _Bits.CONTROL_REQUESTED: Fact.NETWORK_CONTROL,
+        },
+        by_state={},
+        by_clear_bit={_Bits.NO_QUICK_STOP: Fact.QUICK_STOP_ACTIVE},
+        stateless=True,
+        code=lambda word: method.code_of(
+            word,
+            profidrive.state_of(word & 0xFFFF),
+            fault=_Bits.FAULT,
+            warning=_Bits.WARNING,
+        ),
+        # on the ramp to a stop the states look alike, and bit 15 only says that pulses are enabled
+        by_frequency=True,
+        only_frequency=True,
     ),
     holders={},
     methods={'telegram1': G2Telegram1},
@@ -95,4 +155,30 @@ PROFILE = Profile(
     writes_and_reads=True,
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},
+)
+PROFILE = replace(
+    PROFILE,
+    words={
+        'profidrive': PROFILE,
+        'drivecontrol': replace(
+            PROFILE,
+            methods={'telegram1': G2DriveControl},
+            status_word=Words(
+                state=lambda word: drivecontrol.state_of(word & 0xFFFF),
+                # by the sign of the set-point it reverses under the forward run command, so that
+                # the bit of the reverse one tells no direction
+                by_bit={
+                    bit: fact & ~Fact.REVERSE
+                    for bit, fact in drivecontrol.STATUS_WORD.by_bit.items()
+                },
+                by_state=drivecontrol.STATUS_WORD.by_state,
+                frequency_beside=True,
+                code=lambda word: method.code_of(
+                    word,
+                    drivecontrol.state_of(word & 0xFFFF),
+                    fault=drivecontrol.Status.FAULTED,
+                ),
+            ),
+        ),
+    },
 )

@@ -55,9 +55,9 @@ class OptimalTelegram1(Telegram1):
         Where Enable is taken away the drive has to show that, too: else what it has shown before
         would be taken for the answer to the Enable that follows [C109].
         """
-        standing = self.standing(int((yield Read(method.STATUS))))
-        yield method.begin(standing)
-        enabled = bool(standing & _ENABLE)
+        word = self.stopping(int((yield Read(method.STATUS))))
+        yield method.begin(word)
+        enabled = bool(word & _ENABLE)
 
         def is_taken(status: InverterStatus) -> bool:
             word = status.word or 0
@@ -71,7 +71,7 @@ class OptimalTelegram1(Telegram1):
         yield Until(lambda status: bool((status.word or 0) & Status.ENABLED))
         yield method.following(self.ready | _ENABLE | _SWITCH_ON, once=True)
 
-    def standing(self, word: int) -> int:
+    def stopping(self, word: int) -> int:
         """Return the word that keeps Enable where the motor is driven, so that it ramps."""
         return self.ready | _ENABLE if word & _DRIVEN else self.ready
 
@@ -83,6 +83,7 @@ PROFILE = Profile(
         by_bit=STATUS_WORD.by_bit,
         by_state=STATUS_WORD.by_state,
         stateless=True,
+        frequency_beside=True,
         code=lambda word: method.code_of(
             word,
             state_of(word & 0xFFFF),
