@@ -42,13 +42,13 @@ from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.drive_state import Identity
 from nfo_sinus_driver.drive.error_log import ErrorLog
 from nfo_sinus_driver.drive.error_log import ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.parameters import on_bus

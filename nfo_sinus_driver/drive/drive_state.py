@@ -19,10 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
-from dataclasses import dataclass
 from dataclasses import replace
 from fractions import Fraction
-import functools
 import logging
 import math
 import time
@@ -44,6 +42,7 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
@@ -65,45 +64,8 @@ _SOON = 2.0
 #: How long it counts that the bus had control, s, where that has to be asked for by itself.
 _BY_MODE_FOR = 1.0
 #: What makes another drive of it, or another way to command it.
-_FIXED = (
-    'address', 'block_address', 'telegram_words', 'model', 'control_method', 'reference'
-)
+_FIXED = ('address', 'block_address', 'telegram_words', 'model', 'control_method', 'reference')
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
-
-
-@dataclass(frozen=True)
-class Identity:
-    """
-    Who answers; ``''`` is what it does not tell.
-
-    :ivar firmware: SWVer, such as 4.38 [M0 §8.1]; NaN if it does not tell.
-    :ivar motor_firmware: NFOVer, such as 4018.
-    :ivar vendor: who made it.
-    :ivar model: its product name and size, such as ``NFO Sinus 1.50/400`` [M0 §6.2.4].
-    :ivar serial: its serial number.
-    """
-
-    firmware: float = math.nan
-    motor_firmware: int = 0
-    vendor: str = ''
-    model: str = ''
-    serial: str = ''
-
-    @functools.cached_property
-    def version(self) -> Fraction | None:
-        """The firmware as a number that can be compared exactly; ``None`` if it does not tell."""
-        return None if math.isnan(self.firmware) else Fraction(self.firmware)
-
-    @property
-    def versions(self) -> str:
-        """Both firmwares, such as ``4.38 / 4018``."""
-        if math.isnan(self.firmware):
-            return ''
-        return f'{self.firmware:.2f} / {self.motor_firmware}'
-
-    def __str__(self) -> str:
-        told = {'': self.model, 'firmware ': self.versions, 'serial ': self.serial}
-        return ', '.join(f'{name}{value}' for name, value in told.items() if value)
 
 
 class DriveState:

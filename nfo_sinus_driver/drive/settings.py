@@ -86,6 +86,8 @@ def _own_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
 
 #: Those of all models together.
 CONTROL_METHODS = _control_methods(AUTO)
+#: The sets of words that a PLC may map, where a model has several.
+TELEGRAM_WORDS = _telegram_words(AUTO, 'telegram1')[1:]
 #: Where a running drive takes its reference from.
 REFERENCES = _references(AUTO, MONITOR)
 #: The control modes by the names that ``expected_control_mode`` takes.

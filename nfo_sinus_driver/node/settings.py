@@ -32,6 +32,7 @@ from nfo_sinus_driver.drive.settings import CONTROL_MODES
 from nfo_sinus_driver.drive.settings import LAST_BLOCK
 from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.drive.settings import TELEGRAM_WORDS
 from nfo_sinus_driver.link import BIT_RATES
 from nfo_sinus_driver.link import PROTOCOLS
 
@@ -185,9 +186,9 @@ DRIVE_SETTINGS = (
     Setting(
         'telegram_words',
         '',
-        'With control_method telegram1 on sinus_g2: the words that the PLC maps, profidrive or '
-        "drivecontrol; '': profidrive",
-        constraints="'', profidrive or drivecontrol",
+        "With control_method telegram1: which words the PLC maps, where the model has several; '': "
+        f'{TELEGRAM_WORDS[0]}',
+        constraints=f"'' or one of {', '.join(TELEGRAM_WORDS)}, as far as the model has it",
     ),
     Setting(
         'model',

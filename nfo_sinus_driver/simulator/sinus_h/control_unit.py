@@ -122,8 +122,9 @@ class SinusHControlUnit(ControlUnit):
             self._lost = Lost.NOTHING
         rises = word & ~self.word
         self.word = word
-        self.setpoint = (setpoint & 0xFFFF) / 100
         if word & Control.CONTROL_BY_PLC:
+            # without it the drive goes on at the last set-point, too [C116]
+            self.setpoint = (setpoint & 0xFFFF) / 100
             self._obeyed = word
             if rises & Control.FAULT_ACKNOWLEDGE:
                 self.faults.acknowledge()

@@ -48,9 +48,9 @@ from nfo_sinus_driver.simulator.plc import PlcSetting
 ENABLING = {
     'sinus_optimal': [0x0400, 0x0408, 0x0409],
     'sinus_h': [0x0476, 0x0477, 0x047F],
-    'sinus_g2': [0xC076, 0xC077, 0xC07F],
+    'sinus_g2': [0x0476, 0x0477, 0x047F],
 }
-STOPPED = {'sinus_optimal': 0x0408, 'sinus_h': 0x0477, 'sinus_g2': 0xC076}
+STOPPED = {'sinus_optimal': 0x0408, 'sinus_h': 0x0477, 'sinus_g2': 0x047E}
 WAYS_OUT: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'quick stop': lambda drive: drive.quick_stop(),

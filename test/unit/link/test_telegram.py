@@ -117,14 +117,42 @@ def run(block: telegram.Block) -> None:
 def test_before_anybody_commands_it_is_only_read(plc: Plc, block: telegram.Block) -> None:
     assert block.read(STATUS).data == command(0x0207, 3)
     assert block.read(ACTUAL).data == b'\x80\0'
+    assert block.read(ACTUAL).data == b'\x80\0'
+    # the actual value after a status is of the same telegram; it is asked for after that
     assert plc.asked == [3, 3] and not plc.written
+
+
+def test_the_actual_value_of_a_status_is_not_asked_for_again(
+    plc: Plc, block: telegram.Block
+) -> None:
+    block.read(STATUS)
+    reply = block.read(ACTUAL)
+    assert plc.asked == [3] and reply.requests == 0
+    block.read(STATUS)
+    plc.now += 1.0
+    assert block.read(ACTUAL).requests == 1, 'it is too old'
+    assert plc.asked == [3, 3, 3]
+
+
+def test_a_status_from_before_a_word_is_dated_so(plc: Plc, block: telegram.Block) -> None:
+    run(block)
+    written_at, plc.still = plc.now, True
+    for moves in (0, 1, 2):
+        plc.told[2] += bool(moves)
+        plc.now += 0.02
+        assert (block.read(STATUS).arrived > written_at) == (moves == 2)
+    # a set-point is no word
+    block.write(SETPOINT, b'\x20\0')
+    plc.told[2] += 1
+    plc.now += 0.02
+    assert block.read(STATUS).arrived == plc.now
 
 
 def test_every_transaction_carries_all_of_it(plc: Plc, block: telegram.Block) -> None:
     run(block)
     block.write(SETPOINT, b'\x20\0')
     reply = block.write_and_read(SETPOINT, b'\xe0\0', STATUS)
-    block.read(ACTUAL)
+    block.read(STATUS)
     assert reply.data == command(0x0207, 3)
     words = [written[1:3] for written in plc.written]
     assert words == [(READY, 0), (RUN, 0), (RUN, 0x2000), (RUN, 0xE000), (RUN, 0xE000)]
@@ -278,7 +306,7 @@ def test_a_slow_plc_is_no_gap(plc: Plc, block: telegram.Block, takes: float) -> 
     assert plc.written[-1][1] == RUN
 
 
-def test_a_new_connection_forgets_a_run_word(plc: Plc, block: telegram.Block) -> None:
+def test_a_new_connection_forgets_every_word(plc: Plc, block: telegram.Block) -> None:
     run(block)
     block.forget()
     block.read(STATUS)
@@ -286,7 +314,7 @@ def test_a_new_connection_forgets_a_run_word(plc: Plc, block: telegram.Block) ->
     block.write(BEGIN, command(READY))
     block.forget()
     block.read(STATUS)
-    assert plc.asked[-1] == 23
+    assert plc.asked[-1] == 3
 
 
 STEP = st.one_of(

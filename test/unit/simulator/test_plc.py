@@ -39,7 +39,7 @@ PATIENCE = 60.0
 #: What starts each drive, word after word, its set-point for 20 Hz, and what its ZSW1 says then.
 STARTS = {
     'sinus_optimal': ((0x0400, 0x0408, 0x0409), 3277),
-    'sinus_g2': ((0xC076, 0xC077, 0xC07F), 200),
+    'sinus_g2': ((0x0476, 0x0477, 0x047F), 200),
     'sinus_h': ((0x0476, 0x0477, 0x047F), 2000),
 }
 MODELS = sorted(STARTS)

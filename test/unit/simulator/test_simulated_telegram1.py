@@ -229,7 +229,7 @@ def test_lost_fieldbus_goes_by_auto_stop(model, auto_stop):
 
 
 def running_g2(word=G2_FORWARD, setpoint=200, **settings):
-    bench = Bench('sinus_g2', settings)
+    bench = Bench('sinus_g2', settings, telegram_words='drivecontrol')
     bench.step(G2_STANDBY)
     bench.step(G2_ON)
     bench.step(word, setpoint)
@@ -238,7 +238,7 @@ def running_g2(word=G2_FORWARD, setpoint=200, **settings):
 
 
 def test_g2_goes_through_its_states():
-    bench = Bench('sinus_g2')
+    bench = Bench('sinus_g2', telegram_words='drivecontrol')
     assert bench.step(0) & 0xC04F == 0x0040
     assert bench.step(G2_STANDBY) & 0xC06F == 0x0021
     assert bench.step(G2_ON) & 0xC06F == 0x0023
@@ -252,9 +252,12 @@ def test_g2_goes_through_its_states():
     assert bench.zsw1 & 0xC06F == 0x0021
 
 
-def test_g2_needs_a_positive_edge_of_bit_0():
-    bench = Bench('sinus_g2')
-    bench.step(G2_FORWARD, 200)
+@pytest.mark.parametrize(
+    ('words', 'run'), [('drivecontrol', G2_FORWARD), ('profidrive', 0x047F)]
+)
+def test_g2_needs_a_positive_edge_of_bit_0(words, run):
+    bench = Bench('sinus_g2', telegram_words=words)
+    bench.step(run, 200)
     bench.wait(3.0)
     assert not bench.motor.driven
     assert bench.zsw1 & 0x40
@@ -293,6 +296,48 @@ def test_g2_fault_and_its_acknowledgement():
     assert bench.zsw1 & 0xC06F == 0x0021
     bench.wait(2.0)
     assert not bench.motor.driven
+
+
+def test_g2_speaks_profidrive():
+    # standard telegram 1: STW1 0476h, 0477h, 047Fh lead through S1 to S4 [C111]
+    bench = Bench('sinus_g2')
+    assert bench.step(0) & 0x047 == 0x40
+    assert bench.step(0x0476) & 0x277 == 0x231
+    assert bench.step(0x0477) & 0x047 == 0x03
+    assert bench.step(0x047F, 100) & 0x8047 == 0x8007, 'bit 15: pulses enabled'
+    bench.wait(4.0)
+    assert bench.actual == 100 and bench.zsw1 & 0x100
+    bench.step(0x047F, -100)
+    bench.wait(6.0)
+    assert bench.actual == -100, 'the sign reverses'
+    # OFF1 goes down the ramp, S5
+    assert bench.step(0x047E) & 0x8007 == 0x8003 and bench.motor.driven
+    bench.wait(4.0)
+    assert bench.zsw1 & 0x8047 == 0x0001 and not bench.motor.driven
+
+
+def test_g2_without_control_by_plc_goes_on_as_before():
+    bench = Bench('sinus_g2')
+    for word in (0x0476, 0x0477, 0x047F):
+        bench.step(word, 100)
+    bench.wait(4.0)
+    bench.step(0, 0)
+    bench.wait(4.0)
+    assert bench.actual == 100 and bench.motor.driven
+
+
+def test_commands_count_by_level_where_that_is_chosen():
+    for model, words in (
+        ('sinus_optimal', (PLC | ENABLE | SWITCH_ON,)),
+        ('sinus_g2', (0x047F,)),
+        ('sinus_h', (0x047F,)),
+    ):
+        option = {'unlisted_exits': 'levels'} if model == 'sinus_h' else {'commands': 'levels'}
+        bench = Bench(model, **option)
+        bench.wait(0.2)
+        bench.step(words[0], 1000)
+        bench.wait(2.0)
+        assert bench.motor.driven, model
 
 
 # --- in any order ---
