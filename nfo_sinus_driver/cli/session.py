@@ -153,7 +153,8 @@ class Session:
                 char_format=options.char_format,
                 response_timeout=options.response_timeout,
             )
-            self._bus = Bus(open_link(options.protocol, options.port, line))
+            link = open_link(options.protocol, options.port, line)
+            self._bus = Bus(link, link.protocol.most_requests)
             self._settings(options.address)
         except ValueError as error:
             raise UsageError(str(error)) from None

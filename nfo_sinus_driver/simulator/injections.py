@@ -211,6 +211,10 @@ def _fieldbus_cut(target: Target, given: dict[str, Any]) -> None:
     target.channel.cut_until = target.now + given['seconds']
 
 
+def _plc_restart(target: Target, given: dict[str, Any]) -> None:
+    target.the_plc.restart(target.now + given['seconds'])
+
+
 def _plc_stop(target: Target, given: dict[str, Any]) -> None:
     target.the_plc.stopped_until = target.now + given['seconds']
 
@@ -302,6 +306,9 @@ VERBS: Mapping[str, Verb] = {
     ),
     'fieldbus-cut': Verb(
         'let no telegram pass between the PLC and the drive', _fieldbus_cut, (_SECONDS,)
+    ),
+    'plc-restart': Verb(
+        'let the PLC be off, and begin anew with its registers 0', _plc_restart, (_SECONDS,)
     ),
     'plc-stop': Verb(
         'let the program of the PLC stand, and its fieldbus; its registers are still answered',
