@@ -48,7 +48,11 @@ _T = TypeVar('_T')
 
 
 class Refusal(Exception):
-    """The drive has refused a step; what it answered is the cause."""
+    """
+    The drive has refused a step; what it answered is the cause.
+
+    In :meth:`ControlMethod.force_stop` a step without an answer counts as refused, too.
+    """
 
 
 class NotPossible(Exception):
@@ -346,14 +350,54 @@ class ControlMethod(abc.ABC):
     @abc.abstractmethod
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Take the run command back and write set-point 0.
+        Take the run command back and write set-point 0, each step by itself [C126].
 
-        Does nothing to a drive that is not under bus control; refused if it is and does not obey.
+        Does nothing to a drive that is not under bus control; refused if it is and keeps the run
+        command.
         """
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once; control may be given back by it. Else stop as usual."""
         return self.stop(control_mode)
+
+    def force_stop(self, control_mode: str) -> Steps[bool]:
+        """
+        Stop by all that is left where :meth:`stop` is refused or does not help, each by itself.
+
+        Run command and set-point again, control taken away where that is safe, then the quick stop.
+
+        :returns: whether the drive has taken one of those that leave no run command.
+        """
+        removed = yield from self.remove(control_mode)
+        obeyed = yield from taken(self.quick_stop(control_mode))
+        return obeyed or removed is Removal.COMMAND
+
+    def perhaps_in_control(self) -> Steps[bool]:
+        """Tell whether the bus may have control: it has, or the drive does not tell who has."""
+        try:
+            return (yield from self.in_control())
+        except Refusal:
+            return True
+
+    def _stop_by(self, command: Steps[None], *others: Steps[None]) -> Steps[None]:
+        """
+        Take a run command back, then do the others, whatever the drive refuses of all this.
+
+        Where the run command is refused and the bus has no control, nothing more is done.
+
+        :raises Refusal: the run command is refused, and the bus may have control.
+        """
+        refusal: Refusal | None = None
+        try:
+            yield from command
+        except Refusal as error:
+            if not (yield from self.perhaps_in_control()):
+                return
+            refusal = error
+        for steps in others:
+            yield from taken(steps)
+        if refusal is not None:
+            raise refusal
 
     @abc.abstractmethod
     def release(self) -> Steps[None]:

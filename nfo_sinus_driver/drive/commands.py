@@ -29,6 +29,7 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import NotPossible
@@ -43,7 +44,9 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
 _T = TypeVar('_T')
@@ -74,6 +77,8 @@ async def carry_out(
     reached: Reached = _not_reached,
     tell: Callable[[Severity, Report], None] = _not_told,
     held: Held = _not_held,
+    *,
+    onward: bool = False,
 ) -> _T:
     """
     Carry out a sequence of a profile on the bus.
@@ -81,6 +86,8 @@ async def carry_out(
     :param reached: for a sequence that waits for the drive's status between two steps.
     :param tell: for one that writes to a memory that wears out: told what it has written.
     :param held: for one that waits for the status for a while.
+    :param onward: a step without an answer counts as refused, so that others follow it, but for
+        a write that has been carried out.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer; or it refuses, and the sequence ends by that.
     """
@@ -99,7 +106,7 @@ async def carry_out(
             result: _T = end.value
             return result
         except Refusal as refused:
-            assert isinstance(refused.__cause__, Refused)
+            assert isinstance(refused.__cause__, LinkError)
             raise refused.__cause__ from None
         except NotPossible as error:
             raise DriveError(Cause.NOT_POSSIBLE, why=str(error)) from error
@@ -120,11 +127,29 @@ async def carry_out(
                 brought = await held(after_write(step.condition), step.seconds)
             else:
                 await reached(after_write(step.condition))
-        except Refused as error:
-            refusal = Refusal(str(error))
-            refusal.__cause__ = error
+        except (Refused, NoAnswer, DamagedAnswer) as error:
+            if not (onward or isinstance(error, Refused)):
+                raise
+            if not await _stands(step, registers, priority, error):
+                refusal = Refusal(str(error))
+                refusal.__cause__ = error
         if isinstance(step, profile.Write):
             written_at = time.monotonic()
+
+
+async def _stands(
+    step: profile.Step, registers: ParameterAccess, priority: Priority, error: LinkError
+) -> bool:
+    """Tell whether the drive has taken a write that it did not answer, where that can be read."""
+    if isinstance(error, Refused) or not isinstance(step, profile.Write):
+        return False
+    if registers.model[step.key].access is not Access.READ_WRITE:
+        return False
+    address, data = registers.target(step)
+    try:
+        return await registers.read_from(address, priority, once=True) == data
+    except LinkError:
+        return False
 
 
 async def read_nominal(inverter: DriveState, control_mode: str) -> float:
@@ -232,6 +257,11 @@ class Commands:
     async def quick_stop(self, control_mode: str) -> None:
         """Release the motor at once, if the drive has a way; control may be given back by it."""
         await carry_out(self._method.quick_stop(control_mode), self._registers, Priority.STOP)
+
+    async def force_stop(self, control_mode: str) -> bool:
+        """Stop by all that is left, at the head of the bus; tell whether the drive took it."""
+        steps = self._method.force_stop(control_mode)
+        return await carry_out(steps, self._registers, Priority.STOP, onward=True)
 
     async def release(self) -> None:
         """Give control back."""

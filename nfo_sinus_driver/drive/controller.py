@@ -329,6 +329,9 @@ class Controller:
             return self._inverter.report(Cause.STOP_BLOCKED)
         if seen is not None and seen.faulted and not seen.driven:
             return self._inverter.report(Cause.STOPPED_BY_FAULT)
+        if seen is not None and self._sequence.forced:
+            # control may have been taken away by that
+            return self._inverter.report(Cause.STOPPING if seen.driven else Cause.STOPPED)
         if seen is None or not seen.from_bus:
             return self._no_control(seen)
         if not seen.driven:

@@ -43,6 +43,7 @@ from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.link import DamagedAnswer
+from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
@@ -56,6 +57,10 @@ _START_TIMEOUT = 4.0
 _COMPLAINT_PERIOD = 5.0
 #: Each time it is said after a longer while, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
+#: After so many stops in a row that got no answer it is looked whether the drive answers others.
+_UNHEARD_BEFORE_FORCE = 4
+#: The slowest ramp, of 2000 s, shows in the frequency by then, s.
+_RAMP_SHOWS_BY = 5.0
 _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 
@@ -101,6 +106,12 @@ class StopSequence:
         self._told_at = math.inf
         #: From when on a drive that has still not confirmed it is complained of.
         self._due = 0.0
+        #: From when on one that has taken it and does not confirm it is stopped by force.
+        self._force_at = math.inf
+        #: How many attempts in a row the drive has refused, and how many got no answer.
+        self._refusals = self._unheard = 0
+        #: The last stop that was confirmed was one by force.
+        self.forced = False
 
     @property
     def overdue(self) -> bool:
@@ -140,7 +151,9 @@ class StopSequence:
         if self._task is None:
             self._outcome = None
             self._unconfirmed = _NO_ANSWER_YET
-            self._told_at = math.inf
+            self._told_at = self._force_at = math.inf
+            self._refusals = self._unheard = 0
+            self.forced = False
             self._due = time.monotonic() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
@@ -160,10 +173,13 @@ class StopSequence:
         """
         Wait until the drive has confirmed that it stops, or stands because of a fault.
 
-        :param patience: how long to wait, s; by default not for a drive that is lost.
+        :param patience: how long to wait, s; by default not for a drive that is lost. Within it the
+            motor is stopped by force, if need be.
         :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
+        if patience is not None:
+            self._force_at = min(self._force_at, time.monotonic() + patience / 2)
         deadline = time.monotonic() + (drive_state.TIMEOUT if patience is None else patience)
         while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self.blocked_by_fault:
@@ -253,49 +269,82 @@ class StopSequence:
     async def _try_once(self) -> _Outcome:
         control_mode = self._inverter.control_mode
         reasons = self._reasons
-        refusal: Refused | None = None
+        failure: LinkError | None = None
         try:
             await self._method.stop(control_mode)
             self._told_at = min(self._told_at, time.monotonic())
+            self._refusals = self._unheard = 0
         except Refused as error:
-            if error.code == Refused.BUSY:
+            if error.code == Refused.BUSY and time.monotonic() < self._due:
                 self._unconfirmed = report_of(error)
                 return _Outcome.BUSY
-            refusal = error
-        except DamagedAnswer:
+            failure = error
+            self._refusals += 1
+        except (NoAnswer, DamagedAnswer) as error:
+            self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
-            if self._outcome is _Outcome.UNHEARD:
+            if isinstance(error, DamagedAnswer) and self._outcome is _Outcome.UNHEARD:
                 await self._inverter.look(Priority.STOP, once=True)
-            raise
+            if self._unheard < _UNHEARD_BEFORE_FORCE:
+                raise
+            failure = error
+        # one that answers nothing at all ends it here
         seen = await self._inverter.look(Priority.STOP, once=True)
-        if refusal is None:
-            seen = await self._newer(seen, reasons)
-        if refusal and seen.faulted and not seen.runs_by_bus:
+        if failure is None:
+            seen = await self._newer(seen, reasons, self._told_at)
+        if isinstance(failure, Refused) and seen.faulted and not seen.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
-            self._unconfirmed = report_of(refusal)
+            self._unconfirmed = report_of(failure)
             return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = self._why_not(seen, refusal)
+        unconfirmed = self._why_not(seen, failure)
+        if unconfirmed is not None and self._needs_force(seen, failure):
+            unconfirmed = await self._force(control_mode, reasons, unconfirmed)
         if unconfirmed is None:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
         return _Outcome.UNCONFIRMED
 
-    async def _newer(self, seen: InverterStatus, reasons: int) -> InverterStatus:
+    def _needs_force(self, seen: InverterStatus, failure: LinkError | None) -> bool:
+        """Tell whether an ordinary stop will not do: refused again, ignored, or without effect."""
+        if seen.local:
+            return False
+        if isinstance(failure, Refused):
+            # once may have been a moment at which it could not
+            return self._refusals > 1 and (seen.from_bus or seen.driven)
+        if failure is not None:
+            return True
+        return time.monotonic() >= min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
+
+    async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
+        """Stop by all that is left [C126]; return what keeps that from being confirmed."""
+        obeyed = await self._method.force_stop(control_mode)
+        told_at = time.monotonic()
+        seen = await self._inverter.look(Priority.STOP, once=True)
+        if not obeyed:
+            return why
+        self._told_at = min(self._told_at, told_at)
+        unconfirmed = self._why_not(await self._newer(seen, reasons, told_at), None)
+        if unconfirmed is None:
+            self.forced = True
+            self._inverter.tell(Severity.WARNING, self._inverter.report(Cause.STOP_FORCED, why=why))
+        return unconfirmed
+
+    async def _newer(self, seen: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
         """
         Look until a status is from after the stop: a PLC shows for a while what was before.
 
         :param reasons: those that the stop was for; with a new one it has to be written again.
         """
         until = time.monotonic() + _RETRY_PERIOD
-        while self._reasons == reasons and seen.at <= self._told_at:
+        while self._reasons == reasons and seen.at <= told_at:
             if time.monotonic() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
             seen = await self._inverter.look(Priority.STOP, once=True)
         return seen
 
-    def _why_not(self, seen: InverterStatus, refusal: Refused | None) -> Report | None:
+    def _why_not(self, seen: InverterStatus, refusal: LinkError | None) -> Report | None:
         """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
         if seen.tuning and refusal:
             return self._inverter.report(Cause.TUNING_REFUSES, error=str(refusal))

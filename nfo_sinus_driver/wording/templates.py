@@ -110,6 +110,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.STOP_UNCONFIRMED_AT_END: 'the stop is NOT confirmed: this {call.program} is ending',
     Cause.CANNOT_STOP: f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}',
     Cause.STOP_CONFIRMED_LATE: 'the stop is confirmed now: {status}',
+    Cause.STOP_FORCED: 'an ordinary stop did not do ({why}): control was taken from the drive, or '
+    'its motor was released ({status}). Find out why it did not stop, and whether another master '
+    'commands it',
     Cause.NOTHING_TO_ACKNOWLEDGE: 'nothing to acknowledge ({status})',
     Cause.ACKNOWLEDGED: 'acknowledged {status}',
     Cause.ACKNOWLEDGED_DETAILED: 'acknowledged {status} ({details})',

@@ -39,6 +39,7 @@ from nfo_sinus_driver.catalog.profile import SetpointTarget
 from nfo_sinus_driver.catalog.profile import Status
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.profile import taken
 from nfo_sinus_driver.catalog.status import Fact
 from nfo_sinus_driver.catalog.status import State
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -172,8 +173,8 @@ class Telegram1(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run bits and set-point."""
-        yield from self.stop(control_mode)
-        return Removal.COMMAND
+        obeyed = yield from taken(self.stop(control_mode))
+        return Removal.COMMAND if obeyed else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """

@@ -227,31 +227,22 @@ class FunctionBits(ControlMethod):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Write set-point 0, and take the direction away; an enable that stands is left.
+        Take the direction away, and write set-point 0 [C126]; an enable that stands is left.
 
         None is given, for a direction may come from a terminal. Does nothing to a drive that is not
         under control of the line: refused if it is and does not obey.
         """
-        try:
-            yield Write(SIZE, 0.0, once=True)
-            bits = Bits(int((yield Read(BITS, once=True))))
-            kept = bits & (Bits.ENABLE | Bits.CONTROLLER_INHIBIT)
-            yield Write(BITS, int(kept), once=True)
-        except Refusal:
-            if (yield from self.in_control()):
-                raise
+        yield from self._stop_by(_take_direction(), _SETPOINT.zero(once=True))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by controller inhibit; control is kept."""
-        yield Write(BITS, int(Bits.CONTROLLER_INHIBIT))
-        with contextlib.suppress(Refusal):
-            yield Write(SIZE, 0.0)
+        inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))
+        yield from self._stop_by(one(inhibit), _SETPOINT.zero(once=False))
 
     def release(self) -> Steps[None]:
         """Remove function bits and set-point; P841 stays, for another one can start the motor."""
         if (yield from self.in_control()):
-            yield Write(BITS, 0)
-            yield Write(SIZE, 0.0)
+            yield from self._stop_by(one(Write(BITS, 0)), _SETPOINT.zero(once=False))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active, each by itself."""
@@ -282,6 +273,19 @@ class FunctionBits(ControlMethod):
                 'keypad or by a terminal'
             )
         return ''
+
+
+def _take_direction() -> Steps[None]:
+    """
+    Take the direction away, and keep enable and inhibit.
+
+    Where the bits cannot be read nothing of them is kept: without its enable the motor takes the
+    stop ramp, and none is given that did not stand.
+    """
+    kept = Bits(0)
+    with contextlib.suppress(Refusal):
+        kept = Bits(int((yield Read(BITS, once=True))))
+    yield Write(BITS, int(kept & (Bits.ENABLE | Bits.CONTROLLER_INHIBIT)), once=True)
 
 
 def _would_turn() -> Steps[bool]:

@@ -221,28 +221,27 @@ class ModeScmd(_G2):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Take the run command back and write set-point 0.
+        Take the run command back and write set-point 0, each step by itself [C126].
 
         Does nothing to a drive that is under the control of its keypad or terminals. Refused
         although the bus has control or, under Inhibit, nobody can say who has: it may be tuning
         [C101].
         """
+        zeroes = (target.zero(once=True) for target in self._targets(control_mode))
+        yield from self._stop_by(one(Write(self._command, Scmd.STOP, once=True)), *zeroes)
+
+    def perhaps_in_control(self) -> Steps[bool]:
+        """Tell whether the bus may have control: under Inhibit nobody can say who has."""
         try:
-            yield Write(self._command, Scmd.STOP, once=True)
-            for target in self._targets(control_mode):
-                yield from target.zero(once=True)
+            return (yield Read(MODE)) in (Mode.INHIBIT, Mode.BUS)
         except Refusal:
-            mode = yield Read(MODE)
-            if mode in (Mode.INHIBIT, Mode.BUS):
-                raise
+            return True
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
-        yield Write(MODE, Mode.STOP)
-        for target in self._targets(control_mode):
-            # a drive may well refuse a set-point while the bus has no control
-            with contextlib.suppress(Refusal):
-                yield from target.zero(once=False)
+        # a drive may well refuse a set-point while the bus has no control
+        zeroes = (target.zero(once=False) for target in self._targets(control_mode))
+        yield from self._stop_by(one(Write(MODE, Mode.STOP)), *zeroes)
 
     def release(self) -> Steps[None]:
         """Give control back; never by MODE = Ext, which can start the motor [C43]."""
@@ -268,7 +267,7 @@ class ModeScmd(_G2):
     def _remove_control(self) -> Steps[bool]:
         """Write MODE = Stop, with which no run command stands; tell whether it is."""
         obeyed = yield from taken(one(Write(MODE, Mode.STOP)))
-        return obeyed and not (yield from self.in_control())
+        return obeyed and not (yield from self.perhaps_in_control())
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """
@@ -361,23 +360,23 @@ class DriveControl(_G2):
         """
         Take the run command back, so that the drive goes to SHUTDOWN, and write set-point 0.
 
-        Does nothing to a drive that is not under bus control: who has control stays as it is.
+        Each step by itself [C126]. Does nothing to a drive that is not under bus control: who has
+        control stays as it is.
         """
-        try:
-            yield from self._change(~_RUN, Control(0))
-            for target in self._targets(control_mode):
-                yield from target.zero(once=True)
-        except Refusal:
-            if (yield from self.in_control()):
-                raise
+        zeroes = (target.zero(once=True) for target in self._targets(control_mode))
+        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
         coast = ~(_RUN | Control.DISABLE_QUICK_STOP)
-        yield from self._change(coast, Control.OVERRIDE_COAST, once=False)
-        for target in self._targets(control_mode):
-            with contextlib.suppress(Refusal):
-                yield from target.zero(once=False)
+        zeroes = (target.zero(once=False) for target in self._targets(control_mode))
+        change = self._change_or_write(coast, Control.OVERRIDE_COAST, once=False)
+        yield from self._stop_by(change, *zeroes)
+
+    def force_stop(self, control_mode: str) -> Steps[bool]:
+        """Remove run bits and set-point, quick stop, and take control away by MODE = Stop."""
+        obeyed = yield from super().force_stop(control_mode)
+        return (yield from taken(one(Write(MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
         """
@@ -391,14 +390,11 @@ class DriveControl(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
-        if (yield from taken(self._change(~_RUN, Control(0), once=False))):
+        if (yield from taken(self._change_or_write(~_RUN, Control(0), once=False))):
             return Removal.COMMAND
-        try:
-            yield Write(MODE, Mode.STOP)
-            if not (yield from self.in_control()):
-                return Removal.COMMAND
-        except Refusal:
-            pass
+        released = yield from taken(one(Write(MODE, Mode.STOP)))
+        if released and not (yield from self.perhaps_in_control()):
+            return Removal.COMMAND
         if (yield from taken(self.zero_setpoint(control_mode))):
             return Removal.SETPOINT
         return Removal.NOTHING
@@ -443,6 +439,20 @@ class DriveControl(_G2):
             yield Write(_MASK, int(keep) & 0xFFFF | int(add) << 16, once=once)
             return
         word = Control(int((yield Read(CONTROL_WORD))))
+        yield Write(CONTROL_WORD, word & keep | add, once=once)
+
+    def _change_or_write(self, keep: Control, add: Control, *, once: bool = True) -> Steps[None]:
+        """Change some bits of the control word for a stop, in whatever way the drive takes it."""
+        masked = self._reaches(_MASK)
+        if masked and (yield from taken(self._change(keep, add, once=once))):
+            return
+        word = self._ready
+        try:
+            word = Control(int((yield Read(CONTROL_WORD, once=once))))
+        except Refusal:
+            # what it has of ours, then, but never to who has control by keypad or terminals
+            if not (yield from self.perhaps_in_control()):
+                raise
         yield Write(CONTROL_WORD, word & keep | add, once=once)
 
 

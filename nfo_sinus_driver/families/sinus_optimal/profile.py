@@ -40,6 +40,8 @@ from nfo_sinus_driver.catalog.profile import Status
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Until
 from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog.profile import one
+from nfo_sinus_driver.catalog.profile import taken
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2.profile import CONTROL_WORD
 from nfo_sinus_driver.families.sinus_g2.profile import MODE
@@ -165,12 +167,22 @@ class DriveControl(ControlMethod):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Reset Switch on, and leave the other bits to who has control."""
-        word = int((yield Read(CONTROL_WORD, once=True)))
+        yield from self._stop_by(self._switch_off(once=True))
+
+    def _switch_off(self, *, once: bool = False) -> Steps[None]:
+        word = int(_READY | Control.ENABLE)
         try:
-            yield Write(CONTROL_WORD, word & ~_RUN, once=True)
+            word = int((yield Read(CONTROL_WORD, once=once)))
         except Refusal:
-            if (yield from self.in_control()):
+            # what it has of ours, then, but never to who has control by keypad or terminals
+            if not (yield from self.perhaps_in_control()):
                 raise
+        yield Write(CONTROL_WORD, word & ~_RUN, once=once)
+
+    def force_stop(self, control_mode: str) -> Steps[bool]:
+        """Reset Switch on, then take Enable away, by which the motor is released [C109]."""
+        obeyed = yield from taken(self._switch_off())
+        return (yield from taken(one(Write(CONTROL_WORD, _READY)))) or obeyed
 
     def release(self) -> Steps[None]:
         """
@@ -184,12 +196,8 @@ class DriveControl(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset Switch on."""
-        word = int((yield Read(CONTROL_WORD)))
-        try:
-            yield Write(CONTROL_WORD, word & ~_RUN)
-        except Refusal:
-            return Removal.NOTHING
-        return Removal.COMMAND
+        obeyed = yield from taken(self._switch_off())
+        return Removal.COMMAND if obeyed else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """Acknowledge a fault by one rising edge of bit 7 [M1]."""

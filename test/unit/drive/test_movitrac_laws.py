@@ -26,7 +26,6 @@ from movitrac_rig import BITS
 from movitrac_rig import DIRECTIONS
 from movitrac_rig import MODEL
 from movitrac_rig import OVERCURRENT
-from movitrac_rig import SIZE
 from movitrac_rig import SWITCHES
 from movitrac_rig import WAYS
 from movitrac_rig import assert_only_enable_helps
@@ -104,9 +103,9 @@ def test_a_stop_is_the_next_frame(
             rig.drive.parameters.read()
         at, future = stopped_at(rig, moment, way)
         rig.answer(future)
-        # one transaction is on the line; a stop begins with the set-point, or releases the motor
+        # one transaction is on the line; a stop begins with the bits, or releases the motor
         after = requests_since(rig, at)[1]
-        assert after in ((SIZE, (0, 0)), (BITS, (0, int(Bit.INHIBIT)))), (moment, after)
+        assert after in ((BITS, None), (BITS, (0, int(Bit.INHIBIT)))), (moment, after)
 
 
 def stopped_at(

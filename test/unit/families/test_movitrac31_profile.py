@@ -298,27 +298,28 @@ def test_it_runs_forward_at_first() -> None:
 def test_a_stop_takes_the_direction_away_and_gives_no_enable(stands: int, left: int) -> None:
     play(
         method.stop('Freque'),
-        (Write(SIZE, 0.0, once=True), None),
         (Read(BITS, once=True), stands),
         (Write(BITS, left, once=True), None),
+        (Write(SIZE, 0.0, once=True), None),
     )
 
 
-@pytest.mark.parametrize(
-    'begun',
-    [
-        [(Write(SIZE, 0.0, once=True), REFUSED)],
-        [
-            (Write(SIZE, 0.0, once=True), None),
-            (Read(BITS, once=True), FORWARD),
-            (Write(BITS, ENABLE, once=True), REFUSED),
-        ],
-    ],
-)
-def test_a_stop_that_is_refused(begun: list[tuple[Any, Any]]) -> None:
+def test_a_stop_keeps_nothing_of_bits_that_it_cannot_read() -> None:
+    play(
+        method.stop('Freque'),
+        (Read(BITS, once=True), REFUSED),
+        (Write(BITS, 0, once=True), None),
+        (Write(SIZE, 0.0, once=True), REFUSED),
+    )
+
+
+def test_a_stop_that_is_refused() -> None:
+    begun = (Read(BITS, once=True), FORWARD), (Write(BITS, ENABLE, once=True), REFUSED)
     play(method.stop('Freque'), *begun, (Read(MODE), STANDARD))
-    with pytest.raises(Refusal):
-        play(method.stop('Freque'), *begun, (Read(MODE), REMOTE))
+    for mode in (REMOTE, REFUSED):
+        with pytest.raises(Refusal):
+            to_zero = Write(SIZE, 0.0, once=True), None
+            play(method.stop('Freque'), *begun, (Read(MODE), mode), to_zero)
 
 
 @pytest.mark.parametrize('late', [None, REFUSED])

@@ -27,6 +27,8 @@ from nfo_sinus_driver.catalog.profile import Read
 from nfo_sinus_driver.catalog.profile import Status as InverterStatus
 from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.profile import one
+from nfo_sinus_driver.catalog.profile import taken
 from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
@@ -70,6 +72,11 @@ class OptimalTelegram1(Telegram1):
         yield method.following(self.ready | _ENABLE)
         yield Until(lambda status: bool((status.word or 0) & Status.ENABLED))
         yield method.following(self.ready | _ENABLE | _SWITCH_ON, once=True)
+
+    def force_stop(self, control_mode: str) -> Steps[bool]:
+        """Clear Switch on, then take Enable away, by which the motor is released [C109]."""
+        yield from self.remove(control_mode)
+        return (yield from taken(one(method.begin(self.ready))))
 
     def stopping(self, word: int) -> int:
         """Return the word that keeps Enable where the motor is driven, so that it ramps."""

@@ -1,0 +1,97 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A step of a stop that is refused, lost or late does not end it (law 3, [C126])."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+import contextlib
+from typing import Any
+
+import pytest
+from ways_rig import WAYS
+from ways_rig import WayRig
+
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Drive
+
+STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
+    'stop': lambda drive: drive.stop(),
+    'quick stop': lambda drive: drive.quick_stop(),
+    'exit': lambda drive: drive.stop_for_good(4.0),
+}
+#: Of the requests that tell the status nothing goes wrong: without them no stop is confirmed.
+_TELLS = (
+    *(Role.STATUS_WORD, Role.STATUS_CODE, Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED),
+    *(Role.CONTROL_SOURCE, Role.LOCAL_OPERATION),
+)
+#: Nothing else takes these run commands back [C51], [C96]: set-point 0 is all that is left, and
+#: where the reference is a terminal's not even that.
+_NO_OTHER_WAY = {
+    'Optimal, MODE': 'fieldbus.smode',
+    'Optimal, control word': 'fieldbus.drive_control',
+    'MOVITRAC': 'fieldbus.function_bits',
+}
+
+
+def steps_of(way: str, stop: str) -> set[tuple[str, bool]]:
+    """Return what a stop by this way asks, parameters and whether they are written."""
+    with contextlib.closing(WayRig(WAYS[way])) as rig:
+        rig.ride()
+        asked: set[tuple[str, bool]] = set()
+        rig.meet = lambda key, written: asked.add((key, written))  # type: ignore[func-returns-value]
+        rig.answer(STOPS[stop](rig.drive))
+        told = {rig.drive.model.key(role) for role in _TELLS}
+    return {one for one in asked if one[1] or one[0] not in told}
+
+
+def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
+    """Return what is wrong with a stop of which one step always goes wrong; ``''``: nothing."""
+    with contextlib.closing(WayRig(WAYS[way])) as rig:
+        rig.ride()
+        rig.meet = lambda key, written: how if (key, written) == step else None
+        future = STOPS[stop](rig.drive)
+        rig.answer(future)
+        rig.pass_time(6.0)
+        held = step == (_NO_OTHER_WAY.get(way), True)
+        follows = rig.settings.follows_setpoints
+        wrong = []
+        if rig.turns and (follows or not held or how == 'late'):
+            wrong.append(f'turns at {rig.far.motor.demand:g} Hz')
+        if held and how != 'late':
+            if not rig.drive.stop_unconfirmed or not rig.said(Cause.CANNOT_STOP):
+                wrong.append('its run command stands, and nothing says so')
+        elif not held:
+            # one that is ignored is given time to show, unless the driver ends
+            failed = future.exception() and (stop == 'exit' or how != 'ignored')
+            if (failed and stop != 'quick stop') or rig.drive.stop_unconfirmed:
+                wrong.append(f'not confirmed: {future.exception()}')
+    return '; '.join(wrong)
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_no_step_of_a_stop_ends_it(way: str) -> None:
+    rows = [
+        (stop, step, how)
+        for stop in STOPS
+        for step in sorted(steps_of(way, stop))
+        for how in ('refused', 'lost', 'late', *(('ignored',) if step[1] else ()))
+        # by a drive that takes nothing else, and says that it does, nothing can be found out
+        if how != 'ignored' or step[0] != _NO_OTHER_WAY.get(way)
+    ]
+    wrong = {row: found for row in rows if (found := goes_wrong(way, *row))}
+    assert rows and not wrong, '\n'.join(f'{row}: {found}' for row, found in wrong.items())
