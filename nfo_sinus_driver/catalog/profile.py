@@ -463,6 +463,8 @@ class Profile:
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
         its name; this one is the first.
+    :ivar start_settings: what :meth:`ControlMethod.require_startable` depends on: none of these
+        settings changes while the motor is enabled.
     :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
         the protocol over which that is so.
     """
@@ -481,6 +483,7 @@ class Profile:
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
+    start_settings: frozenset[str] = frozenset()
     holds_control: Mapping[str, str] = field(default_factory=dict)
     words: Mapping[str, Profile] = field(default_factory=dict)
 

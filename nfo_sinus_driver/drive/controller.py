@@ -50,6 +50,7 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.following import Following
 from nfo_sinus_driver.drive.sequences import StartSequence
 from nfo_sinus_driver.drive.sequences import StopSequence
 from nfo_sinus_driver.drive.setpoint import Setpoint
@@ -103,6 +104,7 @@ class Controller:
         self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(inverter, method)
         self._sequence = StopSequence(inverter, method, self._happened)
+        self._following = Following(inverter, setpoint)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
         #: The status that was judged last.
@@ -310,6 +312,7 @@ class Controller:
             if not self.enabled:
                 raise Cancelled
             self._setpoint.arm(control_mode, nominal)
+            self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now
             self._stop()
@@ -542,6 +545,8 @@ class Controller:
         reason = None
         if self.enabled:
             reason = self._why_stopped(seen) or self._why_slower(seen, before)
+            if reason is None and self._inverter.settings.follows_setpoints:
+                reason = self._following.judge()
         elif not (self.commanded or self.stopping) and seen.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:

@@ -115,6 +115,7 @@ class ParameterWriter:
     def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
         self._inverter = inverter
         self._registers = inverter.registers
+        self._procedures = procedures
         self._access = WriteAccess(inverter, procedures)
 
     async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
@@ -164,6 +165,9 @@ class ParameterWriter:
 
     async def require_standstill(self, keys: Iterable[str]) -> None:
         """Refuse what only a standing motor allows; a drive lax about it is not trusted."""
+        keys = tuple(keys)
+        for key in keys:
+            self._require_not_enabled(key)
         stopped = ', '.join(key for key in keys if self._registers.model[key].stopped)
         if not stopped:
             return
@@ -173,6 +177,12 @@ class ParameterWriter:
             raise not_changed(stopped, explain_failure(error, self._inverter)) from error
         if seen.driven:
             raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
+
+    def _require_not_enabled(self, key: str) -> None:
+        """Refuse what a start depends on while the motor is enabled, be it at set-point 0."""
+        depends = key in self._inverter.model.profile.start_settings
+        if depends and self._procedures.commanded:
+            raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 
     def describe(self, entry: Written) -> Change:
         """Return what was written as a person reads it."""
@@ -197,6 +207,7 @@ class ParameterWriter:
             await allow()
         except (LinkError, DriveError) as error:
             raise not_changed(key, explain_failure(error, self._inverter)) from error
+        self._require_not_enabled(key)
         failure = await self._send(key, data)
         kept: bytes | None = None
         try:

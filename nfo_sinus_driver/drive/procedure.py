@@ -71,6 +71,11 @@ class Procedures:
             raise DriveError(Cause.MONITOR_ONLY)
         return self._controller
 
+    @property
+    def commanded(self) -> bool:
+        """The motor is enabled, or about to be."""
+        return self._controller is not None and self._controller.commanded
+
     def require(self, procedure: Procedure | Reset) -> None:
         """See to it that a procedure may begin."""
         controller, inverter = self.controller, self._inverter

@@ -59,8 +59,8 @@ _COMPLAINT_PERIOD = 5.0
 _LONGEST_COMPLAINT_PERIOD = 60.0
 #: After so many stops in a row that got no answer it is looked whether the drive answers others.
 _UNHEARD_BEFORE_FORCE = 4
-#: The slowest ramp, of 2000 s, shows in the frequency by then, s.
-_RAMP_SHOWS_BY = 5.0
+#: The slowest ramp, of 2000 s, shows in the frequency by then, s, in whatever steps that is told.
+_RAMP_SHOWS_BY = 7.0
 _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 

@@ -155,6 +155,16 @@ class Setpoint:
         return self._armed_at < math.inf
 
     @property
+    def armed_at(self) -> float:
+        """Since when it does, s of ``time.monotonic``; infinite while it does not."""
+        return self._armed_at
+
+    @property
+    def expired(self) -> bool:
+        """No set-point has come for so long that the drive was given 0."""
+        return self._expired
+
+    @property
     def age(self) -> float:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
         at = self._request.at
@@ -222,6 +232,16 @@ class Setpoint:
             (max(0.0, -value if reverse else value) for value, until in self._had if until >= at),
             default=0.0,
         )
+
+    def range_since(self, at: float) -> tuple[float, float]:
+        """Return the least and the greatest set-point that the drive can have had since then."""
+        values = [value for value, until in self._had if until >= at]
+        return min(values, default=0.0), max(values, default=0.0)
+
+    def write_again(self) -> None:
+        """Write the set-point again that stands in the drive, for another may stand there."""
+        self._written = {where: (data, -math.inf) for where, (data, _) in self._written.items()}
+        self._bus.request(self._slot)
 
     def _may_have(self, value: float) -> None:
         """Take note that the drive may have a set-point from now on; NaN: nobody knows which."""

@@ -156,6 +156,11 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.SLOWER_AFTER_SILENCE: 'the drive did not answer for a moment, and the motor turns slower '
     'than it was told to ({now:g} Hz, before {before:g} Hz; {status}). It may have been switched '
     'off and on: check its mains and the line',
+    Cause.TURNS_BACKWARDS: 'the motor turns in the other direction than its set-points say '
+    '({now:.4g} Hz, {status}). Another master may command the drive: find out which',
+    Cause.NOT_SLOWER_AFTER_TIME_OUT: 'no set-points arrive, and the motor does not slow down at '
+    'set-point 0 ({now:.4g} Hz, {status}). Check the least frequency that the drive is set to, and '
+    'whether another master commands it',
     Cause.CONTROL_LOST: 'the bus has lost control ({status}). Somebody pressed STOP at the keypad, '
     'or another master took it away: find out who',
     Cause.CONTROL_LOST_WHILE_AWAY: 'the bus has lost control meanwhile ({status}). The drive was '
@@ -180,6 +185,9 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.SETPOINT_TIMED_OUT: 'no set-point for {timeout:g} s: the motor ramps to a stop until the '
     'next one arrives; check what publishes them',
     Cause.SETPOINTS_AGAIN: 'set-points arrive again',
+    Cause.FASTER_THAN_TOLD: 'the motor turns at {now:.4g} {unit}, and its set-point is {told:g} '
+    '({status}): the set-point is written again. Check whether the load drives the motor, and '
+    'whether another master commands the drive',
     Cause.BROADCAST_MISSED: 'it did not take the set-point for all drives: it keeps {value:g}; it '
     'is given its own',
     Cause.NO_BROADCAST: 'only the Classic protocol has set-points for all drives at once: publish '
@@ -299,6 +307,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.FOLLOW_THE_LINE: 'the drive uses the new settings of the line from its next power-up on, '
     'or at once: then start this driver with the {settings} that it has',
     Cause.STANDSTILL_NEEDED: 'only while the motor is stopped, but it is not ({status})',
+    Cause.NOT_WHILE_ENABLED: 'the motor is enabled, and might not do what it is told after that: '
+    'stop it first',
     Cause.VALUE_NOT_ACCEPTED: 'the drive does not accept {value}{behind}',
     Cause.REFUSED_WHILE_RUNNING: '{why}: the motor must be stopped for this, and it runs',
     Cause.REFUSED_WHILE_FAULTED: '{why}; fault {status} is active: {call.acknowledge} first',

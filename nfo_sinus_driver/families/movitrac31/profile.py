@@ -85,6 +85,16 @@ _LEAST = {
     'V/f pattern 2': 'frequency.f_min_2',
     'V/f pattern 3': 'frequency.f_min_3',
 }
+#: Changed while the motor is enabled, each could turn it otherwise than the line says.
+_START_SETTINGS = frozenset(
+    (
+        *(key for key, _, _ in _ELSEWHERE),
+        *_ASSIGNED.values(),
+        *_PATTERNS,
+        *_LEAST.values(),
+        *(CONTROL_MODE, 'motor.enable_set_selection'),
+    )
+)
 #: The frequency at which a motor has its rated voltage, by pattern.
 _BASE = {
     'V/f pattern 1': 'frequency.f_base_1',
@@ -362,6 +372,7 @@ PROFILE = Profile(
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _SETPOINT},
     in_charge=_in_charge,
+    start_settings=_START_SETTINGS,
     # a tenth above what the display values have [M4 §4]: the motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 440.0, Role.ACTUAL_SPEED: 9999.0},
 )

@@ -173,7 +173,8 @@ def test_stop_waits_for_the_ramp(make_bench: MakeBench) -> None:
 
 def test_stop_that_is_not_confirmed(bench: Bench) -> None:
     bench.run_by_bus()
-    bench.refuse('fieldbus.scmd', Reason.STATE)
+    for key in ('fieldbus.scmd', 'fieldbus.mode'):
+        bench.refuse(key, Reason.STATE)
     with bench.begun('stop') as process:
         assert process.stderr is not None
         said = process.stderr.readline()

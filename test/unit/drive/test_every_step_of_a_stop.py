@@ -66,7 +66,7 @@ def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
         rig.meet = lambda key, written: how if (key, written) == step else None
         future = STOPS[stop](rig.drive)
         rig.answer(future)
-        rig.pass_time(6.0)
+        rig.pass_time(8.0)
         held = step == (_NO_OTHER_WAY.get(way), True)
         follows = rig.settings.follows_setpoints
         wrong = []

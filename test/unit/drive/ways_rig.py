@@ -243,6 +243,6 @@ class WayRig(Rig):
         assert abs(self.far.motor.frequency) > 5, self.far.motor.frequency
         self.notes.events.clear()
 
-    def said(self, cause: Cause) -> bool:
+    def said(self, what: str | Cause) -> bool:
         """Whether an event says this."""
-        return any(says(text, cause) for _, _, text in self.notes.events)
+        return any(says(text, what) for _, _, text in self.notes.events)

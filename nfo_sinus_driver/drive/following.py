@@ -1,0 +1,138 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether the motor does what it was told: its direction and size beside the set-points."""
+
+from __future__ import annotations
+
+import math
+
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.events import Cause
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
+
+#: By more than this a size has to fall, Hz, within so long, s: the slowest ramp, of 2000 s, falls
+#: by 0.1 in 4 s, and no drive tells it in greater steps.
+_FALL = 0.04
+_FALLS_WITHIN = 5.0
+#: A motor that is slower stands, or wobbles, Hz.
+_STANDS = 0.5
+#: One that turns the other way does so from here on, Hz: slip and measuring show no more.
+_BACKWARDS = 2.0
+#: So long a drive may take to begin to follow another set-point, s.
+_REACTION = 1.0
+#: By this share of a set-point, and so much more, slip, its compensation and overshoot go beyond.
+_BEYOND = 0.1
+_BEYOND_BY = 3.0
+#: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
+_COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
+
+
+class _Fall:
+    """A size that ought to fall."""
+
+    def __init__(self) -> None:
+        self.least = math.inf
+        self._fell_at = math.inf
+
+    def take(self, size: float, at: float, wobble: float = _FALL) -> bool:
+        """Take a size; tell whether it has not fallen for so long that no ramp is that slow."""
+        if size < self.least - wobble:
+            self.least, self._fell_at = size, at
+        return at - self._fell_at > _FALLS_WITHIN
+
+
+class Following:
+    """Compares what is measured of one drive with its set-points, from when it is armed on."""
+
+    def __init__(self, inverter: DriveState, setpoint: Setpoint) -> None:
+        self._inverter = inverter
+        self._setpoint = setpoint
+        self._at = -math.inf
+        #: It told a frequency below 0: it has a sign.
+        self._signed = False
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew."""
+        self._after_expiry, self._backwards, self._beyond = _Fall(), _Fall(), _Fall()
+        self._wrong_way = 0
+        self._told = False
+
+    def judge(self) -> Report | None:
+        """Return why the motor has to be stopped, for what was measured last; tell what else is."""
+        measured = self._inverter.last_polled(Role.ACTUAL_FREQUENCY)
+        role, unit = _COMPARED.get(self._setpoint.control_mode, (None, 1.0))
+        actual = self._inverter.last_polled(role)
+        if measured is NOT_MEASURED or measured.at <= max(self._at, self._setpoint.armed_at):
+            return None
+        self._at = measured.at
+        least, most = self._setpoint.range_since(measured.at - _REACTION)
+        frequency = measured.value
+        self._signed = self._signed or frequency < 0
+        cause = None
+        if self._goes_on(frequency, measured.at):
+            cause = Cause.NOT_SLOWER_AFTER_TIME_OUT
+        elif role is not None and self._turns_back(frequency, measured.at, least, most):
+            cause = Cause.TURNS_BACKWARDS
+        elif role is not None:
+            self._look_beyond(actual.value, measured.at, max(-least, most), unit)
+        return cause and self._inverter.report(cause, now=frequency)
+
+    def _goes_on(self, frequency: float, at: float) -> bool:
+        """Tell whether it does not slow down, although no set-point comes any more."""
+        if not self._setpoint.expired or not abs(frequency) > _STANDS:
+            self._after_expiry = _Fall()
+            return False
+        return self._after_expiry.take(abs(frequency), at)
+
+    def _turns_back(self, frequency: float, at: float, least: float, most: float) -> bool:
+        """
+        Tell whether it turns against all set-points of late, and does not only ramp down.
+
+        One that has begun to, through standstill, has been told by another master.
+        """
+        if least > 0:
+            back = -frequency
+        elif most < 0 and self._signed:
+            back = frequency
+        else:
+            back = math.nan
+        if math.isnan(back):
+            self._backwards, self._wrong_way = _Fall(), 0
+            return False
+        endless = self._backwards.take(max(back, 0.0), at)
+        begun = self._backwards.least < _STANDS
+        self._wrong_way = self._wrong_way + 1 if back > _BACKWARDS and (begun or endless) else 0
+        # one value that cannot be stops no motor
+        return self._wrong_way > 1
+
+    def _look_beyond(self, value: float, at: float, most: float, unit: float) -> None:
+        """Tell of a motor that turns faster than it was told, and give the set-point again."""
+        size, margin = abs(value), _BEYOND_BY * unit
+        if not size > most * (1 + _BEYOND) + margin:
+            self._beyond, self._told = _Fall(), False
+            return
+        endless = self._beyond.take(size, at, _FALL * unit)
+        if self._told or not (endless or size > self._beyond.least + margin):
+            return
+        self._told = True
+        told, name = self._setpoint.commanded, self._inverter.unit
+        report = self._inverter.report(Cause.FASTER_THAN_TOLD, now=value, told=told, unit=name)
+        self._inverter.tell(Severity.WARNING, report)
+        self._setpoint.write_again()
