@@ -76,8 +76,8 @@ def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
             if not rig.drive.stop_unconfirmed or not rig.said(Cause.CANNOT_STOP):
                 wrong.append('its run command stands, and nothing says so')
         elif not held:
-            # one that is ignored is given time to show, unless the driver ends
-            failed = future.exception() and (stop == 'exit' or how != 'ignored')
+            # what is ignored, or comes too soon, is given time, unless the driver ends
+            failed = future.exception() and (stop == 'exit' or how not in ('ignored', 'busy'))
             if (failed and stop != 'quick stop') or rig.drive.stop_unconfirmed:
                 wrong.append(f'not confirmed: {future.exception()}')
     return '; '.join(wrong)
@@ -89,7 +89,7 @@ def test_no_step_of_a_stop_ends_it(way: str) -> None:
         (stop, step, how)
         for stop in STOPS
         for step in sorted(steps_of(way, stop))
-        for how in ('refused', 'lost', 'late', *(('ignored',) if step[1] else ()))
+        for how in ('refused', 'busy', 'lost', 'late', *(('ignored',) if step[1] else ()))
         # by a drive that takes nothing else, and says that it does, nothing can be found out
         if how != 'ignored' or step[0] != _NO_OTHER_WAY.get(way)
     ]

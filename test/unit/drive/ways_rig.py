@@ -186,7 +186,7 @@ class WayRig(Rig):
     The driver of one drive, over one way.
 
     :ivar meet: called with each request, the parameter and whether it is written; what it returns
-        goes wrong: ``refused``, ``lost``, ``late`` or, of a write, ``ignored``.
+        goes wrong: ``refused``, ``busy``, ``lost``, ``late`` or, of a write, ``ignored``.
     """
 
     def __init__(self, way: Way, **settings: Any) -> None:
@@ -212,9 +212,9 @@ class WayRig(Rig):
             wrong = self.meet(key, is_write)
             if wrong is None:
                 return call(unit, address, *data)
-            if wrong == 'refused':
+            if wrong in ('refused', 'busy'):
                 self.elapse(_TURN)
-                raise Refused(Refused.DEVICE_FAILURE)
+                raise Refused(Refused.BUSY if wrong == 'busy' else Refused.DEVICE_FAILURE)
             if wrong == 'late':
                 call(unit, address, *data)
             if wrong == 'ignored':
