@@ -222,9 +222,9 @@ HISTORIES = (
         6,
         'in any order: the register of the other method is written',
         G2,
-        '            yield from self._change(~_RUN, Control(0))\n',
-        '            yield from self._change(~_RUN, Control(0))\n'
-        "            yield Write('fieldbus.scmd', 0)\n",
+        '        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)\n',
+        '        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)\n'
+        "        yield Write('fieldbus.scmd', 0)\n",
         G2_CONTROL,
     ),
     Mutant(

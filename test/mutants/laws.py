@@ -21,6 +21,7 @@ from mutant import COMMANDS
 from mutant import CONTROLLER
 from mutant import DRIVE
 from mutant import ECHO
+from mutant import EVERY_STEP
 from mutant import G2
 from mutant import INTERFACE
 from mutant import MAIN
@@ -28,6 +29,7 @@ from mutant import NO_RESTART
 from mutant import NODE
 from mutant import PROFILE
 from mutant import RTU_LINK
+from mutant import SEQUENCE
 from mutant import SETPOINT
 from mutant import SIGNALS
 from mutant import TABLE
@@ -145,8 +147,8 @@ LAWS = (
         2,
         'the run command is not taken back before an acknowledgement',
         G2,
-        'yield Write(self._command, Scmd.STOP, once=True)',
-        'pass',
+        'one(Write(self._command, Scmd.STOP, once=True))',
+        'one(Read(MODE))',
         (NO_RESTART, '-k', 'fault_and_ack'),
     ),
     Mutant(
@@ -172,6 +174,22 @@ LAWS = (
         '        yield from self.zero(once=False)\n',
         '',
         (TRACE,),
+    ),
+    Mutant(
+        3,
+        'a run command that is refused ends the stop',
+        PROFILE,
+        '            refusal = error\n',
+        '            raise\n',
+        ('test/unit/families', '-k', 'bits_are_refused'),
+    ),
+    Mutant(
+        3,
+        'what stops the motor by force is not tried',
+        SEQUENCE,
+        'if unconfirmed is not None and self._needs_force(seen, failure):',
+        'if False:',
+        (EVERY_STEP,),
     ),
     Mutant(
         3,

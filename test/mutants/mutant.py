@@ -42,6 +42,7 @@ SIGNALS = 'nfo_sinus_driver/signals.py'
 SEQUENCE = 'nfo_sinus_driver/drive/sequences.py'
 PROFILE = 'nfo_sinus_driver/catalog/profile.py'
 ANY_ORDER = 'test/unit/drive/test_any_order.py'
+EVERY_STEP = 'test/unit/drive/test_every_step_of_a_stop.py'
 STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
 CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
 TUNING_BEGINS = ('test/unit/drive/test_tuning_begins.py', '-k', 'any_moment')

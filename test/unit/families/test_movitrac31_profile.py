@@ -322,6 +322,17 @@ def test_a_stop_that_is_refused() -> None:
             play(method.stop('Freque'), *begun, (Read(MODE), mode), to_zero)
 
 
+def test_set_point_0_is_written_although_the_bits_are_refused() -> None:
+    steps, asked = method.stop('Freque'), []
+    with pytest.raises(Refusal):
+        step = next(steps)
+        while True:
+            asked.append(step)
+            refused = step != Write(SIZE, 0.0, once=True)
+            step = steps.throw(REFUSED) if refused else steps.send(None)
+    assert Write(SIZE, 0.0, once=True) in asked
+
+
 @pytest.mark.parametrize('late', [None, REFUSED])
 def test_a_quick_stop_inhibits_the_controller(late: Refusal | None) -> None:
     assert method.coasts
