@@ -53,6 +53,10 @@ _PLATE = (
     Role.NOMINAL_POWER_FACTOR,
 )
 
+#: Standby, where nothing else tells how it ended: a lost RUN input ends in it, too, and a short
+#: procedure may be over before the first look. What was measured decides.
+_UNDECIDED = (Cause.TUNING_WITHOUT_RESULT, Cause.TUNING_DOES_NOT_BEGIN)
+
 #: Told of the status and of how long the procedure takes already, s; on the bus.
 Progress = Callable[[InverterStatus, float], None]
 
@@ -108,8 +112,11 @@ class Tuning:
                 async with self._procedures.in_standby(access):
                     self._inverter.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
-                    how = await self._outcome(what, access, progress)
-                result = Tuned(how.cause is Cause.TUNED, how, await changes())
+                    how = await self._outcome(procedure, access, progress)
+                changed = await changes()
+                if changed and how.cause in _UNDECIDED:
+                    how = self._inverter.report(Cause.TUNED, what=what)
+                result = Tuned(how.cause is Cause.TUNED, how, changed)
         self._inverter.tell(Severity.INFO if result.success else Severity.ERROR, result.report)
         return result
 
@@ -119,8 +126,10 @@ class Tuning:
             if not await self._inverter.registers.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
-    async def _outcome(self, what: str, access: ExclusiveAccess, progress: Progress) -> Report:
-        inverter = self._inverter
+    async def _outcome(
+        self, procedure: Procedure, access: ExclusiveAccess, progress: Progress
+    ) -> Report:
+        inverter, what = self._inverter, procedure.value
         started = time.monotonic()
         begun = False
         told_code, told_at = -1, 0.0
@@ -138,6 +147,11 @@ class Tuning:
                 begun = True
             elif access.aborted:
                 return inverter.report(Cause.TUNING_STOPPED, what=what)
+            elif begun and seen.standby:
+                # it "returns to 'SioStby' when ready" [M0 table 18], and may show no code [C112]
+                calculated = procedure is Procedure.CALCULATE
+                done = Cause.TUNED if calculated else Cause.TUNING_WITHOUT_RESULT
+                return inverter.report(done, what=what)
             elif begun:
                 return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
             elif elapsed > drive_state.TIMEOUT:

@@ -259,6 +259,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.TUNING_BEGINS: '{what} begins: the motor is energised',
     Cause.TUNING_NEEDS: '{what} needs {key}: set it as the motor plate says',
     Cause.TUNED: '{what} finished ({status})',
+    Cause.TUNING_WITHOUT_RESULT: '{what} ended in standby ({status}) and has changed no parameter: '
+    'the RUN input may have been lost meanwhile; repeat it if it was',
     Cause.TUNING_FAILED: f'{{what}} failed, {{status}}: {_REMEDY}; {{call.acknowledge}} first',
     Cause.TUNING_STOPPED: '{what} was stopped before it was finished ({status})',
     Cause.TUNING_CUT_SHORT: '{what} ended, and the drive does not say that it has finished '

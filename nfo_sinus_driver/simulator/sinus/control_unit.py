@@ -536,11 +536,13 @@ class SinusControlUnit(ControlUnit):
 KEEPS, DROPS = 'keeps', 'drops'
 ALL, SCMD, NOTHING = 'all', 'scmd', 'nothing'
 TAKEN, REFUSED = 'taken', 'refused'
+CODE, STANDBY = 'code', 'standby'
 #: What each of them can be, what the G2 does by default last.
 CHOICES: Mapping[str, tuple[str, ...]] = {
     'run_command_in_fault': (KEEPS, DROPS),
     'refuses_in_fault': (ALL, SCMD, NOTHING),
     'stop_in_tuning': (REFUSED, TAKEN),
+    'tuning_ends_in': (CODE, STANDBY),
 }
 
 
@@ -561,12 +563,15 @@ class Variant:
         Classic refuses all whatever this says [M0 §6.1.5].
     :ivar stop_in_tuning: whether SCMD = Stop is ``taken`` while MODE is Inhibit, and ends the
         tuning, or ``refused`` until it is over [C101].
+    :ivar tuning_ends_in: what is shown after a tuning: a ``code`` of success, or plain ``standby``
+        [C112].
     :raises ValueError: one of them cannot be that.
     """
 
     run_command_in_fault: str = DROPS
     refuses_in_fault: str = NOTHING
     stop_in_tuning: str = TAKEN
+    tuning_ends_in: str = CODE
 
     def __post_init__(self) -> None:
         for name, choices in CHOICES.items():

@@ -55,6 +55,11 @@ OPTIONS = (
         'whether SCMD = Stop ends a tuning, or is refused until it is over (default: taken)',
         CHOICES['stop_in_tuning'],
     ),
+    Option(
+        'tuning_ends_in',
+        'what a tuning that succeeds ends in: a code of success, or standby (default: code)',
+        CHOICES['tuning_ends_in'],
+    ),
 )
 #: For the families that have telegram 1.
 COMMANDS = Option(

@@ -37,6 +37,7 @@ from nfo_sinus_driver.simulator.memory import home
 from nfo_sinus_driver.simulator.motor import Regulation
 from nfo_sinus_driver.simulator.motor import nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
+from nfo_sinus_driver.simulator.sinus.control_unit import CODE
 from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
@@ -318,7 +319,8 @@ class G2ControlUnit(SinusControlUnit):
             code, self._next_failure = self._next_failure, 0
             self.faults.trip(code, self.counters.operating_time, cause_present=False)
             return
-        self._tuned = tuning.procedure.done
+        if self.variant.tuning_ends_in == CODE:
+            self._tuned = tuning.procedure.done
         tuning.store(self.memory)
         self.motor.plate = self.nameplate()
 

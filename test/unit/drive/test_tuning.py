@@ -17,6 +17,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from drive_rig import MODE
 from drive_rig import PATIENCE
 from drive_rig import SCMD
@@ -89,6 +91,43 @@ def test_each_procedure_is_done_and_what_it_changed_is_told(rig: Rig, procedure)
     assert changed
     assert {change.key: (change.old, change.new) for change in result.changes} == changed
     assert str(result.changes[0]) in said(result)
+
+
+def use_variant(rig: Rig, **fields: str) -> None:
+    with rig.simulator.lock:
+        rig.far.control_unit.variant = replace(rig.far.control_unit.variant, **fields)
+
+
+@pytest.mark.parametrize('procedure', COMMANDS)
+def test_standby_after_a_tuning_is_success_where_something_was_measured(
+    rig: Rig, procedure
+) -> None:
+    use_variant(rig, tuning_ends_in='standby')
+    rig.connect()
+    result = finish(rig, begin(rig, procedure))
+    assert result.success and '37' in said(result.how)
+    assert result.changes
+    # the same again changes nothing, and standby may have come by a lost RUN input
+    shown: list[int] = []
+    future = rig.drive.tune(procedure, lambda now, _: shown.append(now.status.code))
+    wait_until(lambda: 28 in shown)
+    again = finish(rig, future)
+    assert again.success == (procedure is Procedure.CALCULATE), said(again.report)
+
+
+@pytest.mark.parametrize('end', ['stop', 'RUN input', 'fault'])
+def test_a_tuning_that_was_ended_by_something_else_is_no_success(rig: Rig, end: str) -> None:
+    use_variant(rig, tuning_ends_in='standby')
+    rig.connect()
+    future = begin(rig)
+    with rig.simulator.lock:
+        if end == 'stop':
+            rig.far.control_unit.press('stop')
+        elif end == 'RUN input':
+            rig.far.set_run_input(False)
+        else:
+            rig.far.trip(12)
+    assert not future.result(PATIENCE).success
 
 
 def test_control_is_given_back_as_it_was_found(rig: Rig) -> None:
@@ -234,7 +273,7 @@ def test_the_run_input_lost_ends_it(rig: Rig) -> None:
     with rig.simulator.lock:
         rig.far.set_run_input(False)
     result = future.result(PATIENCE)
-    assert not result.success and 'does not say that it has finished' in said(result.how)
+    assert not result.success and 'has changed no parameter' in said(result.how)
 
 
 def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back(
