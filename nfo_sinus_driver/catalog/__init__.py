@@ -35,6 +35,7 @@ from nfo_sinus_driver.catalog.parameter import Parameter
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import ControlMethod
 from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import Limits
 from nfo_sinus_driver.catalog.profile import NotPossible
 from nfo_sinus_driver.catalog.profile import OlderDialect
 from nfo_sinus_driver.catalog.profile import Procedure
@@ -63,6 +64,7 @@ __all__ = [
     'Holder',
     'InverterStatus',
     'Kind',
+    'Limits',
     'Meaning',
     'NotPossible',
     'Number',

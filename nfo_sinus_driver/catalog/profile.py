@@ -174,6 +174,21 @@ def taken(steps: Steps[None]) -> Steps[bool]:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """
+    Between what a set-point may be, in the unit of the control mode.
+
+    :ivar least: the drive takes none below it.
+    :ivar most: it takes none above it.
+    :ivar nominal: what the motor is made for, in either direction; infinite where nothing tells it.
+    """
+
+    least: float = -math.inf
+    most: float = math.inf
+    nominal: float = math.inf
+
+
+@dataclass(frozen=True)
 class SetpointTarget:
     """
     Where the set-points of one control mode go; here one parameter that takes them as they are.
@@ -184,6 +199,8 @@ class SetpointTarget:
     :ivar forward_only: the drive takes none below 0.
     :ivar nominal: what the motor is made for, in the same unit: the parameter that tells it, or the
         value itself; infinite where nothing tells it.
+    :ivar ends: the two parameters between which the drive takes set-points, if it has such.
+    :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
     """
 
     key: str
@@ -191,6 +208,8 @@ class SetpointTarget:
     at: str = ''
     forward_only: bool = False
     nominal: str | float = math.inf
+    ends: tuple[str, str] | None = None
+    older_most: float = math.inf
 
     @property
     def least(self) -> float:
@@ -207,6 +226,24 @@ class SetpointTarget:
         if isinstance(self.nominal, float):
             return self.nominal
         return float((yield Read(self.nominal))) if has(self.nominal) else math.inf
+
+    def read_limits(self, has: Callable[[str], bool], *, older: bool = False) -> Steps[Limits]:
+        """
+        Find out what a set-point may be; it only reads.
+
+        :param has: tells whether the drive has a parameter.
+        :param older: its firmware is of the family's :class:`OlderDialect`.
+        """
+        least, most = self.least, self.most
+        if older:
+            least, most = max(least, -self.older_most), min(most, self.older_most)
+        if self.ends is not None and all(map(has, self.ends)):
+            first, last = self.ends
+            low, high = sorted((float((yield Read(first))), float((yield Read(last)))))
+            # two that are equal are not set
+            if low < high:
+                least, most = max(least, low), min(most, high)
+        return Limits(least, most, (yield from self.read_nominal(has)))
 
     def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
         """

@@ -42,7 +42,7 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive.commands import read_nominal
+from nfo_sinus_driver.drive.commands import read_limits
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1
@@ -140,13 +140,13 @@ class _Ride:
         if target is None:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
         unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
-        if not target.least <= options.setpoint <= target.most:
+        limits = remote.do(lambda: read_limits(remote.inverter, mode))
+        if not limits.least <= options.setpoint <= limits.most:
             raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
-                f'in control mode {mode} {target.least:g} to {target.most:g} {unit}'
+                f'in control mode {mode} {limits.least:g} to {limits.most:g} {unit}'
             )
-        nominal = remote.do(lambda: read_nominal(remote.inverter, mode))
-        most = options.setpoint_max or nominal
+        most = options.setpoint_max or limits.nominal
         if abs(options.setpoint) > most:
             what = '--setpoint-max' if options.setpoint_max else 'what is nominal for this motor'
             raise CliError(

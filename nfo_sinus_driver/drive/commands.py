@@ -152,16 +152,16 @@ async def _stands(
         return False
 
 
-async def read_nominal(inverter: DriveState, control_mode: str) -> float:
+async def read_limits(inverter: DriveState, control_mode: str) -> profile.Limits:
     """
-    Read what the motor is made for, in the unit of a control mode.
+    Read what a set-point may be, in the unit of a control mode.
 
-    :returns: infinite where the drive does not tell it, or takes no set-points in that mode.
+    :returns: no limits where the drive takes no set-points in that mode.
     """
     target = inverter.model.profile.setpoints.get(control_mode)
     if target is None:
-        return math.inf
-    steps = target.read_nominal(inverter.has)
+        return profile.Limits()
+    steps = target.read_limits(inverter.has, older=inverter.settings_need_control)
     return await carry_out(steps, inverter.registers, Priority.SERVICE)
 
 

@@ -34,6 +34,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Limits
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.commands import Commands
@@ -277,8 +278,8 @@ class Controller:
         self._enabling = self._bus.current
         self._happened(ControlEvent.ENABLE)
         try:
-            control_mode, nominal = await self._check()
-            await self._start(control_mode, nominal, prepare)
+            control_mode, limits = await self._check()
+            await self._start(control_mode, limits, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
@@ -288,11 +289,11 @@ class Controller:
         reference = self._inverter.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
-    async def _check(self) -> tuple[str, float]:
+    async def _check(self) -> tuple[str, Limits]:
         """
         See to it that nothing keeps the motor from being started.
 
-        :returns: the control mode, and the nominal value of what it is about.
+        :returns: the control mode, and what its set-points may be.
         """
         try:
             if self._refusal is not None:
@@ -303,7 +304,7 @@ class Controller:
             raise DriveError(report_of(error)) from error
 
     async def _start(
-        self, control_mode: str, nominal: float, prepare: Callable[[], Awaitable[None]]
+        self, control_mode: str, limits: Limits, prepare: Callable[[], Awaitable[None]]
     ) -> None:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
@@ -311,7 +312,7 @@ class Controller:
             self._happened(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.arm(control_mode, nominal)
+            self._setpoint.arm(control_mode, limits)
             self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now

@@ -28,12 +28,13 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.catalog import InverterStatus
+from nfo_sinus_driver.catalog import Limits
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.commands import read_nominal
+from nfo_sinus_driver.drive.commands import read_limits
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
@@ -368,11 +369,11 @@ class StartSequence:
         #: When the start has to be over, s of ``time.monotonic``.
         self._deadline = math.inf
 
-    async def check(self) -> tuple[str, float]:
+    async def check(self) -> tuple[str, Limits]:
         """
         See to it that the motor may be started, writing nothing.
 
-        :returns: the control mode, and the nominal value of what it is about.
+        :returns: the control mode, and what its set-points may be.
         """
         inverter = self._inverter
         seen = await inverter.look(Priority.SERVICE)
@@ -385,7 +386,7 @@ class StartSequence:
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self._method.require_startable()
-        return control_mode, await read_nominal(inverter, control_mode)
+        return control_mode, await read_limits(inverter, control_mode)
 
     async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
         """

@@ -29,6 +29,7 @@ from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.catalog import Limits
 from nfo_sinus_driver.catalog import SetpointTarget
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause
@@ -109,7 +110,7 @@ class Setpoint:
         #: The newest one to all drives of the line.
         self._shared = _NONE
         self.control_mode = ''
-        self._nominal = math.inf
+        self._limits = Limits()
         self._target: SetpointTarget | None = None
         #: The parameters that a set-point is written to, by where that is.
         self._keys: dict[Address, str] = {}
@@ -175,16 +176,16 @@ class Setpoint:
         able = self._registers.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
-    def arm(self, control_mode: str, nominal: float) -> None:
+    def arm(self, control_mode: str, limits: Limits) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
 
         With a reference of the drive's own, none is followed and none is missed.
 
-        :param nominal: what the motor is made for, in the unit of the control mode.
+        :param limits: what a set-point may be, in the unit of the control mode.
         """
         self.control_mode = control_mode
-        self._nominal = nominal
+        self._limits = limits
         follows = self._inverter.settings.follows_setpoints
         self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
         self._armed_at = time.monotonic()
@@ -306,8 +307,9 @@ class Setpoint:
         More than nominal only where somebody says so: what was meant in another unit, rpm for Hz,
         must not race the motor.
         """
-        assert self._target is not None
-        return min(self._target.most, self._inverter.settings.setpoint_max or self._nominal)
+        limits = self._limits
+        own = max(limits.most, -limits.least)
+        return min(own, self._inverter.settings.setpoint_max or limits.nominal)
 
     def counts(self, request: Request) -> bool:
         """Tell whether a request to all came after the drive was enabled, and is still fresh."""
@@ -383,9 +385,8 @@ class Setpoint:
     # --- to this drive ------------------------------------------------------------------------
 
     def _limited(self, request: Request) -> float:
-        assert self._target is not None
-        most = min(self.most, request.most)
-        return max(self._target.least, -most, min(most, request.value))
+        limits, most = self._limits, min(self.most, request.most)
+        return max(limits.least, -most, min(limits.most, most, request.value))
 
     def _accept(self, request: Request) -> float:
         """Take note that a request counts; return what it is limited to."""
@@ -420,7 +421,8 @@ class Setpoint:
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
 
     def _tell_limited(self, value: float, limited: float) -> None:
-        nominal = self._inverter.settings.setpoint_max == 0 and abs(limited) == self._nominal
+        chosen = self._inverter.settings.setpoint_max
+        nominal = chosen == 0 and abs(limited) == self._limits.nominal
         self._inverter.tell(
             Severity.WARNING,
             Cause.SETPOINT_BEYOND_NOMINAL if nominal else Cause.SETPOINT_LIMITED,

@@ -75,7 +75,14 @@ _COMMON = 'fieldbus.setpoint'
 #: The greatest ones are those over a bus [M2 table 2].
 _SETPOINTS = {
     'Freque': SetpointTarget('status.frq_set', 150.0, at=_COMMON, nominal='motor.f_nom'),
-    'PI-Reg': SetpointTarget('status.reg_set', 150.0, at=_COMMON),
+    # [C113]
+    'PI-Reg': SetpointTarget(
+        'status.reg_set',
+        2000.0,
+        at=_COMMON,
+        ends=('pi_reg.setmin', 'pi_reg.setmax'),
+        older_most=150.0,
+    ),
     'Torque': SetpointTarget('status.trq_set', 200.0, at=_COMMON, nominal=100.0),
     'Speed': SetpointTarget('status.spd_set', 9000.0, at=_COMMON, nominal='motor.n_nom'),
 }

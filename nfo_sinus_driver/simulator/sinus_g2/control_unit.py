@@ -72,6 +72,8 @@ FACTORY: Mapping[str, Value] = {
     'control.kp_spd': 2.0,
     'control.ti_spd': 0.2,
     'pi_reg.reg_amp': 1,
+    'pi_reg.setmin': -150.0,
+    'pi_reg.setmax': 150.0,
     'freque.op_mode': 'Terminal',
     'freque.f_fix1': 10,
     'freque.f_fix2': 15,

@@ -303,7 +303,6 @@ def test_range_of_the_setpoint() -> None:
     text = '\n'.join(manual('M2'))
     for mode, count, key, decimals in (
         ('Freque, Pl-reg', 1500, 'status.frq_set', 1),
-        ('Freque, Pl-reg', 1500, 'status.reg_set', 1),
         ('Speed', 9000, 'status.spd_set', 0),
         ('Torque', 200, 'status.trq_set', 0),
     ):
@@ -311,6 +310,9 @@ def test_range_of_the_setpoint() -> None:
         row = G2[key]
         assert row.maximum == Fraction(count, 10**decimals)
         assert row.minimum == -row.maximum
+    # that of PI-Reg stands in a row in Hz, and is the limit of that firmware alone [C113]
+    process = G2.profile.setpoints['PI-Reg']
+    assert process.older_most == 150.0 and process.most == G2['pi_reg.setmax'].maximum
 
 
 def test_codes_and_types_of_enumerations() -> None:

@@ -292,7 +292,7 @@ def test_what_newer_firmware_has() -> None:
         ('status.frq_set', -150, 150),
         ('status.spd_set', -9000, 9000),
         ('status.trq_set', -200, 200),
-        ('status.reg_set', -150, 150),
+        ('status.reg_set', -2000, 2000),
     ],
 )
 def test_range_is_in_engineering_units(

@@ -145,6 +145,31 @@ def follow(rig: Rig, mode: str, value: float) -> None:
 
 
 @every_way
+@pytest.mark.parametrize('ends', [(0.0, 1000.0), (1000.0, 0.0), (-50.0, 400.0), (0.0, 0.0)])
+def test_a_process_set_point_lies_between_setmin_and_setmax(make_rig: MakeRig, ends) -> None:
+    # in the unit of the process, such as 400 kPa [C113]
+    setmin, setmax = ends
+    rig = make_rig(
+        parameters={
+            'control.mode': 'PI-Reg',
+            'pi_reg.unit': 'kPa',
+            'pi_reg.setmin': setmin,
+            'pi_reg.setmax': setmax,
+        }
+    )
+    rig.connect()
+    rig.enable()
+    low, high = sorted(ends) if setmin != setmax else (-2000.0, 2000.0)
+    for value in (400.0, high + 100.0, low - 100.0):
+        rig.drive.set_setpoint(value)
+        limited = max(low, min(high, value))
+        wait_until(lambda limited=limited: rig.far.memory.number('status.reg_set') == limited)
+        wait_until(
+            lambda value=value, limited=limited: rig.drive.snapshot.setpoint == limited
+            and rig.drive.snapshot.setpoint_clamped == (value != limited)
+        )
+
+
 @pytest.mark.parametrize('most', ['nominal', 'less', 'the_drive'])
 def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: str) -> None:
     quantity = MODES[mode]
