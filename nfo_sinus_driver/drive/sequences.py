@@ -315,7 +315,9 @@ class StopSequence:
             return self._refusals > 1 and (seen.from_bus or seen.driven)
         if failure is not None:
             return True
-        return time.monotonic() >= min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
+        shows_at = min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
+        # what a PLC has from before says nothing of a motor that may well be ramping down
+        return seen.at > self._told_at and time.monotonic() >= shows_at
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
