@@ -103,7 +103,7 @@ bench: setup ## measure its speed, and that of others (two hours; BENCH=--quick:
 
 docs: .venv/docs/installed ## the documentation as a site, in site/; every link is checked
 	@.venv/docs/bin/sphinx-build -q -W --keep-going -b html -c docs . site
-	@echo 'site/docs/README.html'
+	@echo 'site/index.html'
 
 parameters: setup ## write docs/parameters.md from the tables of the drives
 	@.venv/bin/python -m nfo_sinus_driver.catalog.page > docs/parameters.md.new

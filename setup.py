@@ -51,7 +51,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            f'driver = {NAME}.node.main:main',
+            f'driver = {NAME}.node.__main__:main',
             f'monitor = {NAME}.node.monitor:main',
             f'nfo-sinus = {NAME}.cli.main:main',
             f'plot = {NAME}.demo.record:plot',

@@ -146,7 +146,7 @@ def main() -> None:
         simulator = subprocess.Popen(
             [
                 sys.executable, '-m', 'nfo_sinus_driver.simulator', '--protocol', 'canopen',
-                '--address', '1', '--baud', str(_BIT_RATE), '--link', port, '--paced',
+                '--address', '1', '--baud-rate', str(_BIT_RATE), '--link', port, '--paced',
                 '--control', control, '--trace', trace,
             ],
             stdout=subprocess.PIPE,

@@ -103,7 +103,7 @@ class Rig(contextlib.ExitStack):
         with contextlib.ExitStack() as failing:
             failing.push(self)
             simulator = self.start(
-                *(executable('simulator'), '--link', self.port, '--baud', str(baud_rate)),
+                *(executable('simulator'), '--link', self.port, '--baud-rate', str(baud_rate)),
                 *('--char-format', char_format, '--paced', '--trace', str(self._trace)),
                 *('--protocol', protocol, '--model', self.line.model),
                 *('--boot-time', '0', *addresses),

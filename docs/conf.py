@@ -25,6 +25,8 @@ exclude_patterns = ['.*', 'build', 'install', 'log', 'site']
 root_doc = 'docs/README'
 html_theme = 'furo'
 html_title = 'nfo_sinus_driver'
+# what a web server shows of the folder itself; it leads to the first page
+html_extra_path = ['index.html']
 # what a link may point to inside a page: every heading that there is
 myst_heading_anchors = 6
 # as GitHub shows it

@@ -70,7 +70,7 @@ def generate_launch_description():
             protocol,
             '--model',
             model,
-            '--baud',
+            '--baud-rate',
             baud_rate,
             '--paced',
         ],

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import os
+from pathlib import Path
 import select
 import signal
 
@@ -169,3 +170,20 @@ class OtherProcess:
             # it is there, as somebody else's
             pass
         return False
+
+
+def ros2_parent(pid: int) -> OtherProcess | None:
+    """
+    Return the parent of that number if it is the ``ros2`` command, else ``None``.
+
+    ``ros2 run`` and ``ros2 launch`` can end without a word to what they have started. Of any other
+    parent nothing is known: a script may leave the driver to itself on purpose.
+    """
+    try:
+        words = Path(f'/proc/{pid}/cmdline').read_bytes().split(b'\0')
+        # the second word where an interpreter runs it
+        is_ros2 = any(os.path.basename(word) == b'ros2' for word in words[:2])
+        return OtherProcess(pid) if is_ros2 else None
+    except OSError:
+        # it has ended already, or this system does not tell
+        return None

@@ -50,6 +50,8 @@ from nfo_sinus_driver.catalog.status import StatusCode
 _FAMILIES = 'nfo_sinus_driver.families'
 #: The message InvSt has one byte for a status code.
 _HIGHEST_CODE = 0xFF
+#: Wider ones have no place in a message.
+_WIDEST_WORD = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
@@ -249,6 +251,9 @@ def _read_family(name: str, method: str = '') -> Family:
     for needed in _needed_roles(profile):
         if needed not in roles:
             raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
+    if not 0 <= profile.status_word.shown <= _WIDEST_WORD:
+        where = folder / 'profile.py'
+        raise table.CatalogError(f'{where}: shown is wider than a status word, 32 bits')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
 
     def area(row: table.Row) -> ErrorLogArea:

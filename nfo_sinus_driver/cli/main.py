@@ -21,6 +21,7 @@ from collections.abc import Callable
 from collections.abc import Iterator
 from collections.abc import Sequence
 import contextlib
+import io
 import os
 import signal
 import sys
@@ -75,6 +76,10 @@ _INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status, 0 only when the drive did it."""
+    for stream in (sys.stdout, sys.stderr):
+        # what the locale cannot write, such as a unit, must not end what drives a motor
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='replace')
     options = parse(sys.argv[1:] if argv is None else argv)
     failed = _DIFF_FAILED if options.verb == 'diff' else _FAILED
     try:

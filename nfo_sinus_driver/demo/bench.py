@@ -46,7 +46,7 @@ class Bench(contextlib.ExitStack):
 
     def start_simulator(self) -> str:
         """Start the simulated drive, wait until it serves, and return what it says of itself."""
-        arguments = ('--link', self.port, '--baud', str(BAUD_RATE), '--paced')
+        arguments = ('--link', self.port, '--baud-rate', str(BAUD_RATE), '--paced')
         process = self._start(*_SIMULATOR, *arguments, stdout=subprocess.PIPE)
         assert process.stdout is not None
         line = process.stdout.readline().decode().strip()

@@ -12,11 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python -m nfo_sinus_driver.node`` is the ``driver`` command."""
+"""
+The ``driver`` command, also as ``python -m nfo_sinus_driver.node``.
 
+ROS takes a second to load. Signals are held before that, for a signal without a handler would end
+the process as if it had been killed.
+"""
+
+from __future__ import annotations
+
+import os
 import sys
 
-from nfo_sinus_driver.node.main import main
+from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
+from nfo_sinus_driver.signals import HeldSignals
+from nfo_sinus_driver.signals import ros2_parent
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
+    open_closed_streams()
+    signals = HeldSignals()
+    # to the last, so that none cuts the end of the process short
+    signals.hold()
+    # as early as possible: a parent that has ended before it was looked for is not noticed
+    parent = ros2_parent(os.getppid())
+    from nfo_sinus_driver.node import main as process
+
+    return process.main(signals, parent, args)
+
 
 if __name__ == '__main__':
     sys.exit(main())

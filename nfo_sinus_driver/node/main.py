@@ -47,7 +47,6 @@ from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.executor import NodeExecutor
 from nfo_sinus_driver.node.executor import end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
-from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.node.overrides import bus_overrides
 from nfo_sinus_driver.node.overrides import overruled_parameters
 from nfo_sinus_driver.node.overrides import refuse_other_arguments
@@ -75,6 +74,17 @@ _POLL_SIGNALS = 0.5
 _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
+
+#: What an end says that comes before the port is opened.
+_NOT_STARTED = (
+    'ended before the bus was opened, nothing was written; a motor that was left running before '
+    'runs on: use the RUN input or the emergency stop'
+)
+_PARENT_IS_FIRST = (
+    'ros2 is process 1 of this container, and ros2 run passes no signal on: docker stop would kill '
+    'this driver and leave the motors running; start the container with --init '
+    '(TINI_KILL_PROCESS_GROUP=1) and --stop-signal SIGINT, or the driver without ros2 run'
+)
 
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
@@ -247,17 +257,18 @@ def _check_name(name: str) -> None:
         raise ValueError(f'a drive cannot be named {BUS_NAME}: that is the bus node')
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
+def main(signals: HeldSignals, parent: OtherProcess | None, args: list[str] | None = None) -> int:
+    """
+    Run the driver until a signal ends it; returns 1 if a stop was not confirmed.
+
+    :param signals: held already.
+    :param parent: the ``ros2`` command that started this process; the driver ends with it.
+    """
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _limit_arenas()
-    open_closed_streams()
-    signals = HeldSignals()
-    # to the last, so that none cuts the end of the process short
-    signals.hold()
     stdio = NonblockingStdio()
     try:
-        return _run(signals, *take_out_node_name(sys.argv if args is None else args))
+        return _run(signals, parent, *take_out_node_name(sys.argv if args is None else args))
     except Exception:
         # while somebody can yet be told
         traceback.print_exc()
@@ -274,11 +285,18 @@ def _limit_arenas() -> None:
         return
 
 
-def _run(signals: HeldSignals, arguments: list[str], single_name: str | None) -> int:
+def _run(
+    signals: HeldSignals,
+    parent: OtherProcess | None,
+    arguments: list[str],
+    single_name: str | None,
+) -> int:
     try:
         arguments, pid = take_out_end_with(arguments)
         refuse_other_arguments(arguments)
-        starter = None if pid is None else _starter(pid)
+        starters = [] if parent is None else [parent]
+        if pid is not None:
+            starters.append(_starter(pid))
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         process = DriverProcess(arguments, single_name)
     except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:
@@ -286,10 +304,17 @@ def _run(signals: HeldSignals, arguments: list[str], single_name: str | None) ->
         rclpy.logging.get_logger('nfo_sinus_driver').fatal(f'cannot start: {text}')
         rclpy.try_shutdown()
         return 2
+    log = rclpy.logging.get_logger('nfo_sinus_driver')
+    if parent is not None and parent.pid == 1:
+        log.warning(_PARENT_IS_FIRST)
+    if (why := _reason_to_end(signals, starters, 0.0)) is not None:
+        log.info(f'{why}: {_NOT_STARTED}')
+        rclpy.shutdown()
+        return 0
     process.start()
     why = 'error in the driver'
     try:
-        why = _await_end(process, signals, starter)
+        why = _await_end(process, signals, starters)
     finally:
         confirmed = process.stop(why)
         rclpy.shutdown()
@@ -304,18 +329,30 @@ def _starter(pid: int) -> OtherProcess:
 
 
 def _await_end(
-    process: DriverProcess, signals: HeldSignals, starter: OtherProcess | None
+    process: DriverProcess, signals: HeldSignals, starters: list[OtherProcess]
 ) -> str:
     """Wait until something ends the driver; return what."""
-    log = rclpy.logging.get_logger('nfo_sinus_driver')
     while process.alive:
-        number = signals.next(_POLL_SIGNALS)
-        if starter is not None and starter.ended:
-            return f'process {starter.pid}, which this driver ends with, has ended'
-        if number is None:
-            continue
-        name = signal_name(number)
-        if number in ENDING:
-            return name
-        log.warning(f'{name} ignored: a suspended driver would leave the motors running')
+        why = _reason_to_end(signals, starters, _POLL_SIGNALS)
+        if why is not None:
+            return why
     return 'a part of the driver has ended by itself'
+
+
+def _reason_to_end(
+    signals: HeldSignals, starters: list[OtherProcess], timeout: float
+) -> str | None:
+    """Take the next signal within so many s; return why the driver has to end, if it has to."""
+    number = signals.next(timeout)
+    for starter in starters:
+        if starter.ended:
+            return f'process {starter.pid}, which this driver ends with, has ended'
+    if number is None:
+        return None
+    name = signal_name(number)
+    if number in ENDING:
+        return name
+    rclpy.logging.get_logger('nfo_sinus_driver').warning(
+        f'{name} ignored: a suspended driver would leave the motors running'
+    )
+    return None

@@ -47,6 +47,15 @@ _CONTROL_MODES = {
     'Torque': DriveStatus.TORQUE,
     'Speed': DriveStatus.SPEED,
 }
+#: What has no constant is one of a family's own: CUSTOM.
+_METHODS = {
+    'mode_scmd': DriveStatus.MODE_SCMD,
+    'drive_control': DriveStatus.DRIVE_CONTROL,
+    'monitor': DriveStatus.MONITOR,
+    'function_bits': DriveStatus.FUNCTION_BITS,
+    'telegram1': DriveStatus.TELEGRAM1,
+    'ds402': DriveStatus.DS402,
+}
 _STATES = {state: getattr(DriveStatus, state.name) for state in State}
 #: The facts have the names and the bits that the message has; plain numbers, for this is done with
 #: every poll, and flags take their time.
@@ -79,7 +88,7 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
         enabled=snapshot.enabled,
-        control_method=getattr(DriveStatus, snapshot.control_method.upper()),
+        control_method=_METHODS.get(snapshot.control_method, DriveStatus.CUSTOM),
         control_mode=_CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
         unit=scale.unit(snapshot.unit),
         setpoint=scale.shown(snapshot.setpoint),
@@ -128,7 +137,8 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
 def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
     """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if nobody knows)."""
     return ErrorLogEntry(
-        code=entry.code,
+        # as in InvSt
+        code=min(entry.code, 0xFF),
         text=entry.full_text,
         operating_time=entry.operating_time,
         age=entry.age,

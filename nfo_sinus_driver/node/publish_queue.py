@@ -24,9 +24,12 @@ import logging
 import math
 import threading
 import time
+import traceback
 
 _log = logging.getLogger(__name__)
 
+#: How often the same failure is logged, s: it may come with every poll.
+_SAME_AGAIN = 60.0
 #: More than this many waiting messages are too old to be of use; the oldest are dropped.
 _MOST_WAITING = 1000
 
@@ -41,6 +44,7 @@ class PublishQueue:
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque(maxlen=_MOST_WAITING)
         self._schedule = Schedule()
+        self._failures = Failures()
         self._something = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='publish queue', daemon=True)
@@ -75,11 +79,19 @@ class PublishQueue:
             self._something.wait(self._time_to_spare())
             self._something.clear()
             while self._waiting:
-                _run(self._waiting.popleft())
+                self._run(self._waiting.popleft())
             if self._closing:
                 return
             if (function := self._schedule.take_due(time.monotonic())) is not None:
-                _run(function)
+                self._run(function)
+
+    def _run(self, function: Callable[[], None]) -> None:
+        try:
+            function()
+        except Exception as error:
+            # one message that cannot be sent must not silence the others
+            if self._failures.is_due(error, time.monotonic()):
+                _log.exception('a message could not be published; the same is logged once a minute')
 
     def _time_to_spare(self) -> float | None:
         """Return for how long nothing is due by the clock, s; ``None`` is for ever."""
@@ -87,12 +99,20 @@ class PublishQueue:
         return None if moment == math.inf else max(0.0, moment - time.monotonic())
 
 
-def _run(function: Callable[[], None]) -> None:
-    try:
-        function()
-    except Exception:
-        # one message that cannot be sent must not silence the others
-        _log.exception('a message could not be published')
+class Failures:
+    """Which failures are to be logged: each kind once a minute, be it ever so frequent."""
+
+    def __init__(self) -> None:
+        self._logged: dict[tuple[object, ...], float] = {}
+
+    def is_due(self, error: Exception, now: float) -> bool:
+        """Whether to log an error that is being handled; of its kind are those of its place."""
+        place = traceback.extract_tb(error.__traceback__)[-1:]
+        kind = (type(error), *((one.filename, one.lineno) for one in place))
+        if now - self._logged.get(kind, -math.inf) < _SAME_AGAIN:
+            return False
+        self._logged[kind] = now
+        return True
 
 
 #: The golden ratio: beginnings that are this part of a period apart never crowd.

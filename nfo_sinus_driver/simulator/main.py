@@ -134,7 +134,7 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         protocol=options.protocol,
         link=options.link,
         tcp=options.tcp,
-        baud=options.baud,
+        baud=options.baud_rate,
         char_format=options.char_format,
         also=options.also,
         echo=options.echo,
@@ -225,8 +225,10 @@ def _parser() -> argparse.ArgumentParser:
         help='serve the same drives by another protocol as well, at a link or TCP port; may be '
         'repeated',
     )
+    # the name of older versions
+    add('--baud', dest='baud_rate', type=int, help=argparse.SUPPRESS)
     add(
-        '--baud',
+        '--baud-rate',
         type=int,
         help='default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s)',
     )

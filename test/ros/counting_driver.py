@@ -26,7 +26,7 @@ import sys
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from nfo_sinus_driver.node import main
+from nfo_sinus_driver.node.__main__ import main
 
 
 def run() -> int:
@@ -40,7 +40,7 @@ def run() -> int:
             os.write(count, b'.')
 
     rclpy_implementation.WaitSet = CountingWaitSet
-    return main.main()
+    return main()
 
 
 if __name__ == '__main__':

@@ -38,3 +38,4 @@ def test_every_page_is_made_and_no_link_leads_nowhere(tmp_path: Path) -> None:
         made = tmp_path / page.relative_to(ROOT).with_suffix('.html')
         assert made.is_file(), page
         assert page.name == 'README.md' or made.name in index, f'{page} is in the contents'
+    assert 'docs/README.html' in (tmp_path / 'index.html').read_text(), 'the folder has a page'

@@ -94,7 +94,7 @@ def test_the_command_line_of_a_page_runs_as_it_is_typed(page: list[Typed], tmp_p
         named = {parse(shlex.split(one.text)[1:]).address for one in mine}
         arguments = ['--protocol', protocol, '--model', model, '--link', link]
         if protocol == 'canopen':
-            arguments += ['--baud', '125000']
+            arguments += ['--baud-rate', '125000']
         for address in sorted({*_ADDRESSES, *named}):
             arguments += ['--address', str(address)]
         with simulated(arguments):

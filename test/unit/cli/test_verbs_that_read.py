@@ -18,9 +18,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import contextlib
+import io
 import json
 from pathlib import Path
 import signal
+import sys
 
 from cli_bench import BACKGROUND
 from cli_bench import Bench
@@ -31,6 +34,7 @@ import yaml
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
 from nfo_sinus_driver.cli.console import CliError
+from nfo_sinus_driver.cli.main import main
 from nfo_sinus_driver.cli.options import parse
 
 Nfo = Callable[..., Done]
@@ -61,6 +65,22 @@ def test_list_shows_every_setting(nfo: Nfo, bench: Bench) -> None:
     assert table['control.auto_start'] == {'value': False, 'unit': ''}
     assert len(table) == len(REACHED)
     assert bench.writes() == []
+
+
+@pytest.mark.parametrize('encoding', ['latin-1', 'ascii'])
+@pytest.mark.parametrize(
+    'arguments', ['info', 'list', 'list --json', 'get motor.r_stat', 'dump -', 'errors', 'scan --help']
+)
+def test_what_a_locale_cannot_write_ends_no_verb(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, arguments: str, encoding: str
+) -> None:
+    written = io.BytesIO()
+    for name in ('stdout', 'stderr'):
+        monkeypatch.setattr(sys, name, io.TextIOWrapper(written, encoding))
+    with contextlib.suppress(SystemExit):
+        assert main([*bench.options, *arguments.split()]) == 0
+    sys.stdout.flush()
+    assert written.getvalue()
 
 
 @pytest.mark.parametrize('name', ['PI Reg', 'pi_reg'])

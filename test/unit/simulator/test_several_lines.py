@@ -407,7 +407,7 @@ def test_modbus_tcp_needs_no_port(start, capsys):
         (['--protocol', 'classic', '--address', '100'], '1 to 94'),
         (['--also', 'bus:1'], 'choose one of'),
         (['--dialect', '3'], '2.03'),
-        (['--protocol', 'classic', '--baud', '57600', '--dialect', '5.0'], '9600 at most'),
+        (['--protocol', 'classic', '--baud-rate', '57600', '--dialect', '5.0'], '9600 at most'),
         (['--protocol', 'modbus_tcp', '--link', 'x'], 'needs a TCP port'),
     ],
 )

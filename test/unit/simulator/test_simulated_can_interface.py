@@ -214,7 +214,7 @@ def test_the_command_serves_canopen(folder: Path) -> None:
     link = folder / 'nfo0'
     command = [sys.executable, '-m', 'nfo_sinus_driver.simulator']
     options = ['--protocol', 'canopen', '--address', '1', '--address', '7', '--link', str(link)]
-    more = ['--baud', '250000', '--trace', str(folder / 'trace'), '--canopen-types', 'wide']
+    more = ['--baud-rate', '250000', '--trace', str(folder / 'trace'), '--canopen-types', 'wide']
     with subprocess.Popen(
         [*command, *options, *more], stdout=subprocess.PIPE, text=True, cwd=ROOT
     ) as process:

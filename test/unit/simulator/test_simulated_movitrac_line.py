@@ -238,7 +238,7 @@ def test_another_family_keeps_its_own_keys():
     [
         ([], 'movitrac31 does not speak modbus_rtu'),
         (['--protocol', 'movitrac', '--address', '64'], '0 to 63'),
-        (['--protocol', 'movitrac', '--baud', '19200'], '9600 8N1'),
+        (['--protocol', 'movitrac', '--baud-rate', '19200'], '9600 8N1'),
         (['--protocol', 'movitrac', '--char-format', '8E1'], '9600 8N1'),
         (['--protocol', 'movitrac', '--set', 'serial.inverter_address=2'], 'with --address'),
         (['--protocol', 'movitrac', '--enable-bit', 'sometimes'], 'anded'),

@@ -130,7 +130,7 @@ def test_tcp_and_its_control_channel(start, capsys):
 
 
 def test_without_link_it_names_the_device(start, capsys, open_master):
-    _, line = start('--paced', '--baud', '57600', '--turnaround', '0.01')
+    _, line = start('--paced', '--baud-rate', '57600', '--turnaround', '0.01')
     pattern = r'at 57600 8E1 on (/dev/pts/\d+), drive 1; control (\S+)'
     port, control = re.search(pattern, line).groups()
     assert len(open_master(port).ask(1, READ_MODE, 7)) == 7
@@ -230,6 +230,7 @@ def test_inject_says_what_is_wrong(start, link, capsys):
         (['--set', 'control.accel=fast'], 'not a number'),
         (['--set', 'control.accel=1000'], 'out of range'),
         (['--set', 'serial.address=2'], 'with --address'),
+        (['--baud-rate', '115200'], '57600'),
         (['--baud', '115200'], '57600'),
         (['--char-format', '7E1'], 'data bits'),
         (['--tcp', '70000'], '65535'),

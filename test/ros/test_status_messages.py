@@ -1,0 +1,59 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a family of one's own may have that the messages have no constant for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from nfo_sinus_msgs.msg import DriveStatus
+import pytest
+
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_profile
+from nfo_sinus_driver.node.messages import drive_status
+from nfo_sinus_driver.node.messages import error_log_entry
+
+
+def status_of(method: str) -> DriveStatus:
+    """The status of a drive that is commanded by a method, and otherwise says nothing."""
+    nothing = dict.fromkeys(('setpoint', 'setpoint_age', 'actual'), 0.0)
+    flags = dict.fromkeys(('connected', 'enabled', 'setpoint_clamped'), False)
+    snapshot: Any = SimpleNamespace(
+        control_method=method, control_mode='Odd', unit='', status=None, **nothing, **flags
+    )
+    scale: Any = SimpleNamespace(unit=str, shown=float)
+    return drive_status(snapshot, Time(), '', scale)
+
+
+# also the names of constants that mean something else
+@pytest.mark.parametrize('method', ['four_bits', 'faulted', 'valid_ready', 'speed'])
+def test_a_control_method_with_a_name_of_its_own_is_published_as_custom(method: str) -> None:
+    status = status_of(method)
+    assert status.control_method == DriveStatus.CUSTOM
+    assert status.control_mode == DriveStatus.UNKNOWN
+
+
+def test_every_shipped_control_method_has_its_constant() -> None:
+    methods = {method for name in families() for method in load_profile(name).methods}
+    for method in {*methods, 'monitor', 'ds402'}:
+        assert status_of(method).control_method == getattr(DriveStatus, method.upper())
+
+
+def test_a_code_beyond_one_byte_in_the_error_log_is_published() -> None:
+    entry: Any = SimpleNamespace(code=300, full_text='Odd', operating_time=1.0, age=0.0)
+    assert error_log_entry(entry, Time()).code == 255
