@@ -29,6 +29,7 @@ from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.callers import log_call
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -39,6 +40,8 @@ _LONGEST_ENABLE = 3700.0
 _LONGEST_STOP = 15.0
 
 _Command = Callable[[ManagedDrive], Future[Report]]
+#: Is given what to call when all drives have their command; returns what failed, and what was done.
+_Callback = Callable[[Callable[[], None]], tuple[list[str], list[str]]]
 
 
 class AllDrives:
@@ -53,16 +56,17 @@ class AllDrives:
             ('~/enable_all', self._enable),
         ):
             group = MutuallyExclusiveCallbackGroup()
+            answer = self._safe(name, callback)
             node.create_service(
-                Trigger, name, self._safe(callback), qos_profile=COMMANDS, callback_group=group
+                Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
             )
 
     def _safe(
-        self, callback: Callable[[], tuple[list[str], list[str]]]
+        self, name: str, callback: _Callback
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
-                failed, done = callback()
+                failed, done = callback(lambda: log_call(self._node, name))
             except Exception as error:
                 # an exception that leaves a service callback would end the executor
                 self._node.get_logger().error(f'error in a service: {error!r}')
@@ -73,9 +77,9 @@ class AllDrives:
 
         return answer
 
-    def _stop(self) -> tuple[list[str], list[str]]:
+    def _stop(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
-        failed, done = self._command(_stop_one, _LONGEST_STOP)
+        failed, done = self._command(_stop_one, _LONGEST_STOP, given)
         if failed and self._context.bus.protocol.broadcast is not None:
             if any(one.settings.method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
@@ -92,13 +96,15 @@ class AllDrives:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'
 
-    def _enable(self) -> tuple[list[str], list[str]]:
+    def _enable(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
         asked_at = received_at()
         return self._command(
-            lambda managed: managed.require_active().enable(asked_at), _LONGEST_ENABLE
+            lambda managed: managed.require_active().enable(asked_at), _LONGEST_ENABLE, given
         )
 
-    def _command(self, command: _Command, timeout: float) -> tuple[list[str], list[str]]:
+    def _command(
+        self, command: _Command, timeout: float, given: Callable[[], None]
+    ) -> tuple[list[str], list[str]]:
         """Give a command to every controlled drive; return what failed, and what was done."""
         failed: list[str] = []
         done: list[str] = []
@@ -112,6 +118,7 @@ class AllDrives:
                 except NodeError as error:
                     failed.append(f'{managed.name}: {error}')
         deadline = time.monotonic() + timeout
+        given()
         for managed, future in futures:
             name, say = managed.name, managed.wording.say
             try:

@@ -52,6 +52,7 @@ from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
 from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.node.callers import log_call
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
@@ -93,7 +94,9 @@ class Commands:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            return self._answer(response, lambda: command(self._managed.drive), timeout)
+            return self._answer(
+                response, _and_log(self._node, name, lambda: command(self._managed.drive)), timeout
+            )
 
         group = MutuallyExclusiveCallbackGroup()
         self._node.create_service(Trigger, name, answer, qos_profile=COMMANDS, callback_group=group)
@@ -123,13 +126,28 @@ class Commands:
         return response
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        if not request.data:
-            return self._answer(response, self._managed.drive.stop, _LONGEST_STOP)
-        return self._answer(
-            response,
-            lambda: self._managed.require_active().enable(received_at()),
-            _LONGEST_COMMAND,
-        )
+        def enable() -> Future[Report]:
+            return self._managed.require_active().enable(received_at())
+
+        command, timeout = self._managed.drive.stop, _LONGEST_STOP
+        if request.data:
+            command, timeout = enable, _LONGEST_COMMAND
+        detail = str(request.data).lower()
+        return self._answer(response, _and_log(self._node, '~/enable', command, detail), timeout)
+
+
+def _and_log(
+    node: Node, service: str, command: Callable[[], _T], detail: str = ''
+) -> Callable[[], _T]:
+    """Return a command that is logged as well, right after it was given: a stop never waits."""
+
+    def given() -> _T:
+        try:
+            return command()
+        finally:
+            log_call(node, service, detail)
+
+    return given
 
 
 class BoundedCallbackGroup(CallbackGroup):
@@ -234,7 +252,9 @@ class TuningServices:
         # reentrant, so that a second one is refused at once and a cancel need not wait
         group = ReentrantCallbackGroup()
         for name, procedure in _SERVICES.items():
-            node.create_service(Trigger, name, self._service_of(procedure), callback_group=group)
+            node.create_service(
+                Trigger, name, self._service_of(name, procedure), callback_group=group
+            )
         self._server = ActionServer(
             node,
             Tune,
@@ -247,13 +267,16 @@ class TuningServices:
         )
 
     def _service_of(
-        self, procedure: Procedure
+        self, name: str, procedure: Procedure
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             asked_at = received_at()
-            tuned = self._result(
-                lambda: self._managed.require_active().tune(procedure, asked_at=asked_at).result()
+            tune = _and_log(
+                self._node,
+                name,
+                lambda: self._managed.require_active().tune(procedure, asked_at=asked_at),
             )
+            tuned = self._result(lambda: tune().result())
             response.success = tuned.success
             response.message = self._managed.wording.say(tuned.report)
             return response
@@ -301,6 +324,7 @@ class TuningServices:
 
     def _followed(self, goal: ServerGoalHandle, asked_at: float) -> Tuned:
         procedure = _PROCEDURES[goal.request.procedure]
+        log_call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
         drive = self._managed.require_active()
         # the bus reports how far it is, and nobody may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()

@@ -1,0 +1,52 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Each command leaves one line in the log: what was called, and which node has called it."""
+
+from __future__ import annotations
+
+from bench import Bench
+from bench import wait_until
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+from ways import needs
+
+_TRIGGERS = ('stop', 'quick_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log')
+
+
+@needs('own')
+def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -> None:
+    bench.simulator()
+    driver = bench.driver()
+    client = bench.client().connected()
+    name = client.node.get_fully_qualified_name()
+    for value in (True, False):
+        client.call('enable', SetBool, data=value)
+    for service in (*_TRIGGERS, 'tune_basic'):
+        client.call(service)
+    others = bench.client('/nfo_sinus_bus')
+    for service in ('stop_all', 'disable_all', 'enable_all'):
+        others.call(service, Trigger)
+    other = others.node.get_fully_qualified_name()
+    expected = [
+        f'/nfo_sinus/enable (true) called by {name}',
+        f'/nfo_sinus/enable (false) called by {name}',
+        *(f'/nfo_sinus/{service} called by {name}' for service in (*_TRIGGERS, 'tune_basic')),
+        *(f'/nfo_sinus_bus/{one} called by {other}' for one in ('stop_all', 'disable_all')),
+        f'/nfo_sinus_bus/enable_all called by {other}',
+    ]
+    wait_until(lambda: all(line in driver.text for line in expected), f'{expected}')
+    assert driver.text.count(' called by ') == len(expected), driver.text
+    # even one that is refused is to be found in the log
+    assert '[INFO]' in next(line for line in driver.text.splitlines() if expected[2] in line)
