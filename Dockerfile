@@ -1,7 +1,7 @@
 # ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of the README.
 #
 #   docker build -t nfo_sinus_driver .
-#   docker run -it --rm nfo_sinus_driver ros2 launch nfo_sinus_driver simulation.launch.py
+#   docker run -it --rm --init nfo_sinus_driver ros2 launch nfo_sinus_driver simulation.launch.py
 FROM ros:jazzy
 
 # rosdep installs the packages that package.xml names
@@ -21,4 +21,9 @@ RUN . /opt/ros/jazzy/setup.sh \
 
 # the entry point of the base image knows its own packages alone
 RUN sed --in-place '/^exec/i source /workspace/install/setup.bash' /ros_entrypoint.sh
+
+# ros2 launch stops what it started on SIGINT, on SIGTERM it does not; with --init the signal goes
+# to every process of the group, so that ros2 run, which passes nothing on, does no harm
+STOPSIGNAL SIGINT
+ENV TINI_KILL_PROCESS_GROUP=1
 CMD ["bash"]

@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sys
 
 from nfo_sinus_driver.demo.bench import Bench
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_HELP = """
+_WITH_ROS2 = """
 The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try:
 
   ros2 service call /nfo_sinus/enable std_srvs/srv/SetBool '{data: true}'
@@ -32,6 +33,16 @@ The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try
   simulator inject --link %s fault 5
   ros2 topic echo --once /nfo_sinus/inv_st
   ros2 service call /nfo_sinus/fault_ack std_srvs/srv/Trigger
+
+Ctrl-C stops the motor and ends both.
+"""
+_WITHOUT_ROS2 = """
+The driver is up. The ros2 tool is not installed here. In another terminal try without it:
+
+  tools/run python examples/ride.py
+  tools/run monitor
+  tools/run record
+  tools/run simulator inject --link %s fault 5
 
 Ctrl-C stops the motor and ends both.
 """
@@ -45,7 +56,8 @@ def main() -> int:
         try:
             print(bench.start_simulator(), flush=True)
             bench.start_driver('-p', 'drive_timeout:=2.0')
-            print(_HELP % bench.port, flush=True)
+            text = _WITHOUT_ROS2 if shutil.which('ros2') is None else _WITH_ROS2
+            print(text % bench.port, flush=True)
             return bench.wait()
         except KeyboardInterrupt:
             # the driver now stops the motor, and that must not be cut short

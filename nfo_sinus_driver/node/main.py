@@ -80,11 +80,6 @@ _NOT_STARTED = (
     'ended before the bus was opened, nothing was written; a motor that was left running before '
     'runs on: use the RUN input or the emergency stop'
 )
-_PARENT_IS_FIRST = (
-    'ros2 is process 1 of this container, and ros2 run passes no signal on: docker stop would kill '
-    'this driver and leave the motors running; start the container with --init '
-    '(TINI_KILL_PROCESS_GROUP=1) and --stop-signal SIGINT, or the driver without ros2 run'
-)
 
 #: What rclpy raises when its own arguments make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
@@ -216,6 +211,7 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         return False
     except Exception as error:
         if not node.managed.drive.heard:
+            log.warning('the drive has not answered yet: if its motor was left running, it runs on')
             return True
         # whatever it is, the other drives have to be waited for, too
         known = isinstance(error, DriveError)
@@ -306,7 +302,10 @@ def _run(
         return 2
     log = rclpy.logging.get_logger('nfo_sinus_driver')
     if parent is not None and parent.pid == 1:
-        log.warning(_PARENT_IS_FIRST)
+        log.warning(
+            'ros2 is process 1 of this container: ros2 run passes no signal on, and the end of '
+            'the container leaves the motors running; see docs/container.md'
+        )
     if (why := _reason_to_end(signals, starters, 0.0)) is not None:
         log.info(f'{why}: {_NOT_STARTED}')
         rclpy.shutdown()

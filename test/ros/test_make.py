@@ -25,7 +25,9 @@ import sys
 
 from bench import Bench
 from bench import Process
+from bench import _executable
 from bench import wait_until
+import pytest
 from ways import needs
 
 _DEMO_TIME = 300.0
@@ -86,3 +88,27 @@ def test_make_run_ends_with_the_motor_stopped(bench: Bench) -> None:
         assert process.wait() == 0
     wait_until(lambda: 'control released' in process.text, 'the driver stopped the motor')
     assert not os.path.exists(port[1]), 'the simulator left its port behind'
+
+
+@needs('own')
+@pytest.mark.parametrize('installed', [False, True])
+def test_make_run_prints_only_lines_that_work_here(bench: Bench, installed: bool) -> None:
+    folder = bench.folder / 'path'
+    folder.mkdir()
+    if installed:
+        (folder / 'ros2').write_text('#!/bin/sh\n')
+        (folder / 'ros2').chmod(0o755)
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain), 'PATH': str(folder)}
+    command = [sys.executable, '-m', 'nfo_sinus_driver.demo.run']
+    process = Process(command, environment, bench.folder / 'make_run.log')
+    bench.callback(process.end)
+    wait_until(lambda: 'Ctrl-C stops' in process.text, 'it says what to try')
+    lines = [line.split() for line in process.text.splitlines() if line.startswith('  ')]
+    programs = [line[0] for line in lines]
+    assert ('ros2' in programs) is installed
+    if not installed:
+        root = Path(__file__).resolve().parents[2]
+        scripts = {path.name for path in Path(_executable('simulator')).parent.iterdir()}
+        for first, program, *rest in lines:
+            assert (root / first).is_file()
+            assert program in scripts or (root / rest[0]).is_file(), program

@@ -109,6 +109,16 @@ def test_a_signal_while_it_is_still_loading_ends_it_cleanly(bench: Bench, module
     assert not bench.requests()
 
 
+def test_an_end_before_the_first_answer_says_that_a_motor_may_run_on(bench: Bench) -> None:
+    drive = bench.simulator()
+    drive.inject('line-dead', 60.0)
+    driver = bench.driver()
+    wait_until(bench.frames, 'the driver asks for the drive')
+    driver.signal(signal.SIGTERM)
+    assert driver.wait() == 0, driver.text
+    assert 'the drive has not answered yet: if its motor was left running' in driver.text
+
+
 def test_as_process_1_under_ros2_run_it_says_that_no_signal_will_reach_it(bench: Bench) -> None:
     bench.simulator()
     isolated = ('unshare', '--user', '--map-root-user', '--pid', '--fork', '--mount-proc')

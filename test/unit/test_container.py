@@ -21,6 +21,9 @@ from pathlib import Path
 import re
 
 import pytest
+import yaml
+
+from nfo_sinus_driver.drive import DriveSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
@@ -43,6 +46,7 @@ def test_it_is_built_as_the_readme_says(beginning: str) -> None:
 def test_it_is_used_as_the_readme_says() -> None:
     build, run = commands('docker')
     assert f'#   {build}\n' in DOCKERFILE and f'#   {run}\n' in DOCKERFILE
+    assert ' --init ' in run
     *_, launch = run.partition('ros2 launch nfo_sinus_driver ')
     assert (ROOT / 'launch' / launch).is_file()
 
@@ -64,3 +68,21 @@ def test_the_development_container_is_the_same() -> None:
     target = wanted['workspaceFolder']
     assert f'target={target},' in wanted['workspaceMount']
     assert target == '/workspace/src/nfo_sinus_driver'
+    assert wanted['init'] is True
+
+
+def test_the_end_of_a_container_reaches_the_driver_and_leaves_it_time() -> None:
+    assert '\nSTOPSIGNAL SIGINT\n' in DOCKERFILE
+    assert '\nENV TINI_KILL_PROCESS_GROUP=1\n' in DOCKERFILE
+    text = (ROOT / 'docs' / 'compose.yaml').read_text(encoding='utf-8')
+    (service,) = yaml.safe_load(text)['services'].values()
+    assert service['init'] is True
+    assert service['stop_signal'] == 'SIGINT'
+    assert service['environment'] == {'TINI_KILL_PROCESS_GROUP': '1'}
+    grace = float(service['stop_grace_period'].removesuffix('s'))
+    assert grace >= 2 * DriveSettings(address=1).shutdown_timeout + 20
+    (limit,) = re.findall(r'exit_timeout:=(\d+)', service['command'])
+    # launch must not kill the driver before the container does
+    assert grace - 5 <= float(limit) <= grace
+    *_, launch = service['command'].partition('ros2 launch nfo_sinus_driver ')
+    assert (ROOT / 'launch' / launch.split()[0]).is_file()
