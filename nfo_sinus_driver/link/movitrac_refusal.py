@@ -53,7 +53,10 @@ _OTHER_INTERFACE = ReturnCode(
     'not permitted via this serial interface',
     'use the keypad, or the other interface (X4 or X20)',
 )
-_INHIBIT = 'stop the motor and inhibit the controller first (terminal or function bits)'
+_INHIBIT = (
+    'stop the motor, then inhibit the controller: call the service ~/quick_stop, or open a '
+    'terminal that has the function /Controller inhibit'
+)
 
 #: What the drive has done all the same.
 DONE: Mapping[int, str] = {

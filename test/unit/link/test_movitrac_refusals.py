@@ -119,3 +119,10 @@ def test_a_refusal_is_an_answer() -> None:
     assert not raised.value.maybe_done
     bench.read(A)
     assert bench.asked == [A.index, A.index], f'nothing was in doubt, {RESYNC} not asked'
+
+
+@pytest.mark.parametrize('code', [0x1C, 0x2B])
+def test_a_remedy_for_inhibit_names_what_an_operator_has(code: int) -> None:
+    # each way: the service of the node, and the terminal with the function that inhibits
+    assert '~/quick_stop' in REFUSALS[code].remedy
+    assert '/Controller inhibit' in REFUSALS[code].remedy
