@@ -57,6 +57,8 @@ from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
 from nfo_sinus_driver.bus.tasks import set_up
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Connecting
+from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LineProtocol
 from nfo_sinus_driver.link import Link
@@ -108,6 +110,9 @@ class Bus:
         self._being_introduced: set[int] = set()
         self._introduced: set[int] = set()
         self._current: Task | None = None
+        #: Since when the gateway says nothing at all, and how long that may last by each unit, s.
+        self._mute_since = math.inf
+        self._lost_after: dict[int, float] = {}
         #: Who is told that a unit has started anew.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
@@ -173,6 +178,15 @@ class Bus:
     def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
         """Tell the link which parameters of a unit it may read to find out if it hears it."""
         self.call(lambda: self._link.use_resync_reads(unit, addresses))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the link has noticed about the line, each in a sentence that says what to do."""
+        return self._link.remarks.texts
+
+    def require_sign_of_life(self, unit: int, seconds: float) -> None:
+        """Look for another way to the far end when nothing came from it for so long, s."""
+        self.call(lambda: self._lost_after.update({unit: seconds}))
 
     def on_restart(self, unit: int, tell: Callable[[], None]) -> None:
         """Have a function called, on the worker, when a unit says that it has started anew."""
@@ -499,6 +513,26 @@ class Bus:
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
             self.recorder.transaction(unit, now, now - started, error)
+            self._note_life(now, error)
+
+    def _note_life(self, now: float, error: LinkError | None) -> None:
+        """Open the link beside itself where nothing at all has come from a gateway for long."""
+        if not isinstance(error, GatewaySilent):
+            self._mute_since = math.inf
+            return
+        self._mute_since = min(self._mute_since, now)
+        if now - self._mute_since < min(self._lost_after.values(), default=math.inf):
+            return
+        self._mute_since = math.inf
+        try:
+            self._link.open()
+        except Connecting:
+            # the link uses it as soon as it is there
+            pass
+        except PortError as lost:
+            self._port.mark_lost(lost, now + REOPEN_PERIOD)
+            return
+        self.recorder.opened()
 
     def _open_when_due(self) -> None:
         now = time.monotonic()

@@ -29,6 +29,8 @@ from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.link import GatewayFault
+from nfo_sinus_driver.link import GatewayLate
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import Interrupted
 from nfo_sinus_driver.link import LinkError
@@ -38,6 +40,11 @@ from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 
+#: What is wrong is not the drive, nor the settings of its line.
+_SAYS_WHAT_TO_DO = (
+    PortError, Refused, GatewaySilent, GatewayLate, GatewayFault, NoPath, NoData, Interrupted
+)
+
 
 def explain(error: LinkError, address: int, *, check: str | None = None) -> Report:
     """
@@ -46,7 +53,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     :param check: what to look at while the drive has never answered; ``None``: it has, so that its
         settings are right [C93].
     """
-    if isinstance(error, (PortError, Refused, GatewaySilent, NoPath, NoData, Interrupted)):
+    if isinstance(error, _SAYS_WHAT_TO_DO):
         return Report(Cause.LINE_FAILED, error=str(error))
     if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))

@@ -117,6 +117,7 @@ class Drive:
         self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
         self._tuning = Tuning(self.inverter, self.parameters, procedures)
         bus.on_restart(self._unit, self._watch.restarted)
+        bus.require_sign_of_life(self._unit, settings.lost_after)
         #: What goes on while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
@@ -131,6 +132,7 @@ class Drive:
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
         self.inverter.use(settings)
+        self._bus.require_sign_of_life(self._unit, settings.lost_after)
 
     @property
     def snapshot(self) -> Snapshot:

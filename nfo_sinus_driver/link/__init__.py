@@ -15,7 +15,10 @@
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Connecting
 from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import GatewayFault
+from nfo_sinus_driver.link.interface import GatewayLate
 from nfo_sinus_driver.link.interface import GatewaySilent
 from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import Inquiry
@@ -30,6 +33,7 @@ from nfo_sinus_driver.link.interface import NoPath
 from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.interface import Supervision
 from nfo_sinus_driver.link.interface import Watch
@@ -43,7 +47,10 @@ __all__ = [
     'BIT_RATES',
     'PROTOCOLS',
     'Address',
+    'Connecting',
     'DamagedAnswer',
+    'GatewayFault',
+    'GatewayLate',
     'GatewaySilent',
     'Identification',
     'Inquiry',
@@ -59,6 +66,7 @@ __all__ = [
     'PortError',
     'Reconnect',
     'Refused',
+    'Remarks',
     'Reply',
     'Supervision',
     'Watch',

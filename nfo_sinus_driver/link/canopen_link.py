@@ -38,6 +38,7 @@ from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
@@ -104,6 +105,7 @@ class CanopenLink:
     def __init__(self, port: CanPort, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
+        self.remarks = Remarks()
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds
         )

@@ -43,6 +43,7 @@ from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NothingToAsk
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.line_protocols import BROADCAST
@@ -114,6 +115,7 @@ class ClassicLink:
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
+        self.remarks = Remarks()
         self._late: LateReplies[Request, Kind] = LateReplies(
             settings.response_timeout, classic.kinds
         )

@@ -151,6 +151,27 @@ class Supervision(Protocol):
         """Return how a unit is made to notice a silence of so long, s; 0: nothing any more."""
 
 
+class Remarks:
+    """
+    What a link has noticed about its line although it works; any thread may read it.
+
+    :ivar foreign_frames: how many frames of another master have been seen.
+    """
+
+    def __init__(self) -> None:
+        self.foreign_frames = 0
+        self._texts: dict[str, None] = {}
+
+    def add(self, text: str) -> None:
+        """Take note of a sentence, which says what to do, too; once only."""
+        self._texts = {**self._texts, text: None}
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Every sentence, in the order in which they came."""
+        return tuple(self._texts)
+
+
 class NothingToAsk:
     """The inquiry of a protocol that knows nothing but parameters: it has no questions."""
 
@@ -245,16 +266,23 @@ class Link(Protocol):
     One line to several units, used by one thread.
 
     :ivar protocol: what it speaks.
+    :ivar remarks: what it has noticed.
     """
 
     protocol: LineProtocol
+    remarks: Remarks
 
     @property
     def supervision(self) -> Supervision | None:
         """What lives on it beside questions and answers; ``None``: nothing."""
 
     def open(self) -> None:
-        """Open the port (PortError: it cannot be opened; the message says what to do)."""
+        """
+        Open the port; where it is open, and nothing comes from it, another way to its far end.
+
+        :raises Connecting: that takes longer.
+        :raises PortError: it cannot be opened; the message says what to do.
+        """
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -322,6 +350,10 @@ class PortError(LinkError):
     """The port cannot be opened or was lost; the message says what to do."""
 
 
+class Connecting(PortError):
+    """It takes longer to open the port: it has to be opened again, which goes on with it."""
+
+
 class NoAnswer(LinkError):
     """Nobody answered in time."""
 
@@ -330,6 +362,10 @@ class NoAnswer(LinkError):
 
 class GatewaySilent(NoAnswer):
     """The gateway itself said nothing in time, not even that the drive is silent."""
+
+
+class GatewayLate(NoAnswer):
+    """The gateway answered too late; the message says what to do."""
 
 
 class NoData(NoAnswer):
@@ -348,6 +384,10 @@ class DamagedAnswer(LinkError):
     """Something came, but no answer to this request: noise, a collision or wrong line settings."""
 
     maybe_done = True
+
+
+class GatewayFault(DamagedAnswer):
+    """The gateway answered in a way that no gateway may; the message says what to do."""
 
 
 class NeverSilent(DamagedAnswer):

@@ -28,6 +28,7 @@ from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.interface import LineProtocol
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NotReady
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_pdu import Request
 from nfo_sinus_driver.link.modbus_pdu import Write
@@ -41,6 +42,7 @@ class ModbusLink(ABC):
     """A Modbus master, whatever carries its requests."""
 
     protocol: LineProtocol
+    remarks: Remarks
     supervision = None
 
     def parts(self, address: Address) -> tuple[Address]:

@@ -23,10 +23,10 @@ somebody else is there.
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
 from collections.abc import Sequence
 import contextlib
-import select
-import socket
 import struct
 import time
 from typing import Any
@@ -36,7 +36,10 @@ from urllib.parse import urlsplit
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Connecting
 from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import GatewayFault
+from nfo_sinus_driver.link.interface import GatewayLate
 from nfo_sinus_driver.link.interface import GatewaySilent
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
@@ -44,11 +47,16 @@ from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NoPath
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.line_protocols import MODBUS_TCP
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import Write
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.modbus_pdu import understand
+from nfo_sinus_driver.link.tcp_connection import Connection
+from nfo_sinus_driver.link.tcp_connection import TcpConnection
 
 _HEADER = struct.Struct('>HHH')
 #: Unit and function, and as much data as there can be.
@@ -94,12 +102,19 @@ _T = TypeVar('_T')
 
 #: Where gateways listen.
 _PORT = 502
-#: How long the gateway may take to accept a connection, s.
+#: How long the gateway may take to accept a connection, and how long that is waited for at a time,
+#: s: meanwhile others may want something of the thread.
 _CONNECT_TIMEOUT = 3.0
-#: How long it may take to acknowledge bytes before the connection counts as lost, s.
-_ACKNOWLEDGE_TIMEOUT = 5.0
+_SLICE = 0.02
+#: So many connections in a row that the gateway closes after one answer are no accident.
+_CLOSINGS = 2
+#: Of so many requests that were given up an answer is known as late.
+_GIVEN_UP = 64
 _HINT = 'is the gateway switched on and its address right?'
-_READ_SIZE = 4096
+_CLOSED_HINT = (
+    'it may have restarted, or serve fewer connections at a time than there are clients: end other '
+    'clients, or allow more in its settings'
+)
 
 
 class TcpLink(ModbusLink):
@@ -110,20 +125,46 @@ class TcpLink(ModbusLink):
     told from the right one by that, so nothing is ever in quarantine. Drives that do not answer
     leave the connection as it is.
 
+    A connection may stay open and mute, when the gateway has lost its other side, or something
+    between has forgotten it. Who calls :meth:`open` then has another one begun beside it; the first
+    that answers is kept. Before the other is used the mute one is closed so that nothing that was
+    handed over to it arrives later.
+
+    A gateway that closes the connection after each answer gets another one for each request.
+
     :param response_timeout: from a request sent to its answer, s.
+    :param connection: makes what carries the bytes, of host and port.
     """
 
     protocol = MODBUS_TCP
 
-    def __init__(self, host: str, port: int, response_timeout: float) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        response_timeout: float,
+        connection: Callable[[str, int], Connection] = TcpConnection,
+    ) -> None:
         self._host = host
         self._port = port
         self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
         self._response_timeout = response_timeout
-        self._socket: socket.socket | None = None
+        self._make = connection
+        self._connection: Connection | None = None
+        #: One that has been begun, and until when it is waited for.
+        self._begun: Connection | None = None
+        self._begun_until = 0.0
         self._reader = FrameReader()
         self._number = 0
+        #: What was asked on this connection in vain, and how many answers came.
+        self._given_up: deque[int] = deque(maxlen=_GIVEN_UP)
+        self._answers = 0
+        #: The last request on this connection has not been answered.
+        self._unanswered = False
+        #: How many connections in a row the gateway has closed after one answer.
+        self._closings = 0
         self._blocks = telegram.Blocks(self._ask)
+        self.remarks = Remarks()
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
@@ -131,26 +172,22 @@ class TcpLink(ModbusLink):
         return cls(*_host_and_port(port), settings.response_timeout)
 
     def open(self) -> None:
-        """Connect to the gateway."""
-        self.close()
-        try:
-            self._socket = socket.create_connection((self._host, self._port), _CONNECT_TIMEOUT)
-            # requests are small and shall leave at once
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # a cable that was pulled says nothing by itself
-            milliseconds = int(1000 * _ACKNOWLEDGE_TIMEOUT)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
-        except OSError as error:
-            self.close()
-            raise PortError(f'{self._name} cannot be reached ({error}): {_HINT}') from error
-        self._reader = FrameReader()
-        self._blocks.forget()
+        """
+        Connect to the gateway; where a connection is open, and mute, to another beside it.
+
+        :raises Connecting: it takes longer; the next call goes on.
+        """
+        if self._begun is None:
+            self._begin()
+        if not self._go_on(time.monotonic() + _SLICE):
+            raise Connecting(f'{self._name} is being connected to')
 
     def close(self) -> None:
         """Close the connection; harmless when it is closed already."""
-        connection, self._socket = self._socket, None
+        self._drop_begun()
+        connection, self._connection = self._connection, None
         if connection is not None:
-            connection.close()
+            connection.close(discard=self._unanswered)
 
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter, of a drive or of the block of a PLC."""
@@ -173,70 +210,205 @@ class TcpLink(ModbusLink):
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Take parameters that are safe to read; here nothing has to be resynchronised."""
 
+    # --- the connection ---------------------------------------------------------------------------
+
+    @property
+    def _is_closed_each_time(self) -> bool:
+        """The gateway closes the connection after each answer."""
+        return self._closings >= _CLOSINGS
+
+    def _begin(self) -> None:
+        self._begun = self._make(self._host, self._port)
+        self._begun_until = time.monotonic() + _CONNECT_TIMEOUT
+        try:
+            self._begun.open()
+        except OSError as error:
+            self._drop_begun()
+            raise self._unreachable(error) from error
+
+    def _go_on(self, until: float) -> bool:
+        """Wait for the connection that was begun; tell whether it is the one by now."""
+        assert self._begun is not None
+        try:
+            if not self._begun.connected(until):
+                if time.monotonic() < self._begun_until:
+                    return False
+                raise TimeoutError('timed out')
+        except OSError as error:
+            self._drop_begun()
+            raise self._unreachable(error) from error
+        begun, self._begun = self._begun, None
+        self.close()
+        self._connection = begun
+        self._reader = FrameReader()
+        self._given_up.clear()
+        self._answers = 0
+        self._unanswered = False
+        if not self._is_closed_each_time:
+            self._blocks.forget()
+        return True
+
+    def _drop_begun(self) -> None:
+        begun, self._begun = self._begun, None
+        if begun is not None:
+            begun.close()
+
+    def _connect_again(self) -> None:
+        """Connect once more, in the middle of a request."""
+        self.close()
+        self._begin()
+        if not self._go_on(time.monotonic() + self._response_timeout):
+            self._drop_begun()
+            raise self._unreachable(TimeoutError('timed out'))
+
+    def _usable(self) -> Connection:
+        """Return the connection that the next request goes by."""
+        if self._begun is not None:
+            self._go_on(time.monotonic())
+        connection = self._connection
+        if connection is None:
+            raise PortError(f'{self._name} is not connected')
+        if self._is_closed_each_time and self._answers:
+            self._connect_again()
+        elif self._answers == 1 and not self._unanswered and self._was_closed(connection):
+            self._note_closing()
+            self._connect_again()
+        assert self._connection is not None
+        return self._connection
+
+    def _was_closed(self, connection: Connection) -> bool:
+        """Tell whether the gateway has closed it since it answered."""
+        try:
+            self._reader.feed(connection.read(0.0))
+        except OSError:
+            return True
+        return False
+
+    def _note_closing(self) -> None:
+        """Take note that the gateway has closed a connection after one answer."""
+        self._closings += 1
+        if self._is_closed_each_time:
+            self.remarks.add(
+                f'{self._name} closes the connection after each answer: it is opened anew for each '
+                'request, which takes longer; look in the settings of the gateway for one that '
+                'keeps connections open'
+            )
+
+    # --- one transaction --------------------------------------------------------------------------
+
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""
-        connection = self._connection()
-        self._number = self._number % 0xFFFF + 1
         try:
-            connection.sendall(encode(request, self._number))
+            return self._exchange(request)
+        except ConnectionError as error:
+            first = not self._closes_after_one(request)
+            if first or isinstance(request, (Write, WriteAndRead)):
+                raise self._lost(error) from error
         except OSError as error:
             raise self._lost(error) from error
+        # the gateway answers one request a connection, and this one changes nothing
+        self._connect_again()
+        try:
+            return self._exchange(request)
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def _closes_after_one(self, request: Request[object]) -> bool:
+        """Tell whether the gateway seems to close after each answer: it did after one, just now."""
+        if self._answers != 1 or self._reader.received:
+            return False
+        self._note_closing()
+        return True
+
+    def _exchange(self, request: Request[_T]) -> tuple[_T, float]:
+        connection = self._usable()
+        self._number = self._number % 0xFFFF + 1
+        self._unanswered = True
+        connection.write(encode(request, self._number))
         deadline = time.monotonic() + self._response_timeout
+        others: list[int] = []
         while True:
-            data = self._receive(connection, deadline)
+            data = connection.read(deadline)
             now = time.monotonic()
             for number, message in self._reader.feed(data):
-                # others answer requests that were given up, or answer twice
                 if number == self._number:
+                    self._note_answer()
                     return self._understood(request, message), now
+                others.append(number)
             if self._reader.out_of_step:
                 raise PortError(
                     f'{self._name} does not speak Modbus TCP; if it is a serial device server, '
                     f'set protocol to modbus_rtu and port to socket://{self._name}'
                 )
+            if data:
+                # it talks, so none is needed beside it
+                self._drop_begun()
             if now >= deadline:
                 break
+        error = self._missing(request, others)
+        self._given_up.append(self._number)
+        raise error
+
+    def _note_answer(self) -> None:
+        self._drop_begun()
+        self._unanswered = False
+        self._answers += 1
+        if self._answers > 1:
+            self._closings = 0
+
+    def _missing(self, request: Request[object], others: Sequence[int]) -> LinkError:
+        """Return what it means that no answer to a request came, but perhaps others."""
+        unit = request.unit
+        strange = [number for number in others if number not in self._given_up]
+        if strange:
+            return GatewayFault(
+                f'unit {unit}: the gateway answered with transaction number {strange[0]} instead '
+                f'of {self._number}, that of the request: update or replace the gateway, or set it '
+                'to pass bytes on and use socket:// with modbus_rtu'
+            )
         if self._reader.received:
-            raise DamagedAnswer(f'unit {request.unit}: only a part of the answer came')
-        raise GatewaySilent(
-            f'the gateway did not answer for unit {request.unit}: '
+            return DamagedAnswer(f'unit {unit}: only a part of the answer came')
+        if others:
+            return GatewayLate(
+                f'the answer of the gateway for unit {unit} came after response_timeout: set it '
+                "longer than the gateway's own time-out"
+            )
+        return GatewaySilent(
+            f'the gateway did not answer for unit {unit}: '
             'response_timeout has to be longer than its own'
         )
 
     def _ask_unheard(self, request: Request[object]) -> None:
         """Send a request and wait for its answer, whatever that is and says."""
         with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NoPath):
-            self._ask(request)
+            try:
+                self._exchange(request)
+            except OSError as error:
+                raise self._lost(error) from error
 
     def _understood(self, request: Request[_T], message: bytes) -> _T:
         try:
             answer = understand(request, message)
         except Refused as refusal:
             raise _of_gateway(request, refusal) from None
+        if answer is None and message[0] != request.unit:
+            raise GatewayFault(
+                f'the gateway answered as unit {message[0]} and not as unit {request.unit}, which '
+                'was asked: correct the table of units in the settings of the gateway, or `address`'
+            )
         if answer is None:
-            raise DamagedAnswer(f'unit {request.unit}: the gateway sent what is no answer')
+            raise GatewayFault(
+                f'unit {request.unit}: the gateway sent what is no answer: update or replace it, '
+                'and check `protocol`'
+            )
         return answer
 
-    def _receive(self, connection: socket.socket, until: float) -> bytes:
-        """Return what has come; nothing when the time is over."""
-        wait = max(0.0, until - time.monotonic())
-        try:
-            if not select.select((connection,), (), (), wait)[0]:
-                return b''
-            data = connection.recv(_READ_SIZE)
-        except OSError as error:
-            raise self._lost(error) from error
-        if not data:
-            raise self._lost('the gateway closed it')
-        return data
+    def _unreachable(self, error: OSError) -> PortError:
+        return PortError(f'{self._name} cannot be reached ({error}): {_HINT}')
 
-    def _connection(self) -> socket.socket:
-        if self._socket is None:
-            raise PortError(f'{self._name} is not connected')
-        return self._socket
-
-    def _lost(self, why: OSError | str) -> PortError:
-        return PortError(f'the connection to {self._name} was lost ({why}): {_HINT}')
+    def _lost(self, why: OSError) -> PortError:
+        hint = _CLOSED_HINT if isinstance(why, ConnectionError) else _HINT
+        return PortError(f'the connection to {self._name} was lost ({why}): {hint}')
 
 
 def _host_and_port(port: str) -> tuple[str, int]:

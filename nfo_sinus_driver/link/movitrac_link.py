@@ -31,6 +31,7 @@ from nfo_sinus_driver.link.interface import NeverSilent
 from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NothingToAsk
 from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.line_protocols import MOVITRAC
@@ -104,6 +105,7 @@ class MovitracLink:
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
+        self.remarks = Remarks()
         self._late: LateReplies[Request, Kind] = LateReplies(
             settings.response_timeout, movitrac.kinds
         )

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import logging
 
+from nfo_sinus_driver.link.interface import Connecting
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.interface import PortError
 
@@ -43,6 +44,9 @@ class Reconnect:
         """Try to open the link; if that fails, again at ``reopen_at``. Tells whether it is open."""
         try:
             self._link.open()
+        except Connecting:
+            # it is gone on with at once, but whoever has the link may do something else between
+            return False
         except PortError as error:
             self.mark_lost(error, reopen_at)
         except BaseException as error:

@@ -32,6 +32,7 @@ from nfo_sinus_driver.link.interface import NeverSilent
 from nfo_sinus_driver.link.interface import NoAnswer
 from nfo_sinus_driver.link.interface import NotReady
 from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Remarks
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import Doubt
 from nfo_sinus_driver.link.late_replies import LateReplies
@@ -83,6 +84,7 @@ class SerialLink(ModbusLink):
     def __init__(self, port: Port, settings: LineSettings) -> None:
         self._port = port
         self._settings = settings
+        self.remarks = Remarks()
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )

@@ -24,6 +24,7 @@ import serial
 
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.tcp_connection import watch_over
 
 _READ_SIZE = 512
 _CONNECT_HINT = 'is the device server switched on and its address right?'
@@ -57,6 +58,10 @@ class UrlPort:
             )
         except (OSError, ValueError) as error:
             raise PortError(f'{self._url} cannot be opened ({error}): {_CONNECT_HINT}') from error
+        connection = getattr(self._serial, '_socket', None)
+        if connection is not None:
+            # pyserial has no option for it
+            watch_over(connection)
 
     def close(self) -> None:
         """Disconnect; harmless when it is closed already."""

@@ -65,6 +65,7 @@ class BusNode(Node):
         AllDrives(self, self.bus_context)
         SetpointsForAll(self, self.bus_context)
         self._logged_port: str | None = ''
+        self._logged_remarks: set[str] = set()
         self._last_diagnosis: tuple[bytes, str] | None = None
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
@@ -101,9 +102,14 @@ class BusNode(Node):
             error,
             silent,
             self.bus_context.bus.protocol.check if nobody else '',
+            self.bus_context.bus.remarks,
         )
         self._diagnostics.publish(diagnostics.array(status, stamp))
         self._log_port(None if error is None else str(error))
+        for remark in self.bus_context.bus.remarks:
+            if remark not in self._logged_remarks:
+                self._logged_remarks.add(remark)
+                self.get_logger().warning(remark)
 
     def _log_port(self, error: str | None) -> None:
         """Say what the port does, on change."""

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 from builtin_interfaces.msg import Time
@@ -110,11 +111,13 @@ def bus_status(
     port_error: PortError | None,
     silent_drives: list[str],
     check: str,
+    remarks: Sequence[str],
 ) -> DiagnosticStatus:
     """
     Return how the line is doing.
 
     :param check: what to look at where no drive answers; ``''`` where one has.
+    :param remarks: what the link has noticed about the line.
     """
     if port_error is not None:
         level, message = DiagnosticStatus.ERROR, str(port_error)
@@ -122,6 +125,8 @@ def bus_status(
         level, message = DiagnosticStatus.ERROR, f'no response from {", ".join(silent_drives)}'
         if check:
             message += f': check in this order: {check}'
+    elif remarks:
+        level, message = DiagnosticStatus.WARN, remarks[-1]
     else:
         level, message = DiagnosticStatus.OK, 'all drives answer'
     values = {'port': port, **_figures(statistics)}

@@ -31,6 +31,7 @@ from support.addresses import register
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import Remarks
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.link import Supervision
 
@@ -69,6 +70,7 @@ class FakeLink:
     """
 
     protocol = PROTOCOLS['modbus_rtu']
+    remarks = Remarks()
     supervision: Supervision | None = None
 
     def __init__(self) -> None:

@@ -61,6 +61,7 @@ from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Remarks
 from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Refused as FarRefusal
@@ -206,6 +207,7 @@ class DirectLink(FaultyLine):
     """The line, without frames: what is asked is done at once, and the clock goes on."""
 
     protocol = PROTOCOLS['modbus_rtu']
+    remarks = Remarks()
     supervision = None
 
     def __init__(self, rig: Rig) -> None:

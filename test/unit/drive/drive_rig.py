@@ -146,6 +146,7 @@ class Tap:
         self.use_resync_reads = link.use_resync_reads
         self.identify = link.identify
         self.supervision = link.supervision
+        self.remarks = link.remarks
 
     def read(self, unit: int, address: Address) -> Reply:
         self.before(address.index, None)

@@ -28,6 +28,7 @@ from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Remarks
 from nfo_sinus_driver.link import Reply
 
 
@@ -35,6 +36,7 @@ class FarEnd:
     """The registers of a drive; it refuses what it does not have."""
 
     protocol = PROTOCOLS['modbus_rtu']
+    remarks = Remarks()
     supervision = None
 
     def __init__(self, registers: dict[int, int]) -> None:

@@ -41,7 +41,9 @@ from nfo_sinus_driver.link import NoPath
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
+from nfo_sinus_driver.link.tcp_connection import TcpConnection
 
 A = register(0x400)
 B = register(0x264)
@@ -373,6 +375,40 @@ def test_connection_closed_while_nobody_looked(gateway: Gateway, patient: TcpLin
         patient.read(1, A)
     with pytest.raises(PortError):
         patient.read(1, A)
+
+
+def test_tcp_itself_finds_out_that_an_idle_connection_is_gone(
+    gateway: Gateway, patient: TcpLink
+) -> None:
+    read(patient, A, gateway)
+    connection = patient._connection
+    assert isinstance(connection, TcpConnection) and connection._socket is not None
+    for level, option in (
+        (socket.SOL_SOCKET, socket.SO_KEEPALIVE),
+        (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT),
+    ):
+        assert connection._socket.getsockopt(level, option) > 0
+
+
+def test_words_that_let_a_motor_run_are_forgotten_with_a_mute_connection(
+    gateway: Gateway, hasty: TcpLink
+) -> None:
+    block = bytes.fromhex('0000 0000 0001 0003 0001')
+    gateway.reply = lambda frame: pack(
+        frame[0], frame[1][:2] + (bytes((10,)) + block if frame[1][1] != 16 else frame[1][2:6])
+    )
+    hasty._response_timeout = PATIENCE
+    for part in (telegram.BEGIN, telegram.NEXT):
+        place = Address(telegram.ADDRESSING, 100, part, 4)
+        hasty.write(1, place, packed(0x47F, 0))
+    assert gateway.requests[-1][1][1] == 23
+    # beside the mute one
+    hasty.open()
+    gateway.requests.clear()
+    with pytest.raises(Refused):
+        hasty.write(1, place._replace(sub_index=telegram.SETPOINT, size=2), packed(5))
+    hasty.read(1, place._replace(sub_index=telegram.STATUS))
+    assert {message[1] for _, message in gateway.requests} == {3}
 
 
 def test_somebody_else_answers(gateway: Gateway, patient: TcpLink) -> None:

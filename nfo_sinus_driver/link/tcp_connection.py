@@ -1,0 +1,133 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One connection to a gateway: begun, waited for in small steps, and watched over by TCP itself."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import struct
+import time
+from typing import Protocol
+
+#: How long bytes may stay unacknowledged before the connection counts as lost, s.
+_ACKNOWLEDGE_TIMEOUT = 5
+#: An idle connection is asked after so long, so often, and so many times, s: a gateway that has
+#: lost it says so, and one that is gone says nothing.
+_KEEPALIVE = {socket.TCP_KEEPIDLE: 2, socket.TCP_KEEPINTVL: 1, socket.TCP_KEEPCNT: 3}
+_READ_SIZE = 4096
+#: What a name leads to, while it leads somewhere: to look it up may take long.
+_known: dict[tuple[str, int], list[tuple[socket.AddressFamily, object]]] = {}
+
+
+class Connection(Protocol):
+    """A connection to a gateway; whatever fails raises an ``OSError``, which says why."""
+
+    def open(self) -> None:
+        """Begin to connect; do not wait for it."""
+
+    def connected(self, until: float) -> bool:
+        """Wait for the connection until a moment of ``time.monotonic``, s; tell whether it is."""
+
+    def write(self, data: bytes) -> None:
+        """Hand all bytes over."""
+
+    def read(self, until: float) -> bytes:
+        """
+        Return what has come, or nothing; wait for the first byte until a moment.
+
+        :raises ConnectionError: the gateway has closed it.
+        """
+
+    def close(self, *, discard: bool = False) -> None:
+        """Close it; ``discard``: what was handed over and has not arrived never shall."""
+
+
+class TcpConnection:
+    """A connection by a socket; of several addresses of a host, each attempt tries the next."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._where = host, port
+        self._socket: socket.socket | None = None
+        self._is_connected = False
+
+    def open(self) -> None:
+        """Begin to connect; only a name that leads nowhere yet is looked up, and waited for."""
+        if self._where not in _known:
+            found = socket.getaddrinfo(*self._where, type=socket.SOCK_STREAM)
+            _known[self._where] = [(family, address) for family, _, _, _, address in found]
+        family, address = _known[self._where][0]
+        self._socket = one = socket.socket(family, socket.SOCK_STREAM)
+        one.setblocking(False)
+        watch_over(one)
+        try:
+            one.connect(address)  # type: ignore[arg-type]  # as it was found
+        except BlockingIOError:
+            # it is on its way
+            return
+
+    def connected(self, until: float) -> bool:
+        """Wait for the connection until a moment; tell whether it is there."""
+        one = self._open_socket()
+        wait = max(0.0, until - time.monotonic())
+        if not self._is_connected and select.select((), (one,), (), wait)[1]:
+            error = one.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+            if error:
+                raise OSError(error, os.strerror(error))
+            self._is_connected = True
+        return self._is_connected
+
+    def write(self, data: bytes) -> None:
+        """Hand all bytes over: requests are small, and there is always room for one."""
+        self._open_socket().sendall(data)
+
+    def read(self, until: float) -> bytes:
+        """Return what has come, or nothing; wait for the first byte until a moment."""
+        one = self._open_socket()
+        wait = max(0.0, until - time.monotonic())
+        if not select.select((one,), (), (), wait)[0]:
+            return b''
+        data = one.recv(_READ_SIZE)
+        if not data:
+            raise ConnectionAbortedError('the gateway closed it')
+        return data
+
+    def close(self, *, discard: bool = False) -> None:
+        """Close it; harmless when it is closed already."""
+        one, self._socket = self._socket, None
+        if one is None:
+            return
+        if not self._is_connected and (known := _known.pop(self._where, None)) and known[1:]:
+            _known[self._where] = known[1:]
+        if discard:
+            # else the kernel would go on trying to deliver it
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
+        one.close()
+
+    def _open_socket(self) -> socket.socket:
+        if self._socket is None:
+            raise ConnectionError('it is not open')
+        return self._socket
+
+
+def watch_over(one: socket.socket) -> None:
+    """Let TCP find out by itself that a connection leads nowhere any more, and send at once."""
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option, value in _KEEPALIVE.items():
+        one.setsockopt(socket.IPPROTO_TCP, option, value)
+    milliseconds = 1000 * _ACKNOWLEDGE_TIMEOUT
+    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
+    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
