@@ -78,12 +78,13 @@ class AsciiReader(AnswerReader[_T]):
 
     @property
     def bytes_needed(self) -> int:
-        """How many characters have to come yet, at least, as far as those that came tell."""
+        """How many characters have to come yet, as far as those that came tell."""
         begun = self._begun()
         digits = begun[1] if begun else b''
         beginning = bytes.fromhex(digits[: len(digits) & ~1].decode())
-        come = len(begun[0]) if begun else 0
-        return max(1, length(self._request.measure(beginning)) - come)
+        if begun is None:
+            return length(self._request.measure(beginning))
+        return max(1, length(modbus_pdu.longest(self._request, beginning)) - len(begun[0]))
 
     @property
     def inter_byte_timeout(self) -> float:

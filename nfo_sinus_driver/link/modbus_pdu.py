@@ -213,6 +213,15 @@ def refusal_head(request: Request[object]) -> bytes:
     return bytes((request.unit, request.function | _EXCEPTION))
 
 
+def longest(request: Request[object], beginning: bytes) -> int:
+    """Return how many bytes an answer that begins like this may have: more than the least."""
+    if request.measure(b'') == request.answer_length:
+        return request.answer_length
+    # what does not follow from the beginning may be as much as there can be
+    unknown = b'\xff' * request.answer_length
+    return min(request.answer_length, request.measure(beginning + unknown))
+
+
 def understand(request: Request[_T], message: bytes) -> _T | None:
     """
     Return what a whole message says as the answer to a request; ``None``: to something else.
@@ -260,7 +269,12 @@ class AnswerReader(ABC, Generic[_T]):
     @property
     @abstractmethod
     def bytes_needed(self) -> int:
-        """How many bytes have to come yet, at least, as far as those that came tell."""
+        """
+        How many bytes have to come yet, as far as those that came tell.
+
+        At least, while no answer has begun; then what may come: the port may hand over all of a
+        long answer at once, and one that is still coming is not late.
+        """
 
     @property
     @abstractmethod

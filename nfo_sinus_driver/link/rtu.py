@@ -67,10 +67,21 @@ class RtuReader(AnswerReader[_T]):
 
     @property
     def bytes_needed(self) -> int:
-        """How many bytes have to come yet, at least, as far as those that came tell."""
-        begun = max(0, self._buffer.find(self._head))
-        length = self._request.measure(self._buffer[begun:]) + CRC_LENGTH
-        return max(1, length - len(self._buffer))
+        """How many bytes have to come yet, as far as those that came tell."""
+        begun = self._begun()
+        if begun is None:
+            length = self._request.measure(self._buffer)
+            return max(1, length + CRC_LENGTH - len(self._buffer))
+        length = modbus_pdu.longest(self._request, self._buffer[begun:]) + CRC_LENGTH
+        return max(1, length - len(self._buffer) + begun)
+
+    def _begun(self) -> int | None:
+        """Return where an answer has begun; ``None``: nowhere yet."""
+        buffer, head = self._buffer, self._head
+        if (start := buffer.find(head)) >= 0:
+            return start
+        ends = range(min(len(head), len(buffer)), 0, -1)
+        return next((len(buffer) - n for n in ends if buffer.endswith(head[:n])), None)
 
     def _messages(self) -> Iterator[tuple[int, int, bytes]]:
         buffer = self._buffer

@@ -26,6 +26,7 @@ from support.variants import hardest
 from support.variants import ramps
 
 from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link.protocols import _link_class
@@ -34,6 +35,9 @@ from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 
 _NEVER = float('inf')
+for _protocol in PROTOCOLS.values():
+    # loaded before a rig lets all modules of the driver see its clock
+    _link_class(_protocol)
 
 
 class MemoryPort:
@@ -79,16 +83,20 @@ class MemoryPort:
         self.line.receive(data, self._rig.clock.now)
 
     def read(self, until: float) -> bytes:
-        clock = self._rig.clock
         self._catch_up()
         while not self._come and (due := self._due) <= until:
-            self._rig.elapse(max(0.0, due - clock.now))
-            self._catch_up()
+            self._go_to(due)
         if not self._come:
-            self._rig.elapse(max(0.0, until - clock.now))
-            self._catch_up()
+            self._go_to(until)
         data, self._come = self._come, b''
         return data
+
+    def _go_to(self, moment: float) -> None:
+        clock = self._rig.clock
+        # exactly: what is due then is done
+        clock.now = max(clock.now, moment)
+        self._rig.elapse(0.0)
+        self._catch_up()
 
     @property
     def _due(self) -> float:
