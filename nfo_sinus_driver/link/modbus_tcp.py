@@ -394,12 +394,12 @@ class TcpLink(ModbusLink):
         if answer is None and message[0] != request.unit:
             raise GatewayFault(
                 f'the gateway answered as unit {message[0]} and not as unit {request.unit}, which '
-                'was asked: correct the table of units in the settings of the gateway, or `address`'
+                'was asked: correct the table of units in the settings of the gateway, or address'
             )
         if answer is None:
             raise GatewayFault(
                 f'unit {request.unit}: the gateway sent what is no answer: update or replace it, '
-                'and check `protocol`'
+                'and check protocol'
             )
         return answer
 
