@@ -180,7 +180,7 @@ class TcpLink(ModbusLink):
         if self._begun is None:
             self._begin()
         if not self._go_on(time.monotonic() + _SLICE):
-            raise Connecting(f'{self._name} is being connected to')
+            raise Connecting
 
     def close(self) -> None:
         """Close the connection; harmless when it is closed already."""
