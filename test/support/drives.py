@@ -308,7 +308,7 @@ DRIVES = {
         coasts=False,
     ),
     'sinus_optimal telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0, coasts=False),
-    'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x2009, control=1 << 14, nominal=150.0),
+    'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0),
     # its ramps are set at its keypad alone
     'sinus_h': BehindPlc(
         **{

@@ -178,6 +178,10 @@ def test_each_word_stands_until_the_drive_has_had_it(model: str) -> None:
 
         rig.channel.exchange = noted  # type: ignore[method-assign]
         rig.turn()
+        for _ in range(2):
+            rig.answer(rig.drive.stop())
+            rig.pass_time(1.0)
+            rig.turn()
         rig.answer(rig.drive.stop())
         rig.far.trip(12)
         rig.pass_time(1.0)
