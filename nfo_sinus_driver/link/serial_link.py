@@ -54,6 +54,11 @@ from nfo_sinus_driver.link.silence import await_silence
 
 _T = TypeVar('_T')
 
+_FIRST_BYTE_LOST = (
+    'the first byte of the answer is missing: the RS-485 adapter switches from sending to receiving '
+    'too late; use one that switches by itself, or try rs485 true where the port switches'
+)
+
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
 #: How long a write waits at least for a line that is not silent, s.
@@ -358,10 +363,17 @@ class SerialLink(ModbusLink):
             # had there been another answer to come, it would be here, too
             raise refusals[0]
         if held or (came and reader.other != frame):
+            if self._lacks_first_byte(request, frame, reader.other + held):
+                raise DamagedAnswer(f'unit {request.unit}: {_FIRST_BYTE_LOST}')
             raise DamagedAnswer(
                 f'unit {request.unit}: {came + len(held)} bytes came that are no answer'
             )
         raise NoAnswer(f'unit {request.unit} did not answer')
+
+
+    def _lacks_first_byte(self, request: Request[_T], frame: bytes, came: bytes) -> bool:
+        """Tell whether what came is the answer without its first byte, which is the request's."""
+        return _feed(self._reader(request), frame[:1] + came, []) is not None
 
 
 def _feed(reader: AnswerReader[_T], data: bytes, refusals: list[Refused] | None) -> _T | None:

@@ -92,6 +92,13 @@ def test_frame_may_pause_as_long_as_it_may_take_to_begin(cuts: list[int]) -> Non
     assert bench.read(A).data == packed(77)
 
 
+def test_an_answer_without_its_first_character_is_said_to_be_that() -> None:
+    bench = Bench()
+    in_parts(bench, opinion.ascii_frame(b'\x01\x03\x02\x00\x4d')[1:], [], 0.0)
+    error = bench.expect(DamagedAnswer, lambda: bench.read(A))
+    assert 'adapter switches from sending to receiving too late' in str(error)
+
+
 def test_frame_may_pause_for_a_second_at_most() -> None:
     for pause, whole in ((0.95, True), (1.1, False)):
         bench = Bench(settings=LineSettings(char_format='7E1', response_timeout=2.0))

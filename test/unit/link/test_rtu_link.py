@@ -153,6 +153,18 @@ def test_answer_that_stops_in_the_middle(cut: int) -> None:
     assert bench.wire.now - bench.wire.sent[0][0] < 2 * TIMEOUT
 
 
+@pytest.mark.parametrize('values', [[77], [1, 2]])
+def test_an_answer_without_its_first_byte_is_said_to_be_that(values: list[int]) -> None:
+    bench = Bench()
+
+    def far_end(request: bytes, end: float) -> None:
+        bench.wire.arrive(end, opinion.read_answer(UNIT, values)[1:])
+
+    bench.wire.far_end = far_end
+    error = bench.expect(DamagedAnswer, lambda: bench.read(A if len(values) == 1 else C))
+    assert 'adapter switches from sending to receiving too late' in str(error)
+
+
 def test_damaged_answer() -> None:
     bench = Bench([Fate(what='damage')])
     assert bench.expect(DamagedAnswer, lambda: bench.read(A)).maybe_done
