@@ -40,6 +40,7 @@ from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.demo.record import why_missing
 from nfo_sinus_driver.demo.recording import Recorder
 from nfo_sinus_driver.demo.recording import RecordingError
+from nfo_sinus_driver.demo.recording import replay_warning
 from nfo_sinus_driver.demo.sequence import HEADING
 from nfo_sinus_driver.demo.sequence import PATIENCE
 from nfo_sinus_driver.demo.sequence import DemoSequence
@@ -89,7 +90,7 @@ def main() -> int:
             return _INTERRUPTED
     print('The ride is done: every step happened.')
     if bag:
-        print(f'Its bag, for `ros2 bag play` and the like: {bag}')
+        print(f'Its bag: {bag}; {replay_warning("/nfo_sinus")}')
     if not missing:
         from nfo_sinus_driver.demo import plot
 

@@ -42,6 +42,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from nfo_sinus_driver.demo.recording import Recorder
 from nfo_sinus_driver.demo.recording import RecordingError
+from nfo_sinus_driver.demo.recording import replay_warning
 from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
@@ -80,7 +81,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         # before there was anything to be kept
         return 130
-    print(f'record: the bag is {bag}')
+    print(f'record: the bag is {bag}; {replay_warning(options.drive)}')
     if missing:
         print(f'record: no picture: {missing["matplotlib"]}', file=sys.stderr)
         return 0

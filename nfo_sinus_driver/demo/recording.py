@@ -77,6 +77,14 @@ def topics_of(drive: str) -> Iterator[tuple[str, type, QoSProfile]]:
     yield '/rosout', Log, _ROSOUT
 
 
+def replay_warning(drive: str) -> str:
+    """Return what an operator must know before a bag of this drive is played."""
+    return (
+        f'`ros2 bag play` publishes {drive}/setpoint, and an enabled drive follows it: play the '
+        f'bag in another ROS_DOMAIN_ID, or with `--exclude-topics {drive}/setpoint`'
+    )
+
+
 class RecordingError(Exception):
     """What was to be recorded was not."""
 

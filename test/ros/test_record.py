@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
 import signal
 import struct
 import subprocess
@@ -30,6 +31,7 @@ from bench import wait_until
 from ways import needs
 
 from nfo_sinus_driver.demo import bag as bags
+from nfo_sinus_driver.demo.recording import topics_of
 
 _RECORD = (sys.executable, '-m', 'nfo_sinus_driver.demo.record')
 _PLOT = (
@@ -88,6 +90,13 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert 'Traceback' not in recorder.text
     assert recorder.text.count('is heard') == 1
     assert _is_picture(picture)
+    # `ros2 bag play` of it must not command the drive: what the driver obeys is named
+    obeyed = client.node.get_subscriber_names_and_types_by_node('infeed', '/line1')
+    excluded = re.search(r'--exclude-topics (\S+)`', recorder.text)
+    assert excluded is not None, recorder.text
+    recorded = {topic for topic, _, _ in topics_of(_DRIVE)}
+    assert {excluded.group(1)} == recorded & {name for name, _ in obeyed}
+    assert 'another ROS_DOMAIN_ID' in recorder.text
 
     ride = bags.read(bag, bags.only_drive(bag))
     assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
