@@ -29,6 +29,7 @@ from bench import Client
 from bench import wait_until
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
+from support.aggregator import Aggregator
 from support.sros2_policy import Policy
 from support.sros2_policy import allowed
 from ways import Way
@@ -160,48 +161,22 @@ def _statuses(client: Client) -> set[str]:
     return {one.name for message in client.messages['diagnostics'] for one in message.status}
 
 
-def _groups(analyzers: dict[str, Any], status: str) -> set[str]:
-    """The groups that a status is shown in, as diagnostic_aggregator finds them."""
-    found = set()
-    for analyzer in analyzers.values():
-        if not isinstance(analyzer, dict):
-            continue
-        if 'analyzers' in analyzer:
-            nested = _groups(analyzer['analyzers'], status)
-            found |= {f'{analyzer["path"]}/{name}' for name in nested}
-        elif status in analyzer.get('expected', ()) or any(
-            re.fullmatch(regex, status) for regex in analyzer.get('regex', ())
-        ):
-            found.add(analyzer['path'])
-    return found
-
-
-def _expected(analyzers: dict[str, Any]) -> set[str]:
-    """All that is expected by its full name."""
-    found = set()
-    for analyzer in analyzers.values():
-        if isinstance(analyzer, dict):
-            found |= {*analyzer.get('expected', ()), *_expected(analyzer.get('analyzers', {}))}
-    return found
-
-
 def test_diagnostics_are_grouped_by_bus_and_by_drive(client: Client) -> None:
-    file = yaml.safe_load((CONFIG / 'diagnostic_aggregator.yaml').read_text())
-    analyzers = file['analyzers']['ros__parameters']
+    aggregator = Aggregator(CONFIG / 'diagnostic_aggregator.yaml')
     assert _statuses(client) == {'nfo_sinus_bus: line', 'nfo_sinus: drive'}
     for prefix in ('', 'line1/'):
-        assert _groups(analyzers, f'{prefix}nfo_sinus_bus: line') >= {'Lines'}
-        assert _groups(analyzers, f'{prefix}nfo_sinus: drive') == {'Drives'}
+        assert aggregator.groups(f'{prefix}nfo_sinus_bus: line') >= {'Lines'}
+        assert aggregator.groups(f'{prefix}nfo_sinus: drive') == {'Drives'}
     # the bus with its drives is that of conveyor.yaml, by the names that the driver gives them
     conveyor = yaml.safe_load((CONFIG / 'conveyor.yaml').read_text())
     drives = conveyor['/**/nfo_sinus_bus']['ros__parameters']['drives']
     (bus,) = (name for name in _statuses(client) if name.startswith('nfo_sinus_bus'))
     (one,) = _statuses(client) - {bus}
     named = {drive: one.replace('nfo_sinus', drive) for drive in drives}
-    assert _expected(analyzers) == {bus, *named.values()}
-    assert _groups(analyzers, bus) == {'Lines', 'Conveyor/line'}
+    assert aggregator.expected() == {bus, *named.values()}
+    assert aggregator.groups(bus) == {'Lines', 'Conveyor/line'}
     for drive, status in named.items():
-        assert _groups(analyzers, status) == {'Drives', f'Conveyor/{drive}'}
+        assert aggregator.groups(status) == {'Drives', f'Conveyor/{drive}'}
 
 
 # --- SROS 2 ---------------------------------------------------------------------------------------

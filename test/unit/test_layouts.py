@@ -22,7 +22,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-import yaml
+from support.aggregator import ERROR
+from support.aggregator import OK
+from support.aggregator import WARN
+from support.aggregator import Aggregator
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
 FOXGLOVE = CONFIG / 'foxglove.json'
@@ -91,29 +94,13 @@ def test_plotjuggler_layout_is_whole() -> None:
     assert topics == set(selected.attrib['value'].split(';'))
 
 
-def test_aggregator_groups_have_what_an_analyzer_needs() -> None:
-    file = yaml.safe_load((CONFIG / 'diagnostic_aggregator.yaml').read_text())
-    # the name of the node that reads them
-    assert list(file) == ['analyzers']
-    found = dict(analyzers_of(file['analyzers']['ros__parameters']))
-    assert {'lines', 'drives'} < set(found)
-    for name, analyzer in found.items():
-        assert analyzer['path'], name
-        if analyzer['type'] == 'diagnostic_aggregator/GenericAnalyzer':
-            (how,) = {'regex', 'expected'} & set(analyzer)
-            # the reader takes lists and doubles, and no number of another type
-            assert isinstance(analyzer[how], list), name
-            assert isinstance(analyzer['timeout'], float), name
-        else:
-            assert analyzer['type'] == 'diagnostic_aggregator/AnalyzerGroup', name
-            assert analyzer['analyzers'], name
-
-
-def analyzers_of(group: dict[str, object]) -> Iterator[tuple[str, dict[str, object]]]:
-    """Every analyzer of a group and of the groups in it."""
-    for name, value in group.items():
-        if isinstance(value, dict) and 'type' in value:
-            yield name, value
-            nested = value.get('analyzers')
-            if isinstance(nested, dict):
-                yield from analyzers_of(nested)
+def test_top_level_of_the_diagnostics_is_ok_while_all_is_well() -> None:
+    aggregator = Aggregator(CONFIG / 'diagnostic_aggregator.yaml')
+    assert not aggregator.refused()
+    # the statuses are those of conveyor.yaml, as test/ros/test_config_names.py finds
+    well = dict.fromkeys(aggregator.expected(), OK)
+    assert len(well) == 4
+    assert aggregator.level(well) == OK
+    for name in well:
+        assert aggregator.level({**well, name: WARN}) == WARN
+        assert aggregator.level({other: OK for other in well if other != name}) == ERROR, name
