@@ -55,8 +55,8 @@ from nfo_sinus_driver.link.silence import await_silence
 _T = TypeVar('_T')
 
 _FIRST_BYTE_LOST = (
-    'the first byte of the answer is missing: the RS-485 adapter switches from sending to receiving '
-    'too late; use one that switches by itself, or try rs485 true where the port switches'
+    'the first byte of the answer is missing: the RS-485 adapter switches from sending to '
+    'receiving too late; use one that switches by itself, or try rs485 true where the port switches'
 )
 
 #: How many of the longest pauses within an answer there may be.
