@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 import enum
 from fractions import Fraction
 import functools
@@ -183,6 +184,12 @@ class Parameter:
     def factor(self, protocol: str) -> Fraction:
         """Return the value of one raw count over ``protocol``, in :attr:`unit`."""
         return self.at(protocol).factor
+
+    def rescaled(self, protocol: str, factor: Fraction) -> Parameter:
+        """Return the same with another factor over ``protocol``: so many times as great."""
+        address = self.at(protocol)
+        address = replace(address, factor=address.factor * factor)
+        return replace(self, addresses={**self.addresses, protocol: address})
 
     def decode(self, data: bytes, protocol: str = 'modbus') -> Value:
         """

@@ -32,6 +32,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
 import enum
+from fractions import Fraction
 import math
 from typing import Any
 from typing import ClassVar
@@ -470,12 +471,14 @@ class OlderDialect:
     :ivar name: the dialect, as a person chooses it.
     :ivar before: the first firmware that is not of it.
     :ivar harmless: while one of these has control, asking for what it does not know does no harm.
+    :ivar factors: by what the factor of a parameter is multiplied there, by its key.
     """
 
     protocol: str
     name: str
     before: float
     harmless: frozenset[Holder]
+    factors: Mapping[str, Fraction] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

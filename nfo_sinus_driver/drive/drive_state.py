@@ -418,7 +418,7 @@ class DriveState:
         await self.registers.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
-        self._older = dialect is not None and self.settings.classic_dialect == dialect.name
+        self._be_older(dialect is not None and self.settings.classic_dialect == dialect.name)
         firmware_key = self.model.key(Role.FIRMWARE)
         if self._older or not self.registers.reaches(firmware_key):
             self.identity = Identity()
@@ -434,7 +434,7 @@ class DriveState:
                     dialect=dialect.name,
                 )
             else:
-                self._older = was_older
+                self._be_older(was_older)
             return self.identity or Identity()
         try:
             firmware = await self.registers.read_number(firmware_key, Priority.SERVICE)
@@ -443,12 +443,18 @@ class DriveState:
         except Refused:
             if dialect is None or self.settings.classic_dialect:
                 raise
-            self._older = True
+            self._be_older(True)
             self.identity = Identity()
         else:
-            self._older = dialect is not None and firmware < dialect.before
+            self._be_older(dialect is not None and firmware < dialect.before)
             self.identity = Identity(firmware, int(motor))
         return self.identity
+
+    def _be_older(self, older: bool) -> None:
+        """Take the firmware for one of the older dialect, or not."""
+        self._older = older
+        dialect = self._dialect
+        self.registers.rescale(dialect.factors if older and dialect is not None else {})
 
     @property
     def _dialect(self) -> OlderDialect | None:

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping
 from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.catalog.profile import Write
@@ -79,6 +81,8 @@ class ParameterAccess:
         #: What it has refused because no option card for it is there, each time in a row.
         self._denials: dict[str, list[Refused]] = {}
         self._addresses: dict[str, Address] = {}
+        #: Those that have another factor in this drive than in the tables.
+        self._rescaled: dict[str, Parameter] = {}
         #: How parameters are addressed on this line.
         self.protocol = addressing or bus.protocol.addressing
         #: They stand in the registers of a PLC.
@@ -94,6 +98,17 @@ class ParameterAccess:
             self._addresses[key] = address._replace(index=address.index + self._block_address)
         return self._addresses[key]
 
+    def rescale(self, factors: Mapping[str, Fraction]) -> None:
+        """Take what the factors of parameters are multiplied by in this drive, by key."""
+        self._rescaled = {
+            key: self.model[key].rescaled(self.protocol, factor)
+            for key, factor in factors.items()
+            if factor != 1 and self.reaches(key)
+        }
+
+    def _parameter(self, key: str) -> Parameter:
+        return self._rescaled.get(key) or self.model[key]
+
     @property
     def writes_and_reads(self) -> bool:
         """The drive has a function that writes one parameter and reads another, on this line."""
@@ -101,7 +116,7 @@ class ParameterAccess:
 
     def encode(self, key: str, value: Value) -> bytes:
         """Return the bytes to write for a value."""
-        parameter = self.model[key]
+        parameter = self._parameter(key)
         if parameter.never_negative and not isinstance(value, str) and value < 0:
             raise ValueError(f'{key}: {value:g} is out of range, at least 0 {parameter.unit}')
         highest = self._highest(key)
@@ -113,12 +128,12 @@ class ParameterAccess:
         """Return where a step of a profile is written, and what: a float as the nearest step."""
         address = self.address(step.at if self.reaches(step.at) else step.key)
         if isinstance(step.value, float):
-            return address, self.model[step.key].quantise(step.value, self.protocol)
+            return address, self._parameter(step.key).quantise(step.value, self.protocol)
         return address, self.encode(step.key, step.value)
 
     def value(self, key: str, data: bytes) -> Value:
         """Return what the drive means by bytes."""
-        return self.model[key].decode(data, self.protocol)
+        return self._parameter(key).decode(data, self.protocol)
 
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
@@ -126,7 +141,7 @@ class ParameterAccess:
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""
-        parameter = self.model[key]
+        parameter = self._parameter(key)
         low, high = parameter.span(self.protocol)
         low = max(low, Fraction(0)) if parameter.never_negative else low
         high = self._highest(key) or high

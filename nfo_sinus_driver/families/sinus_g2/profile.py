@@ -24,6 +24,7 @@ from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
 import contextlib
+from fractions import Fraction
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.parameter import Value
@@ -492,7 +493,12 @@ PROFILE = Profile(
     # the v5.0 dialect [M2]; from 4.28 on [M0] describes the protocol [C3]. There an unknown
     # parameter is a serial fault, by which it stops while the bus has control [C21]
     older=OlderDialect(
-        'classic', 'v5.0', before=4.28, harmless=frozenset((Holder.NOBODY, Holder.LOCAL))
+        'classic',
+        'v5.0',
+        before=4.28,
+        harmless=frozenset((Holder.NOBODY, Holder.LOCAL)),
+        # one decimal [C115]
+        factors={'status.trq_act': Fraction(1, 10)},
     ),
     most=MOST,
     # before it code 1 is another format ([C3], [C5])

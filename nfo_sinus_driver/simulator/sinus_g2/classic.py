@@ -80,6 +80,7 @@ class Server(classic.Server):
             raw = self._read(parameter.key)
         except Refused as refused:
             raise Wrong(_FLAGS[refused.reason]) from refused
+        raw *= 10 if parameter.key in self._firmware.tenths else 1
         if parameter.key in _COUNTERS:
             # nobody says whether the drive has more than the 24 bits that count [C26]
             high = 0xFF if self._firmware.short_counters else 0xFFFF

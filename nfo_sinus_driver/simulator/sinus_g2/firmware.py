@@ -49,6 +49,7 @@ class Firmware:
     :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
     :ivar bus_only: nothing but MODE is written while the bus has no control [C100].
     :ivar own_bus_codes: control over a fieldbus has InvSt codes of its own, four higher [C3].
+    :ivar tenths: values that it tells with a decimal more on Classic [C115].
     :ivar lacks: parameters that it does not have on Classic [C21].
     :ivar codes: enumerations of which it has these codes only.
     """
@@ -67,6 +68,7 @@ class Firmware:
     lower_case: bool = False
     bus_only: bool = False
     own_bus_codes: bool = False
+    tenths: frozenset[str] = frozenset()
     lacks: frozenset[str] = frozenset()
     codes: Mapping[str, frozenset[int]] = field(default_factory=dict)
 
@@ -91,6 +93,7 @@ OLD = Firmware(
     lower_case=True,
     bus_only=True,
     own_bus_codes=True,
+    tenths=frozenset({'status.trq_act'}),
     lacks=frozenset(
         {
             'control.f_sleep',

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from drive_rig import MODEST
 from drive_rig import PATIENCE
@@ -62,6 +63,24 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
             assert not notes.told(Cause.RUNS_UNASKED)
             assert not notes.told(Cause.CANNOT_STOP)
             assert not drive.stop_unconfirmed
+        finally:
+            bus.close()
+
+
+@pytest.mark.parametrize(
+    ('dialect', 'chosen'), [('5.0', 'v5.0'), ('5.0', ''), ('2.03', 'v2.03'), ('2.03', '')]
+)
+def test_torque_has_the_decimals_of_its_firmware(dialect: str, chosen: str) -> None:
+    # one decimal on firmware of the v5.0 dialect, none on others [C115]
+    line = line_settings('classic', response_timeout=2.0)
+    with Simulator(protocol='classic', dialect=dialect, boot_time=0.2) as far:
+        far.drives[1].motor.torque = 0.6
+        bus = Bus(open_link('classic', far.port, line))
+        drive = Drive(bus, replace(SETTINGS, classic_dialect=chosen), Notes())
+        bus.start()
+        try:
+            drive.connect().result(PATIENCE)
+            assert drive.measure('status.trq_act').result(PATIENCE) == 60.0
         finally:
             bus.close()
 
