@@ -269,6 +269,9 @@ class Role(_LookedUp):
     NOMINAL_VOLTAGE = 'nominal_voltage'
     NOMINAL_FREQUENCY = 'nominal_frequency'
     NOMINAL_SPEED = 'nominal_speed'
+    #: By numerator over denominator the values are multiplied that have the scale of the speed.
+    SPEED_SCALE_NUMERATOR = 'speed_scale_numerator'
+    SPEED_SCALE_DENOMINATOR = 'speed_scale_denominator'
     #: Of the motor; where it is missing, nominal frequency and speed tell it.
     POLE_PAIRS = 'pole_pairs'
     NOMINAL_CURRENT = 'nominal_current'

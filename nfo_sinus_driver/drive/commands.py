@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 from collections.abc import Callable
+from dataclasses import replace
 import math
 import time
 from typing import Any
@@ -162,7 +163,12 @@ async def read_limits(inverter: DriveState, control_mode: str) -> profile.Limits
     if target is None:
         return profile.Limits()
     steps = target.read_limits(inverter.has, older=inverter.settings_need_control)
-    return await carry_out(steps, inverter.registers, Priority.SERVICE)
+    limits = await carry_out(steps, inverter.registers, Priority.SERVICE)
+    if not inverter.registers.is_rescaled(target.key):
+        return limits
+    # with another scale a word may not carry all that the drive takes
+    least, most, _ = inverter.registers.limits(target.key)
+    return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
 
 async def _store(

@@ -331,6 +331,7 @@ class Drive:
     async def identify(self, *, thoroughly: bool = True) -> Identity:
         """Find out who answers, thoroughly with model and serial number; what runs runs on."""
         identity = await self.inverter.identify()
+        await self.inverter.scales.read()
         return await self.inverter.introduce() if thoroughly else identity
 
     @on_bus
@@ -428,6 +429,7 @@ class Drive:
             raise DriveError(
                 Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
             ) from error
+        await self._read_scales()
         await inverter.read_control_mode()
         await inverter.timeout.read()
         inverter.require_fresh(await inverter.look(Priority.SERVICE))
@@ -452,6 +454,11 @@ class Drive:
         if self._controller is None and held:
             inverter.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
+
+    async def _read_scales(self) -> None:
+        scales = self.inverter.scales
+        if await scales.read():
+            self.inverter.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(scales.speed))
 
     def _set_disconnected(self) -> None:
         self.inverter.lost()

@@ -44,6 +44,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.drive.events import Severity
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.drive.scales import Scales
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 from nfo_sinus_driver.drive.snapshot import Listener
@@ -116,6 +117,7 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
+        self.scales = Scales(self.registers, self.has)
         #: What it does by itself when it hears nothing.
         self.timeout = CommunicationTimeout(self.registers, self.model, self.has)
 
@@ -454,7 +456,7 @@ class DriveState:
         """Take the firmware for one of the older dialect, or not."""
         self._older = older
         dialect = self._dialect
-        self.registers.rescale(dialect.factors if older and dialect is not None else {})
+        self.scales.use_dialect(dialect.factors if older and dialect is not None else {})
 
     @property
     def _dialect(self) -> OlderDialect | None:

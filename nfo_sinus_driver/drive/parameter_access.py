@@ -98,6 +98,10 @@ class ParameterAccess:
             self._addresses[key] = address._replace(index=address.index + self._block_address)
         return self._addresses[key]
 
+    def is_rescaled(self, key: str) -> bool:
+        """Tell whether a parameter has another factor in this drive than in the tables."""
+        return key in self._rescaled
+
     def rescale(self, factors: Mapping[str, Fraction]) -> None:
         """Take what the factors of parameters are multiplied by in this drive, by key."""
         self._rescaled = {

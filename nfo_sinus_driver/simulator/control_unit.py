@@ -26,6 +26,7 @@ from collections.abc import Sequence
 from typing import Any
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.motor import Counters
@@ -80,6 +81,10 @@ class ControlUnit(abc.ABC):
     def read(self, key: str) -> int | None:
         """Return what reading has an effect for, having it; else ``None``."""
         return None
+
+    def scaled(self, parameter: Parameter) -> Parameter:
+        """Return a parameter with the scale that this drive is set to."""
+        return parameter
 
     def key_of(self, key: str) -> str:
         """Return which parameter is meant: there may be one for the set-points of all modes."""

@@ -147,7 +147,7 @@ class SimulatedDrive:
         parameter = self.memory.model[key]
         if parameter.access not in (Access.WRITE, Access.READ_WRITE):
             raise Refused(Reason.ADDRESS, f'{key} cannot be written')
-        Memory.check(parameter, raw)
+        Memory.check(self.control_unit.scaled(parameter), raw)
         if not self.control_unit.write(key, raw):
             self.control_unit.admit(key)
             if parameter.stopped and (self.motor.driven or self.motor.turning):

@@ -256,6 +256,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.PROCEDURE_STOPPED: '{what} was stopped',
     Cause.PROCEDURE_NOT_BEGUN: '{what} was stopped before it began',
     Cause.INTERRUPTED: '{signal}: not begun',
+    Cause.SPEED_SCALE: 'the drive multiplies the speeds of the bus by {scale}: the driver takes '
+    'that into account, and set-points and values are in rpm',
     Cause.TUNING_BEGINS: '{what} begins: the motor is energised',
     Cause.TUNING_NEEDS: '{what} needs {key}: set it as the motor plate says',
     Cause.TUNED: '{what} finished ({status})',

@@ -76,8 +76,8 @@ HISTORIES = (
         2,
         'in any order: a driver that begins lets run what runs',
         CONTROLLER,
-        '        if await self.method.in_control(Priority.SERVICE):\n            if seen',
-        '        self._since = float("inf")\n        if False:\n            if seen',
+        '        if await self.method.in_control(Priority.SERVICE):\n            turns',
+        '        self._since = float("inf")\n        if False:\n            turns',
         G2_CONTROL,
         # a poll would find it, too
         ((CONTROLLER, '            reason = Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),

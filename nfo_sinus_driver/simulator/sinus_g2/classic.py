@@ -148,8 +148,10 @@ class Server(classic.Server):
         raw = drive.read_raw(key)
         key = self._unit.key_of(key)
         parameter, role = drive.model[key], drive.model.role_of.get(key)
-        # what is measured may be finer here than in the memory
-        shown = measure(role, parameter, 'classic', drive.motor, drive.counters)
+        # what is measured may be finer here than in the memory, but for what the unit shows itself
+        shown = None
+        if self._unit.show(key) is None:
+            shown = measure(role, parameter, 'classic', drive.motor, drive.counters)
         return carried(parameter, raw, 'classic') if shown is None else shown
 
     def _understood(self, raw: int) -> int:

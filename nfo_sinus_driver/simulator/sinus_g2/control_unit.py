@@ -21,10 +21,12 @@ Commands become control words, and the state of the generic state machine orders
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -254,6 +256,9 @@ class G2ControlUnit(SinusControlUnit):
             return self.memory.raw(self.setpoint_key)
         if key == 'fieldbus.profidrive_status':
             return int(self.status_word)
+        if key == 'status.spd_act':
+            parameter = self.memory.model[key]
+            return nearest(parameter, self.motor.speed / self._speed_scale, home(parameter))
         return super().show(key)
 
     def command(self, scmd: Scmd) -> None:
@@ -348,12 +353,25 @@ class G2ControlUnit(SinusControlUnit):
         key, motor = self.setpoint_key, self.motor
         values = {
             'status.frq_set': motor.frequency,
-            'status.spd_set': motor.speed,
+            'status.spd_set': motor.speed / self._speed_scale,
             'status.trq_set': 100 * motor.torque,
             'status.reg_set': 100 * abs(motor.frequency) / motor.plate.frequency,
         }
         parameter = self.memory.model[key]
         return nearest(parameter, values[key], home(parameter))
+
+    def scaled(self, parameter: Parameter) -> Parameter:
+        """Return a parameter with SpdScl, where it is a speed."""
+        if parameter.scale != 'SpdScl' or self._speed_scale == 1:
+            return parameter
+        return parameter.rescaled(home(parameter), Fraction(self._speed_scale))
+
+    @property
+    def _speed_scale(self) -> float:
+        """SpdScl: what comes over a bus times this is a speed [M0 §8.3.2]."""
+        above = self.memory.number('fieldbus.spd_scl_numerator')
+        below = self.memory.number('fieldbus.spd_scl_denominator')
+        return above / below if above > 0 and below > 0 else 1.0
 
     def _take_setpoint(self, setpoint: int) -> None:
         self.memory.put(self.setpoint_key, setpoint)
@@ -462,7 +480,7 @@ class G2ControlUnit(SinusControlUnit):
         setpoint = self.memory.number(self.setpoint_key)
         scale = {
             'status.frq_set': 1.0,
-            'status.spd_set': self.motor.plate.pole_pairs / 60,
+            'status.spd_set': self._speed_scale * self.motor.plate.pole_pairs / 60,
             'status.trq_set': 0.01,
             'status.reg_set': frequency / 100,
         }

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+import math
+from types import SimpleNamespace
 from typing import Any
 from typing import cast
 
@@ -74,7 +76,9 @@ class Noted:
         self._next('acknowledge and write', key, step)
 
     async def reached(self, condition: Callable[[Any], bool]) -> None:
-        self._next('until', condition('status'))
+        # a status from before the last write fulfils nothing
+        assert not condition(SimpleNamespace(at=-1.0, word=1))
+        self._next('until', condition(SimpleNamespace(at=math.inf, word=1)))
 
 
 def carried_out(noted: Noted, steps: Steps[Any], priority: Priority = Priority.SERVICE) -> Any:
@@ -89,7 +93,7 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
         yield Write('b', first)
         flags = yield Acknowledge('c')
         yield AcknowledgeThenWrite('c', Write('b', 0))
-        yield Until(lambda status: status == 'status')
+        yield Until(lambda status: status.word == 1)
         return int(first + flags)
 
     noted = Noted(3, None, 4, None, None)

@@ -144,7 +144,6 @@ def follow(rig: Rig, mode: str, value: float) -> None:
     assert not told.setpoint_clamped
 
 
-@every_way
 @pytest.mark.parametrize('ends', [(0.0, 1000.0), (1000.0, 0.0), (-50.0, 400.0), (0.0, 0.0)])
 def test_a_process_set_point_lies_between_setmin_and_setmax(make_rig: MakeRig, ends) -> None:
     # in the unit of the process, such as 400 kPa [C113]
@@ -170,6 +169,7 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(make_rig: MakeRig, e
         )
 
 
+@every_way
 @pytest.mark.parametrize('most', ['nominal', 'less', 'the_drive'])
 def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: str) -> None:
     quantity = MODES[mode]

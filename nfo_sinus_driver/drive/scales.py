@@ -1,0 +1,84 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Factors that a drive has other than its family's tables: by its firmware, by its own scale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping
+from fractions import Fraction
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import Refused
+
+_ONE = Fraction(1)
+
+
+class Scales:
+    """
+    The scales of one drive; for the bus.
+
+    :param has: tells whether the drive has a parameter.
+    :ivar speed: by what speeds are multiplied that come over the bus [M0 §8.3.2].
+    """
+
+    def __init__(self, registers: ParameterAccess, has: Callable[[str], bool]) -> None:
+        self._registers = registers
+        self._has = has
+        self._dialect: Mapping[str, Fraction] = {}
+        self.speed = _ONE
+
+    def use_dialect(self, factors: Mapping[str, Fraction]) -> None:
+        """Take the factors of the firmware that the drive has, by key."""
+        self._dialect = factors
+        self._apply()
+
+    async def read(self) -> bool:
+        """
+        Read the scale of speeds, 1 where the drive tells none; tell whether it is another now.
+
+        :raises LinkError: the drive does not answer.
+        """
+        before, self.speed = self.speed, await self._read_speed()
+        self._apply()
+        return self.speed != before
+
+    async def _read_speed(self) -> Fraction:
+        model = self._registers.model
+        roles = (Role.SPEED_SCALE_NUMERATOR, Role.SPEED_SCALE_DENOMINATOR)
+        keys = [model.key(role) for role in roles]
+        if not all(map(self._has, keys)):
+            return _ONE
+        try:
+            above, below = [
+                int(await self._registers.read_number(key, Priority.SERVICE)) for key in keys
+            ]
+        except Refused:
+            return _ONE
+        # what cannot be a scale is none [C114]
+        return Fraction(above, below) if above > 0 and below > 0 else _ONE
+
+    def _apply(self) -> None:
+        model = self._registers.model
+        key = model.key(Role.ACTUAL_SPEED)
+        scale = model[key].scale if key else ''
+        speeds = {
+            parameter.key: self.speed
+            for parameter in model.values()
+            if scale and parameter.scale == scale
+        }
+        self._registers.rescale({**speeds, **self._dialect})
