@@ -65,7 +65,15 @@ _SOON = 2.0
 #: How long it counts that the bus had control, s, where that has to be asked for by itself.
 _BY_MODE_FOR = 1.0
 #: What makes another drive of it, or another way to command it.
-_FIXED = ('address', 'block_address', 'telegram_words', 'model', 'control_method', 'reference')
+_FIXED = (
+    'address',
+    'block_address',
+    'telegram_words',
+    'model',
+    'control_method',
+    'reference',
+    'scales',
+)
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
@@ -117,7 +125,7 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
-        self.scales = Scales(self.registers, self.has)
+        self.scales = Scales(self.registers, self.has, settings.scales)
         #: What it does by itself when it hears nothing.
         self.timeout = CommunicationTimeout(self.registers, self.model, self.has)
 

@@ -26,6 +26,12 @@ from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import Refused
 
 _ONE = Fraction(1)
+#: The factory's scales of frequency, torque and process values, which stand in the tables [C16].
+FACTORY = {
+    Role.ACTUAL_FREQUENCY: Fraction(1, 10),
+    Role.ACTUAL_TORQUE: _ONE,
+    Role.ACTUAL_PROCESS_VALUE: Fraction(1, 10),
+}
 
 
 class Scales:
@@ -33,14 +39,24 @@ class Scales:
     The scales of one drive; for the bus.
 
     :param has: tells whether the drive has a parameter.
+    :param chosen: the value of one count of those scales that no bus tells, by role.
     :ivar speed: by what speeds are multiplied that come over the bus [M0 §8.3.2].
     """
 
-    def __init__(self, registers: ParameterAccess, has: Callable[[str], bool]) -> None:
+    def __init__(
+        self,
+        registers: ParameterAccess,
+        has: Callable[[str], bool],
+        chosen: Mapping[Role, float],
+    ) -> None:
         self._registers = registers
         self._has = has
+        self._chosen = {
+            role: Fraction(str(value)) / FACTORY[role] for role, value in chosen.items()
+        }
         self._dialect: Mapping[str, Fraction] = {}
         self.speed = _ONE
+        self._apply()
 
     def use_dialect(self, factors: Mapping[str, Fraction]) -> None:
         """Take the factors of the firmware that the drive has, by key."""
@@ -74,11 +90,14 @@ class Scales:
 
     def _apply(self) -> None:
         model = self._registers.model
-        key = model.key(Role.ACTUAL_SPEED)
-        scale = model[key].scale if key else ''
-        speeds = {
-            parameter.key: self.speed
+        scales = {}
+        for role, factor in {**self._chosen, Role.ACTUAL_SPEED: self.speed}.items():
+            key = model.key(role)
+            if key and model[key].scale:
+                scales[model[key].scale] = factor
+        found = {
+            parameter.key: scales[parameter.scale] * self._dialect.get(parameter.key, _ONE)
             for parameter in model.values()
-            if scale and parameter.scale == scale
+            if parameter.scale in scales
         }
-        self._registers.rescale({**speeds, **self._dialect})
+        self._registers.rescale({**self._dialect, **found})

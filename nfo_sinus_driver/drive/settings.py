@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -126,6 +127,10 @@ class DriveSettings:
         about, where the drive tells it, else the drive's own limit.
     :ivar drive_timeout: s; the drive's own time-out, within its limits and on a step of it; 0
         leaves it as it is. At least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
+    :ivar frequency_scale: Hz for one count of the bus, as FrqScl in the drive says, which no bus
+        tells [C16]; only where the family has such a scale, like the following.
+    :ivar torque_scale: % of the nominal torque for one count, as TrqScl says.
+    :ivar process_scale: of the process unit for one count, as RegScl says.
     :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
         older ``v5.0``; '' asks it for its firmware, while the bus has no control.
     :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
@@ -147,9 +152,21 @@ class DriveSettings:
     expected_control_mode: str = ''
     drive_timeout: float = 0.0
     shutdown_timeout: float = 4.0
+    frequency_scale: float = 0.1
+    torque_scale: float = 1.0
+    process_scale: float = 0.1
     allow_communication_changes: bool = False
     classic_dialect: str = ''
     retries: int = 2
+
+    @property
+    def scales(self) -> Mapping[Role, float]:
+        """The scales that no bus tells, by the role of what is measured in them."""
+        return {
+            Role.ACTUAL_FREQUENCY: self.frequency_scale,
+            Role.ACTUAL_TORQUE: self.torque_scale,
+            Role.ACTUAL_PROCESS_VALUE: self.process_scale,
+        }
 
     @property
     def follows_setpoints(self) -> bool:
@@ -216,6 +233,8 @@ class DriveSettings:
         _between('lost_after', self.lost_after, 0.2, 60, 's')
         _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
         _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: what the motor is made for)')
+        for name in ('frequency_scale', 'torque_scale', 'process_scale'):
+            _between(name, getattr(self, name), 1e-6, 1e6, '(the value of one count)')
         _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
         self._check_drive_timeout()
 

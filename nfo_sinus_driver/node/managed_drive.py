@@ -40,6 +40,9 @@ ONLY_UNCONFIGURED = (
     'control_method',
     'reference',
     'classic_dialect',
+    'frequency_scale',
+    'torque_scale',
+    'process_scale',
 )
 
 

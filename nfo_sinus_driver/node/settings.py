@@ -307,6 +307,30 @@ DRIVE_SETTINGS = (
         'and that it has otherwise; false: only report them',
     ),
     Setting(
+        'frequency_scale',
+        0.1,
+        'What one count of a frequency is, Hz, where the drive has a scale that no bus tells, '
+        'such as FrqScl',
+        1e-6,
+        1e6,
+        unit='Hz',
+    ),
+    Setting(
+        'torque_scale',
+        1.0,
+        'The same of a torque, % of the nominal one, such as TrqScl',
+        1e-6,
+        1e6,
+        unit='%',
+    ),
+    Setting(
+        'process_scale',
+        0.1,
+        'The same of a process value, in its unit, such as RegScl',
+        1e-6,
+        1e6,
+    ),
+    Setting(
         'allow_communication_changes',
         False,
         'Let the parameters serial.* be changed: the driver may lose the drive by that',

@@ -76,3 +76,16 @@ def test_a_speed_that_the_scale_cannot_carry_is_clamped() -> None:
     assert rig.far.memory.raw('status.spd_set') == 0x7FFF
     assert rig.drive.snapshot.setpoint_clamped
     rig.close()
+
+
+@pytest.mark.parametrize('way', ['G2, Modbus, MODE', 'G2, Classic, MODE', 'G2, CANopen, MODE'])
+def test_scales_that_no_bus_tells_are_chosen(way: str) -> None:
+    # FrqScl 1/100: a set-point of 20 Hz is 2000 counts, and 200 counts are 2 Hz
+    rig = WayRig(G2_WAYS[way], frequency_scale=0.01)
+    registers = rig.drive.registers
+    key = 'status.frq_set'
+    raw = registers.model[key].at(registers.protocol).codec.decode(registers.encode(key, 20.0))
+    assert raw == 2000
+    assert registers.value(key, registers.encode(key, 20.0)) == 20.0
+    assert registers.limits(key)[2] == 0.01
+    rig.close()
