@@ -172,6 +172,15 @@ _RPM = 2 * math.pi / 60
 _LONGEST_STEP = 1.0
 
 
+def control_mode(drive: Drive) -> str:
+    """Return the control mode of a drive, or a ValueError that says why it is not known."""
+    mode = drive.snapshot.control_mode
+    if not mode:
+        lost = drive.identity is not None and not drive.inverter.connected
+        raise ValueError('the drive is lost' if lost else 'the drive has not been read yet')
+    return mode
+
+
 class Joint:
     """The joint that a motor turns; its ratio is motor turns per turn, negative inverts."""
 
@@ -203,11 +212,11 @@ class Joint:
     def setpoint(self, velocity: float, drive: Drive) -> float:
         """Return the set-point for a velocity of the shaft, rad/s, or a ValueError."""
         rpm = velocity * self._ratio() / _RPM
-        mode = drive.snapshot.control_mode
+        mode = control_mode(drive)
         if mode == 'Speed':
             return rpm
         if mode != 'Freque':
-            raise ValueError(f'the control mode is {mode or "not known"}, not Speed or Freque')
+            raise ValueError(f'the control mode is {mode}, not Speed or Freque')
         # slip is left out: how much there is depends on the load
         return rpm * _pole_pairs(drive) / 60
 

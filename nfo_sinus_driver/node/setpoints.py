@@ -34,6 +34,7 @@ from nfo_sinus_driver.drive.setpoint_all import Told
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
+from nfo_sinus_driver.node.messages import control_mode
 
 _UNITS = {
     'Freque': Setpoint.HZ,
@@ -77,10 +78,16 @@ class Setpoints:
         self._take(self._managed.scale.of_drive(message.data))
 
     def _on_stamped(self, message: Setpoint) -> None:
-        mode = self._managed.drive.snapshot.control_mode
-        if self._managed.active and message.unit != _UNITS.get(mode):
+        if not self._managed.active:
+            return
+        try:
+            mode = control_mode(self._managed.drive)
+        except ValueError as error:
+            self._ignore(f'set-point ignored: {error}')
+            return
+        if message.unit != _UNITS.get(mode):
             unit = _NAMES.get(message.unit, f'unit {message.unit}')
-            self._ignore(f'set-point in {unit} ignored: the control mode is {mode or "not known"}')
+            self._ignore(f'set-point in {unit} ignored: the control mode is {mode}')
             return
         stamp = Time.from_msg(message.header.stamp, clock_type=self._clock.clock_type)
         timeout = self._managed.settings.setpoint_timeout

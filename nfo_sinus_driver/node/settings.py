@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
@@ -359,8 +360,10 @@ def _as(wanted: type, given: object) -> str:
     if isinstance(given, str):
         if wanted is list:
             return f'[{given}]'
-        if _reads_as(wanted, given):
-            return f'{given} without quotes'
+        plain = _plain(wanted, given)
+        if plain:
+            # launch takes 2e0 for a text, ROS 1_0: there were no quotes to leave out
+            return f'{given} without quotes' if given == plain else plain
     if wanted is str and type(given) in (int, float):
         return f"'{given}' with quotes"
     if wanted is int and isinstance(given, float) and given.is_integer():
@@ -368,14 +371,15 @@ def _as(wanted: type, given: object) -> str:
     return _TYPES[wanted][1]
 
 
-def _reads_as(wanted: type, text: str) -> bool:
+def _plain(wanted: type, text: str) -> str:
+    """Return how a value of the wanted type that a text names is written; ``''``: it names none."""
     if wanted is bool:
-        return text in ('true', 'false')
+        return text if text in ('true', 'false') else ''
     try:
-        wanted(text)
+        value = wanted(text)
     except ValueError:
-        return False
-    return True
+        return ''
+    return str(value) if math.isfinite(value) else ''
 
 
 def declare(node: Node, settings: tuple[Setting, ...]) -> dict[str, SettingValue]:

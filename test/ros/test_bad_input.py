@@ -302,6 +302,10 @@ def untouched(
         (['-p', 'address:=248'], ['nfo_sinus: address 248', '0 to 247']),
         (['-p', 'address:=one'], ["address is 'one' (a string)", 'write a whole number']),
         (['-p', 'address:="1"'], ["address is '1' (a string)", 'write 1 without quotes']),
+        # texts although the operator wrote no quotes: 2e0 by launch, 1_0 by ROS
+        (['-p', 'lost_after:="2e0"'], ["lost_after is '2e0' (a string): write 2.0\n"]),
+        (['-p', 'address:=1_0'], ["address is '1_0' (a string): write 10\n"]),
+        (['-p', 'lost_after:="2.0"'], ["lost_after is '2.0' (a string): write 2.0 without quotes"]),
         (['-p', 'address:=2.0'], ['address is 2.0 (a double): write 2']),
         (['-p', 'frame_id:=7'], ["frame_id is 7 (an integer): write '7' with quotes"]),
         (['-p', 'rs485:="true"'], ["rs485 is 'true' (a string)", 'true without quotes']),
@@ -358,7 +362,7 @@ def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
     lines = [line for line in driver.text.splitlines() if 'cannot start' in line]
     assert len(lines) == 1, driver.text
     for part in parts:
-        assert part in lines[0]
+        assert part in f'{lines[0]}\n'
     assert 'Traceback' not in driver.text
     _untouched(drive)
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 import threading
+from types import SimpleNamespace
 
 from bench import Bench
 from bench import Client
@@ -27,6 +28,9 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 from ways import needs
+
+from nfo_sinus_driver.drive.identity import Identity
+from nfo_sinus_driver.node.messages import Joint
 
 _RADIANS = 2 * math.pi
 #: The simulated motor has two pole pairs: 20 Hz are 10 turns a second without slip.
@@ -105,6 +109,28 @@ def test_a_joint_command_without_our_joint_is_told_once(bench: Bench) -> None:
         wait_until(lambda: len(client.messages['status']) > before + 20, 'more commands')
     assert bench.log.count(said) == 1
     assert not simulator.state()['frequency']
+
+
+def test_a_command_that_is_ignored_while_the_drive_is_lost_says_so(bench: Bench) -> None:
+    simulator, client = start(bench)
+    simulator.inject('silence', 3600.0)
+    client.wait_for('status', lambda status: not status.connected, 'it is lost')
+    command = JointState(name=['nfo_sinus'], velocity=[9.0])
+    with Publisher(client, '/nfo_sinus/joint_command', command):
+        wait_until(lambda: 'joint command ignored: the drive is lost' in bench.log, 'it says so')
+    setpoint = Setpoint(value=9.0, unit=Setpoint.HZ)
+    with Publisher(client, '/nfo_sinus/setpoint_stamped', setpoint):
+        wait_until(lambda: 'set-point ignored: the drive is lost' in bench.log, 'it says so')
+
+
+def test_a_command_before_the_drive_was_read_says_so() -> None:
+    drive = SimpleNamespace(
+        snapshot=SimpleNamespace(control_mode=''), inverter=SimpleNamespace(connected=True)
+    )
+    for identity in (None, Identity()):
+        drive.identity = identity
+        with pytest.raises(ValueError, match='the drive has not been read yet'):
+            Joint(lambda: 'belt', lambda: 1.0).setpoint(1.0, drive)
 
 
 @needs('reverse')
