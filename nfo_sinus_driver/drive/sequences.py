@@ -32,6 +32,7 @@ from nfo_sinus_driver.catalog import Limits
 from nfo_sinus_driver.catalog import Meaning
 from nfo_sinus_driver.catalog import Removal
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import read_limits
@@ -195,20 +196,38 @@ class StopSequence:
     async def _keep_trying(self) -> None:
         complain_at = self._due
         pause = 0.0
+        stood = False
         while await self._attempt() is not _Outcome.CONFIRMED:
             if self.blocked_by_fault:
                 await self._fault_gone()
                 self._due = complain_at = time.monotonic() + drive_state.TIMEOUT
                 continue
-            if time.monotonic() >= complain_at:
+            stands = self._stands
+            if time.monotonic() >= complain_at or (stood and not stands):
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
                 complain_at = time.monotonic() + pause
-                self._inverter.tell(Severity.ERROR, Cause.CANNOT_STOP, why=self._unconfirmed)
+                why = self._unconfirmed
+                if stands:
+                    standing = self._inverter.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
+                    self._inverter.tell(Severity.WARNING, standing)
+                else:
+                    self._inverter.tell(Severity.ERROR, Cause.CANNOT_STOP, why=why)
+                stood = stands
             await self._rest()
         self._task = None
         self._report_end()
         if pause:
             self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
+
+    @property
+    def _stands(self) -> bool:
+        """The drive has just shown that the motor stands, and no run command."""
+        seen = self._inverter.seen
+        if seen is None or time.monotonic() - seen.at > _RETRY_PERIOD:
+            return False
+        # a code that is not in the manual shows nothing
+        shows = seen.state is not State.UNKNOWN or seen.standby
+        return shows and not (seen.driven or seen.runs)
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""

@@ -109,6 +109,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.STOP_UNCONFIRMED: 'the stop is NOT confirmed: {why}; retrying',
     Cause.STOP_UNCONFIRMED_AT_END: 'the stop is NOT confirmed: this {call.program} is ending',
     Cause.CANNOT_STOP: f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}',
+    Cause.CANNOT_STOP_BUT_STANDS: 'the stop is NOT confirmed: {why}; retrying. The drive shows '
+    'that the motor stands ({status}); the RUN input or the emergency stop keeps it so',
     Cause.STOP_CONFIRMED_LATE: 'the stop is confirmed now: {status}',
     Cause.STOP_FORCED: 'an ordinary stop did not do ({why}): control was taken from the drive, or '
     'its motor was released ({status}). Find out why it did not stop, and whether another master '

@@ -95,3 +95,20 @@ def test_no_step_of_a_stop_ends_it(way: str) -> None:
     ]
     wrong = {row: found for row in rows if (found := goes_wrong(way, *row))}
     assert rows and not wrong, '\n'.join(f'{row}: {found}' for row, found in wrong.items())
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_a_refused_stop_of_a_motor_that_stands_is_no_alarm_until_it_turns(way: str) -> None:
+    with contextlib.closing(WayRig(WAYS[way])) as rig:
+        rig.ride()
+        assert rig.answer(rig.drive.stop())
+        rig.pass_time(6.0)
+        rig.meet = lambda key, written: 'refused' if written else None
+        rig.drive.stop()
+        rig.pass_time(8.0)
+        assert rig.drive.stop_unconfirmed and not rig.said(Cause.CANNOT_STOP)
+        assert rig.said(Cause.CANNOT_STOP_BUT_STANDS)
+        # a drive that is not heard shows nothing
+        rig.meet = lambda key, written: 'lost'
+        rig.pass_time(3.0)
+        assert rig.said(Cause.CANNOT_STOP)
