@@ -26,6 +26,7 @@ from support.aggregator import ERROR
 from support.aggregator import OK
 from support.aggregator import WARN
 from support.aggregator import Aggregator
+import yaml
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
 FOXGLOVE = CONFIG / 'foxglove.json'
@@ -39,6 +40,10 @@ PANELS = {
     'CallService': {'serviceName', 'requestPayload', 'editingMode', 'timeoutSeconds'},
     'DiagnosticSummary': {'topicToRender'},
 }
+
+
+#: The longest that a configure was measured to take, at a slow rate, s.
+LONGEST_CONFIGURE = 28.0
 
 
 def leaves(layout: object) -> Iterator[str]:
@@ -104,3 +109,10 @@ def test_top_level_of_the_diagnostics_is_ok_while_all_is_well() -> None:
     for name in well:
         assert aggregator.level({**well, name: WARN}) == WARN
         assert aggregator.level({other: OK for other in well if other != name}) == ERROR, name
+
+
+def test_the_lifecycle_manager_waits_longer_than_a_configure_lasts() -> None:
+    file = yaml.safe_load((CONFIG / 'nav2' / 'lifecycle_manager.yaml').read_text())
+    parameters = file['/**/lifecycle_manager_drives']['ros__parameters']
+    # without it, nav2 gives up after 5 s
+    assert parameters['service_timeout'] > LONGEST_CONFIGURE
