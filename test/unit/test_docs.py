@@ -334,6 +334,14 @@ def test_picture_is_whole_and_shown_and_says_what_it_shows(path: Path) -> None:
     assert any(shown.search(read(page)) for page in PAGES)
 
 
+def test_the_picture_of_control_names_the_time_outs_of_its_page() -> None:
+    docs = ROOT / 'docs'
+    named = re.findall(r'\| the driver \| `(\w+)` \|', read(docs / 'control.md'))
+    assert {'setpoint_timeout', 'lost_after'} <= set(named)
+    picture = read(docs / 'control_states.svg')
+    assert not [name for name in named if name not in picture]
+
+
 @pytest.mark.parametrize('path', CONFIGS, ids=lambda path: path.name)
 def test_parameter_file_names_parameters_that_exist(path: Path) -> None:
     names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
