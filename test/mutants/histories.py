@@ -158,7 +158,7 @@ HISTORIES = (
         3,
         'in any order: a motor that cannot be stopped is not said to be',
         SEQUENCE,
-        '            if time.monotonic() >= complain_at:',
+        '            if time.monotonic() >= complain_at or (stood and not stands):',
         '            if False:',
         G2_SCMD,
     ),
