@@ -108,7 +108,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
         'control.auto_start: false -> true, as the parameter file says',
         'freque.op_mode: Terminal -> Fix-1 F, as the parameter file says',
         'motor.u_nom: 400 -> 230 V, as the parameter file says',
-        'pi_reg.setmin: 0 -> -1, as the parameter file says',
+        'pi_reg.setmin: -150 -> -1, as the parameter file says',
     ):
         says_once(driver, text)
     assert 'f_fix1' not in driver.text

@@ -48,7 +48,7 @@ RAMPS = {
 }
 #: As patient as a busy machine needs it.
 PATIENT = ('-p', 'response_timeout:=2.0', '-p', 'lost_after:=5.0')
-RUNS = {'sinus_optimal': 0x0001, 'sinus_h': 0x0008, 'sinus_g2': 0x2009}
+RUNS = {'sinus_optimal': 0x0001, 'sinus_h': 0x0008, 'sinus_g2': 0x0001}
 
 
 @pytest.fixture
