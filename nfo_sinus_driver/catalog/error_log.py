@@ -28,6 +28,8 @@ from nfo_sinus_driver.catalog.codec import Number
 _TICKS = 0xFFFFFF
 #: Its step, h ([M0 §8.4], [M2 §9]); what is shown is cut off, not rounded.
 TICK = 0.1
+#: The status code of an entry that is none; a message has one byte for it.
+_UNKNOWN = 255
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,18 @@ class ErrorLogArea:
         return self.above is None
 
     def code(self, entry: int) -> int:
-        """Return the status code of an entry as it stands in the drive; 0 if it is empty."""
+        """Return the status code of an entry, 0 if it is empty, 255 if it is unknown."""
         if self.above is None:
             return entry >> 24
-        return self.above + int(entry * self.factor) if entry else 0
+        code = self.above + entry * self.factor
+        # the drive prints codes without decimals: what has some is none [C119]
+        whole = code.denominator == 1 and code < _UNKNOWN
+        return (int(code) if whole else _UNKNOWN) if entry else 0
+
+    def unknown(self, entry: int) -> str:
+        """Return what to call an entry that is no code; ``''`` if it is one."""
+        is_none = self.above is not None and self.code(entry) == _UNKNOWN
+        return f'unknown code (raw {entry})' if is_none else ''
 
     def hours(self, entry: int) -> float:
         """Return the operating time of an entry as it stands in the drive, h; NaN if none."""

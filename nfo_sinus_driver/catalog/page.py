@@ -86,6 +86,10 @@ The name of the ROS parameter, and of the setting on the drive's own display; {c
 
 _NO_SETTINGS = 'Its manual prints none.\n'
 
+_NOT_READ = """\
+The drive has these, and this driver neither reads nor writes them.
+"""
+
 _TIMED = """\
 Entries of two words, the newest first: the operating time in 0.1 h, 24 bits, and the code of the
 inverter status above it. Code 0 ends the log.
@@ -141,11 +145,12 @@ def _family(family: Family, taken: list[str]) -> Iterator[str]:
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
-    only_read = [row for row in family.values() if row.access is Access.READ]
-    only_read = [row for row in only_read if row.group not in NO_SETTINGS]
-    if only_read:
-        yield '### Only read\n'
-        yield _table(_OTHER_COLUMNS, only_read)
+    not_read = [row for row in family.values() if row.access is Access.READ]
+    not_read = [row for row in not_read if row.group not in NO_SETTINGS]
+    if not_read:
+        yield '### Not read by this driver\n'
+        yield _NOT_READ
+        yield _table(_OTHER_COLUMNS, not_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
         if rows:

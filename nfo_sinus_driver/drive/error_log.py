@@ -146,7 +146,8 @@ class ErrorLog:
                 continue
             told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
         code = self.area.code(entry)
-        return LogEntry(code, self._inverter.text_of(code), readings=tuple(told))
+        text = self.area.unknown(entry) or self._inverter.text_of(code)
+        return LogEntry(code, text, readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """

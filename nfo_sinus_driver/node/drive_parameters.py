@@ -36,6 +36,8 @@ from nfo_sinus_driver.catalog import Parameter as CatalogParameter
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Change
 from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.node.overrides import declared_names
+from nfo_sinus_driver.node.overrides import did_you_mean
 from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.
@@ -115,9 +117,10 @@ class DriveParameters:
     def _admit(self, parameter: Parameter) -> Parameter:
         if not self._node.has_parameter(parameter.name):
             # rclpy refuses it too, but its message leaves out the name
+            near = did_you_mean(parameter.name, declared_names(self._node))
             raise ValueError(
                 f'{parameter.name}: there is no such parameter; those of the drive are there once '
-                'the node is configured'
+                f'the node is configured{near}'
             )
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET

@@ -69,7 +69,7 @@ def _given_to(name: str) -> dict[str, Parameter]:
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
     """Return a warning for each parameter that was given and that no node declares."""
     nodes = list(nodes)
-    declared = {name for node in nodes for name in _declared(node)}
+    declared = {name for node in nodes for name in declared_names(node)}
     unknown: dict[str, set[str]] = {}
     for node in nodes:
         # rclpy has no other way to see the overrides that nobody declared
@@ -79,10 +79,10 @@ def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
     for name, names in sorted(unknown.items()):
         yield (
             f'parameter {name} was given to {", ".join(sorted(names))}, but there is none of that '
-            f'name{_did_you_mean(name, declared)}'
+            f'name{did_you_mean(name, declared)}'
         )
     for node in nodes:
-        others = declared - _declared(node)
+        others = declared - declared_names(node)
         misplaced = set(node._parameter_overrides) & others
         # given to all of them, it reaches the right one too
         for name in sorted(misplaced):
@@ -90,7 +90,8 @@ def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
                 yield f'parameter {name} was given to {node.get_name()}, which has none such'
 
 
-def _declared(node: Node) -> set[str]:
+def declared_names(node: Node) -> set[str]:
+    """Return the parameters that a node has, or will have once its drive is there."""
     # those of a drive are declared when it is there
     later: Iterable[str] = getattr(node, 'later_parameters', ())
     return set(node.get_parameters_by_prefix('')) | set(later)
@@ -106,7 +107,7 @@ def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
                 if '*' not in name and name not in names:
                     yield (
                         f'{path} has parameters for {section}, but the nodes here are '
-                        f'{", ".join(sorted(names))}{_did_you_mean(name, names)}'
+                        f'{", ".join(sorted(names))}{did_you_mean(name, names)}'
                     )
 
 
@@ -125,7 +126,7 @@ def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterato
         for name, text in given.items():
             if (node.get_name(), name) in specific:
                 continue
-            override = node._parameter_overrides.get(name) if name in _declared(node) else None
+            override = node._parameter_overrides.get(name) if name in declared_names(node) else None
             if override is not None and not _is_value(override, text):
                 counts = parameter_value_to_python(override.get_parameter_value())
                 yield (
@@ -177,7 +178,8 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
             yield from _sections(value, name)
 
 
-def _did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence on an unknown name: those known that are most like it."""
     # loaded for a mistake alone: it takes 0.1 MB
     import difflib
 

@@ -179,6 +179,10 @@ def test_a_name_that_is_none_is_refused(rig: Rig, name: str) -> None:
     assert rig.wire.writes() == []
 
 
+def test_a_name_that_is_none_is_answered_with_the_one_most_like_it(rig: Rig) -> None:
+    refused(set_one(rig.client, 'contrl.accel', 1.0), 'did you mean control.accel')
+
+
 @pytest.mark.parametrize(
     ('name', 'value'),
     [('serial.sio_tot', 2.0), ('serial.address', 2), ('serial.auto_stop', True),

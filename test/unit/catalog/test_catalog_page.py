@@ -23,9 +23,11 @@ import sys
 
 import pytest
 
+from nfo_sinus_driver.catalog import Access
 from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog.page import page
+from nfo_sinus_driver.cli.parameter_file import readable
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / 'docs' / 'parameters.md'
@@ -119,3 +121,18 @@ def test_rows_written_by_hand() -> None:
         and line.endswith(', `Temp F` (258), `Temp R` (259).')
         for line in LINES
     )
+
+
+def test_docs_send_no_user_to_a_parameter_that_nothing_reads() -> None:
+    reached = {key for name in families() for key in readable(load_family(name))}
+    rows = [row for name in families() for row in load_family(name).values()]
+    # the driver itself reads the words of the bus
+    hidden = {
+        row.key for row in rows if row.access is Access.READ and row.group != 'Fieldbus'
+    } - reached
+    assert len(hidden) == 24
+    for path in sorted(PAGE.parent.glob('*.md')):
+        promised = [key for key in hidden if key in path.read_text(encoding='utf-8')]
+        assert not promised, path
+    part = page().split('### Not read by this driver\n')[1].split('### ')[0]
+    assert part.count('\n| ') == 2 + len(hidden)

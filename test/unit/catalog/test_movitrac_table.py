@@ -240,12 +240,21 @@ def test_roles() -> None:
     }
 
 
+@pytest.mark.parametrize('raw', [1, 45, 99, 4501, 15_500, 99_999_900])
+def test_only_whole_numbers_are_fault_codes(raw: int) -> None:
+    # InvSt has one byte for a code
+    area = MOVITRAC.error_logs[BUS]
+    assert area.code(raw) == 255
+    assert area.unknown(raw) == f'unknown code (raw {raw})'
+
+
 def test_error_log() -> None:
     area = MOVITRAC.error_logs[BUS]
     # P060 to P064
     keys = [f'status.fault_t{number}' for number in range(5)]
     assert [area.address(number) for number in range(5)] == [index(MOVITRAC[key]) for key in keys]
     assert [area.code(count) for count in (0, 100, 4500, 8700)] == [0, 101, 145, 187]
+    assert not any(map(area.unknown, (0, 100, 4500, 8700)))
     assert not area.timed
     assert math.isnan(area.hours(4500))
     # the fault memory; inverter status and terminals are not decoded [C77]

@@ -172,3 +172,12 @@ def test_the_last_five_faults_are_told_newest_first(make_virtual: MakeVirtual) -
     rig.answer(log)
     assert [entry.code for entry in log.result()] == [101, 103, 145, 106, 107]
     assert [entry.text for entry in log.result()[:2]] == ['Overcurrent', 'Brake chopper']
+
+
+def test_a_fault_code_with_decimals_is_an_unknown_code(make_virtual: MakeVirtual) -> None:
+    rig = make(make_virtual)
+    rig.connect()
+    rig.far.memory.set_raw('status.fault_t0', 45)
+    log = rig.drive.error_log()
+    rig.answer(log)
+    assert [(one.code, one.text) for one in log.result()] == [(255, 'unknown code (raw 45)')]

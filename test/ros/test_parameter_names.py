@@ -1,0 +1,49 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The names of ROS parameters, those of the nodes and of all families together."""
+
+from __future__ import annotations
+
+import pytest
+
+from nfo_sinus_driver.catalog import families
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.node.overrides import did_you_mean
+from nfo_sinus_driver.node.settings import BUS_SETTINGS
+from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
+from nfo_sinus_driver.node.settings import Setting
+
+#: What rclpy declares for each node.
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
+
+
+@pytest.mark.parametrize('family', sorted(families()))
+@pytest.mark.parametrize('settings', [BUS_SETTINGS, DRIVE_SETTINGS], ids=['bus', 'drive'])
+def test_no_parameter_name_is_the_prefix_of_another(
+    family: str, settings: tuple[Setting, ...]
+) -> None:
+    # `ros2 param dump` makes a tree of them, in which a name is a value or a branch
+    names = {*_OF_ROS, *(one.name for one in settings), *load_family(family)}
+    assert not [(one, other) for one in names for other in names if other.startswith(f'{one}.')]
+
+
+def test_an_old_name_is_answered_with_what_it_is_called_now() -> None:
+    names = list(load_family('movitrac31'))
+    renamed = [name for name in names if name.startswith('reference_values.')]
+    assert len(renamed) == 20
+    for name in renamed:
+        answer = did_you_mean(name.replace('reference_values.', 'reference.'), names)
+        assert answer.startswith(f'; did you mean {name}')
