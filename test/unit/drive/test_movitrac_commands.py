@@ -37,6 +37,7 @@ from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.movitrac31.codes import Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
+from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory
 
 # --- what an enable asks --------------------------------------------------------------------------
 
@@ -174,10 +175,15 @@ def test_the_last_five_faults_are_told_newest_first(make_virtual: MakeVirtual) -
     assert [entry.text for entry in log.result()[:2]] == ['Overcurrent', 'Brake chopper']
 
 
-def test_a_fault_code_with_decimals_is_an_unknown_code(make_virtual: MakeVirtual) -> None:
+def test_a_fault_code_with_decimals_is_an_unknown_code(
+    make_virtual: MakeVirtual, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rig = make(make_virtual)
     rig.connect()
-    rig.far.memory.set_raw('status.fault_t0', 45)
+    remembered = FaultMemory.raw
+    monkeypatch.setattr(
+        FaultMemory, 'raw', lambda *of: 45 if of[1] == 'status.fault_t0' else remembered(*of)
+    )
     log = rig.drive.error_log()
     rig.answer(log)
     assert [(one.code, one.text) for one in log.result()] == [(255, 'unknown code (raw 45)')]
