@@ -487,6 +487,7 @@ class Profile:
     What is to be known of a family beside its tables.
 
     :ivar title: what its maker calls it.
+    :ivar enable_input: what its manual calls the input that lets the motor run, with its terminal.
     :ivar status_word: what its status word means.
     :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
@@ -515,6 +516,7 @@ class Profile:
     methods: Mapping[str, type[ControlMethod]]
     setpoints: Mapping[str, SetpointTarget]
     in_charge: Callable[[Status | None], Steps[str]]
+    enable_input: str = 'enable input'
     broadcast_stop: Write | None = None
     names_itself: bool = False
     told_by: str = ''

@@ -103,7 +103,8 @@ class CommunicationWatchdog:
             if faulted or not inverter.bus.supervised:
                 raise
             # whether a drive has any means at all is nowhere written for such a line [C102]
-            inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
+            report = inverter.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
+            inverter.tell(Severity.WARNING, report)
             return ()
         for change in changes:
             self._found.setdefault(change.key, change.old)
@@ -171,7 +172,7 @@ class CommunicationWatchdog:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if not inverter.timeout.can_be_set and not inverter.timeout.watched_by:
-            return Report(Cause.NO_OWN_TIMEOUT)
+            return inverter.report(Cause.NO_OWN_TIMEOUT)
         name = inverter.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)

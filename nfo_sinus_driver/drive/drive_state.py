@@ -564,8 +564,9 @@ class DriveState:
         return '' if self.seen is None else f'{self.seen.code} {self.text}'
 
     def report(self, cause: Cause, **values: object) -> Report:
-        """Return a report that says what the inverter status is, too."""
-        return Report(cause, status=self.describe(), **values)
+        """Return a report that has the inverter status and the name of the enable input, too."""
+        named = self.model.profile.enable_input
+        return Report(cause, status=self.describe(), enable_input=named, **values)
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""

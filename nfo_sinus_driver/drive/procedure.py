@@ -27,6 +27,7 @@ from nfo_sinus_driver.catalog import Family
 from nfo_sinus_driver.catalog import Holder
 from nfo_sinus_driver.catalog import Procedure
 from nfo_sinus_driver.catalog import Reset
+from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
@@ -148,7 +149,8 @@ class Procedures:
         require_no_fault(inverter, seen)
         found = await controller.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
-            raise DriveError(inverter.report(Cause.CONTROL_INHIBITED, what=what))
+            name = inverter.model[inverter.model.key(Role.CONTROL_SOURCE)].name
+            raise DriveError(inverter.report(Cause.CONTROL_INHIBITED, what=what, name=name))
         if seen.driven:
             raise DriveError(inverter.report(Cause.MOTOR_RUNS, what=what))
         if found not in (Holder.NOBODY, Holder.BUS):

@@ -211,7 +211,10 @@ class StopSequence:
                     standing = self._inverter.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
                     self._inverter.tell(Severity.WARNING, standing)
                 else:
-                    self._inverter.tell(Severity.ERROR, Cause.CANNOT_STOP, why=why)
+                    by = self._inverter.model.profile.enable_input
+                    self._inverter.tell(
+                        Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
+                    )
                 stood = stands
             await self._rest()
         self._task = None
@@ -443,7 +446,7 @@ class StartSequence:
             # in standby after the start delay it has forgotten the start, and must not wait for
             # another one
             if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(Cause.NO_RUN_INPUT)
+                raise DriveError(self._inverter.report(Cause.NO_RUN_INPUT))
             if seen.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
                 delay = await self._inverter.read_start_delay()

@@ -34,7 +34,7 @@ _NO_TIMEOUT = (
 )
 _REMEDY = '{fault.description}. {fault.remedy}'
 _GO_ON = 'then {call.enable} to go on'
-_EMERGENCY = 'Use the RUN input or the emergency stop if it turns'
+_EMERGENCY = 'Use the {enable_input} or the emergency stop if it turns'
 
 TEMPLATES: Mapping[Cause, str] = {
     # --- the line and who answers
@@ -54,7 +54,7 @@ TEMPLATES: Mapping[Cause, str] = {
     'PLC runs',
     Cause.RESTARTED: 'the drive has started anew, as its boot-up message says: check its mains',
     Cause.HELD_BY_LINE: 'only watched, and yet {why}: a motor that the terminals ran has stopped',
-    Cause.OTHER_MODEL: '{error}: every {model} has SWVer; is this another model? {call.set_model}',
+    Cause.OTHER_MODEL: '{error}: every {model} has it; is this another model? {call.set_model}',
     Cause.NOT_THE_MODEL: '{drive} answers, but not as a {model} does ({why}): is --model right?',
     Cause.UNEXPECTED_IDENTITY: 'this drive says that it is a {model}; no {title} says anything: '
     '{call.set_model}',
@@ -82,8 +82,8 @@ TEMPLATES: Mapping[Cause, str] = {
     'one has to wait until it stands',
     Cause.WRONG_CONTROL_MODE: 'the drive is in control mode {mode}, expected is {expected}: set '
     '{key} in the drive or {call.set_control_mode}',
-    Cause.NO_RUN_INPUT: 'the drive stays in standby: its RUN input is not active '
-    '(DIN1; strap it to +24 V or close its safety contact)',
+    Cause.NO_RUN_INPUT: 'the drive stays in standby: its {enable_input} is not active: close '
+    'it, or its safety contact',
     Cause.START_FAULTED: 'the drive did not start: {status}',
     Cause.NOT_STARTED: 'the drive does not start: {status}',
     Cause.STOPPED_WHILE_ENABLING: 'it was stopped while it was being enabled',
@@ -105,12 +105,12 @@ TEMPLATES: Mapping[Cause, str] = {
     'stop',
     Cause.NO_CONTROL: 'the bus has no control of this drive ({status}), and it does not run',
     Cause.RUN_BY_OTHERS: 'the bus has no control of this drive ({status}): stop it where it is '
-    'controlled, by keypad or RUN input',
+    'controlled, by keypad or {enable_input}',
     Cause.STOP_UNCONFIRMED: 'the stop is NOT confirmed: {why}; retrying',
     Cause.STOP_UNCONFIRMED_AT_END: 'the stop is NOT confirmed: this {call.program} is ending',
     Cause.CANNOT_STOP: f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}',
     Cause.CANNOT_STOP_BUT_STANDS: 'the stop is NOT confirmed: {why}; retrying. The drive shows '
-    'that the motor stands ({status}); the RUN input or the emergency stop keeps it so',
+    'that the motor stands ({status}); the {enable_input} or the emergency stop keeps it so',
     Cause.STOP_CONFIRMED_LATE: 'the stop is confirmed now: {status}',
     Cause.STOP_FORCED: 'an ordinary stop did not do ({why}): control was taken from the drive, or '
     'its motor was released ({status}). Find out why it did not stop, and whether another master '
@@ -144,8 +144,8 @@ TEMPLATES: Mapping[Cause, str] = {
     'set-points are in {unit} now: check what sends them',
     Cause.DRIVE_STARTING: 'the drive is starting ({status}): it was switched off and on; check its '
     'mains',
-    Cause.RUN_INPUT_LOST: 'the RUN input (DIN1) of the drive was lost ({status}): close it',
-    Cause.STOPPED_BY_ITSELF: 'the drive stopped by itself ({status}). Either its RUN input (DIN1) '
+    Cause.RUN_INPUT_LOST: 'the {enable_input} of the drive was lost ({status}): close it',
+    Cause.STOPPED_BY_ITSELF: 'the drive stopped by itself ({status}). Either its {enable_input} '
     'was lost or another master stopped it: close the input',
     Cause.TERMINALS_IN_CONTROL: 'the terminals have control now ({status}): press STOP at the '
     'drive',
@@ -212,7 +212,7 @@ TEMPLATES: Mapping[Cause, str] = {
     'published; check motor and scaling in the drive, and that no other master is on the line',
     # --- the time-out of the drive itself
     Cause.NO_OWN_TIMEOUT: _NO_TIMEOUT.format(
-        why='none is known of this model', remedy='use the RUN input'
+        why='none is known of this model', remedy='use the {enable_input}'
     ),
     Cause.OWN_TIMEOUT_OFF: _NO_TIMEOUT.format(
         why='{name} is 0', remedy='{call.set_drive_timeout}'
@@ -233,7 +233,7 @@ TEMPLATES: Mapping[Cause, str] = {
     'the PLC watches this {call.program}, and stops the motor {seconds:g} s after its last word, '
     'so it must be 0',
     Cause.OWN_TIMEOUT_NOT_TAKEN: _NO_TIMEOUT.format(
-        why='{why}', remedy='use the RUN input'
+        why='{why}', remedy='use the {enable_input}'
     ),
     Cause.OWN_TIMEOUT_LEFT: 'control stays with the bus, and the time-out of the drive itself '
     '({name} {timeout:g} s) goes on: {why}. So it will have a fault when nothing is said to it for '
@@ -250,8 +250,8 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.MOTOR_ENABLED: '{what}: the motor is enabled: stop it first',
     Cause.STOP_NOT_CONFIRMED_YET: '{what}: a stop is not confirmed yet',
     Cause.MOTOR_RUNS: '{what}: the motor runs ({status}): stop it first',
-    Cause.CONTROL_INHIBITED: '{what}: the drive lets nobody take control now ({status}; MODE is '
-    'Inhibit)',
+    Cause.CONTROL_INHIBITED: '{what}: the drive lets nobody take control now ({status}; '
+    '{name} is Inhibit)',
     Cause.CONTROLLED_LOCALLY: '{what}: keypad or terminals have control ({status}), and giving it '
     'back to them could start the motor: press STOP at the drive first',
     Cause.NO_STANDBY: '{what}: the drive does not stand by: {status}',
@@ -264,12 +264,12 @@ TEMPLATES: Mapping[Cause, str] = {
     Cause.TUNING_NEEDS: '{what} needs {key}: set it as the motor plate says',
     Cause.TUNED: '{what} finished ({status})',
     Cause.TUNING_WITHOUT_RESULT: '{what} ended in standby ({status}) and has changed no parameter: '
-    'the RUN input may have been lost meanwhile; repeat it if it was',
+    'the {enable_input} may have been lost meanwhile; repeat it if it was',
     Cause.TUNING_FAILED: f'{{what}} failed, {{status}}: {_REMEDY}; {{call.acknowledge}} first',
     Cause.TUNING_STOPPED: '{what} was stopped before it was finished ({status})',
     Cause.TUNING_CUT_SHORT: '{what} ended, and the drive does not say that it has finished '
-    '({status}): was the RUN input lost, or STOP pressed?',
-    Cause.TUNING_DOES_NOT_BEGIN: '{what} does not begin ({status}): is its RUN input (DIN1) '
+    '({status}): was the {enable_input} lost, or STOP pressed?',
+    Cause.TUNING_DOES_NOT_BEGIN: '{what} does not begin ({status}): is its {enable_input} '
     'active?',
     Cause.TUNING_ENDLESS: '{what} has no end ({status}): stopping it',
     Cause.TUNING_CHANGED: '{how}; changed: {changes}',

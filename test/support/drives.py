@@ -276,7 +276,7 @@ _SINUS = {
     'stopped': 'Stop',
     'running': 'Bus Run',
     'most': 150.0,
-    'without_run_input': 'RUN input is not active',
+    'without_run_input': 'RUN input (DIN1) is not active',
 }
 _G2 = {
     **_SINUS,

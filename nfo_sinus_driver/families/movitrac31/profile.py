@@ -367,6 +367,7 @@ def _in_charge(status: Status | None) -> Steps[str]:
 
 PROFILE = Profile(
     title='MOVITRAC 31',
+    enable_input='enable terminal (43 from the factory)',
     status_word=words.STATUS_WORD,
     holders=_HOLDERS,
     methods={'function_bits': FunctionBits},

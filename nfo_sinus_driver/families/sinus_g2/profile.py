@@ -474,6 +474,7 @@ def _in_charge(status: Status | None) -> Steps[str]:
 
 PROFILE = Profile(
     title='NFO Sinus G2',
+    enable_input='RUN input (DIN1)',
     status_word=words.STATUS_WORD,
     holders=_HOLDERS,
     methods={

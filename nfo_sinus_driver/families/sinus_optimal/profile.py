@@ -216,6 +216,7 @@ def _in_charge(status: Status | None) -> Steps[str]:
 
 PROFILE = Profile(
     title='NFO Sinus Optimal',
+    enable_input='RUN input (DIN1)',
     status_word=words.STATUS_WORD,
     holders=_HOLDERS,
     methods={

@@ -529,7 +529,7 @@ def test_no_run_input(make_bench: MakeBench) -> None:
     bench = make_bench(run_input=False)
     done = bench.run('run', 10)
     assert done.status == 1
-    assert 'RUN input is not active' in done.err
+    assert 'RUN input (DIN1) is not active' in done.err
     assert bench.state()['source'] == 'stop'
 
 

@@ -27,6 +27,7 @@ import string
 import pytest
 from support.said import CALLS
 
+from nfo_sinus_driver.catalog import families
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause
@@ -125,7 +126,7 @@ def test_every_sentence_is_given_what_it_needs() -> None:
             what = told_by(call) if isinstance(call, ast.Call) else None
             if isinstance(call, ast.Call) and what is not None:
                 values = {str(keyword.arg) for keyword in call.keywords}
-                values |= {'status'} if name_of(call) == 'report' else set()
+                values |= {'status', 'enable_input'} if name_of(call) == 'report' else set()
                 causes = causes_in(what)
                 given += [(cause, values) for cause in causes]
                 general += [] if causes else [values]
@@ -136,6 +137,31 @@ def test_every_sentence_is_given_what_it_needs() -> None:
     assert never
     for cause in never:
         assert any(fields_of(cause) <= values for values in general), cause
+
+
+#: Terminals, keys and registers, by the family that has them.
+NAMES = {
+    'sinus_g2': {'DIN1', 'RUN', 'MODE', 'SCMD', 'InvSt', 'StMode', 'SioTot', 'AutoStop', 'SWVer'},
+    'sinus_optimal': {'DIN1', 'RUN', 'MODE', 'SCMD', 'InvSt', 'SMODE'},
+    'sinus_h': {'STW1', 'ZSW1', 'PRT'},
+    'movitrac31': {'41', '42', '43', 'P841', 'P842', 'P870'},
+}
+
+
+@pytest.mark.parametrize('family', sorted(families()))
+def test_no_sentence_for_one_family_names_what_another_has(family: str) -> None:
+    every = set().union(*NAMES.values())
+    of_others = every - NAMES[family]
+    codes = load_family(family).status_codes.values()
+    for code in codes:
+        said = f'{code.description} {code.remedy}'
+        assert not of_others & set(re.findall(r'\w+', said)), code
+    named = load_family(family).profile.enable_input
+    for cause in Cause:
+        said = TEMPLATES[cause].replace('{enable_input}', named)
+        assert not of_others & set(re.findall(r'\w+', said)), cause
+    # what a template names of itself, every family has
+    assert not [cause for cause in Cause if every & set(re.findall(r'\w+', TEMPLATES[cause]))]
 
 
 @pytest.mark.parametrize('cause', Cause)

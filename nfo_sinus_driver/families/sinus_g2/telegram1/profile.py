@@ -123,6 +123,7 @@ class G2DriveControl(Telegram1):
 _Bits = profidrive.Status
 PROFILE = Profile(
     title='NFO Sinus G2',
+    enable_input='RUN input (DIN1)',
     status_word=Words(
         state=lambda word: profidrive.state_of(word & 0xFFFF),
         by_bit={

@@ -85,6 +85,7 @@ class OptimalTelegram1(Telegram1):
 
 PROFILE = Profile(
     title='NFO Sinus Optimal',
+    enable_input='RUN input (DIN1)',
     status_word=Words(
         state=lambda word: state_of(word & 0xFFFF),
         by_bit=STATUS_WORD.by_bit,
