@@ -43,7 +43,8 @@ from nfo_sinus_driver.simulator.control import Client as Simulated
 FAULT = {'sinus_optimal': 5, 'sinus_h': 11, 'sinus_g2': 5}
 RAMPS = {
     'sinus_optimal': ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5'),
-    'sinus_g2': ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5'),
+    # by its frequency alone it is seen that it ramps down
+    'sinus_g2': ('--set', 'control.accel=0.5', '--set', 'control.retard=3'),
     'sinus_h': (),
 }
 #: As patient as a busy machine needs it.
