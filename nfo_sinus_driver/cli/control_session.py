@@ -189,7 +189,7 @@ _LONGEST_POLL = 2.0
 #: How control was released.
 RELEASED = (Cause.CONTROL_RELEASED, Cause.CONTROL_KEPT)
 
-_EMERGENCY = 'use the RUN input or the emergency stop if the motor turns'
+_EMERGENCY = 'use the enable input or the emergency stop if the motor turns'
 
 
 class Stopping:
@@ -249,7 +249,7 @@ class Stopping:
                 break
         if drive.stop_unconfirmed:
             show(
-                'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
+                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
                 'the emergency stop; nfo-sinus stop tries again'
             )
             return False

@@ -264,7 +264,7 @@ def stop(options: argparse.Namespace) -> int:
         except DriveError as error:
             done, answer = False, (
                 f'the stop is NOT confirmed: {say(error)}. '
-                'Use the RUN input or the emergency stop if the motor turns'
+                'Use the enable input or the emergency stop if the motor turns'
             )
         if options.json:
             facts = {'confirmed': done, 'message': answer}
@@ -286,7 +286,7 @@ def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, s
         if seen.driven or seen.means(Meaning.START_DELAY):
             return False, (
                 f'keypad or terminals run the motor ({told}), so the bus cannot stop it: '
-                'press STOP at the keypad, or open its RUN input'
+                'press STOP at the keypad, or open its enable input'
             )
         return True, f'the motor does not run ({told})'
     drive = _in_charge(control)

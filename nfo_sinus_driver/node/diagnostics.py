@@ -47,7 +47,7 @@ def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
 def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str]:
     """Return how grave it is what one drive says, and what an operator should know of it."""
     if managed.drive.stop_overdue:
-        message = 'the stop is NOT confirmed: use the RUN input or the emergency stop'
+        message = 'the stop is NOT confirmed: use the enable input or the emergency stop'
         return DiagnosticStatus.ERROR, message
     if not snapshot.connected:
         if not managed.is_silent:

@@ -78,7 +78,7 @@ _LAST_CALLBACK = 2.0
 #: What an end says that comes before the port is opened.
 _NOT_STARTED = (
     'ended before the bus was opened, nothing was written; a motor that was left running before '
-    'runs on: use the RUN input or the emergency stop'
+    'runs on: use the enable input or the emergency stop'
 )
 
 #: What rclpy raises when its own arguments make no sense.
@@ -174,7 +174,7 @@ class DriverProcess:
         ]
         for node in unconfirmed:
             node.get_logger().error(
-                'ending WITHOUT a confirmed stop, the motor may still run: use the RUN input or '
+                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
                 'the emergency stop'
             )
         return not unconfirmed
