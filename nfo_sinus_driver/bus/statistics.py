@@ -44,6 +44,7 @@ class Statistics:
         this unit, 0 to 1.
     :ivar cycle_time: how long the last round of polling took; of a line, that of its slowest unit.
     :ivar transactions: requests sent, answered or not.
+    :ivar foreign_frames: requests of another master heard on the line; of one unit always 0.
     :ivar reconnects: how often the port was opened again, or the unit was connected to again.
     """
 
@@ -60,6 +61,7 @@ class Statistics:
     round_trip_median: float
     round_trip_p99: float
     round_trip_max: float
+    foreign_frames: int = 0
 
 
 class Tally:

@@ -32,6 +32,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 import contextlib
 import ctypes
+import dataclasses
 import functools
 import logging
 import math
@@ -168,7 +169,10 @@ class Bus:
 
     def statistics(self, unit: int | None = None) -> Statistics:
         """Return the counters and times of the line, or of one unit on it."""
-        return self.recorder.statistics(unit)
+        figures = self.recorder.statistics(unit)
+        if unit is not None:
+            return figures
+        return dataclasses.replace(figures, foreign_frames=self._link.remarks.foreign_frames)
 
     @property
     def port_error(self) -> PortError | None:

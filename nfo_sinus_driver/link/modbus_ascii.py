@@ -29,6 +29,7 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link.another_master import message_lengths
 from nfo_sinus_driver.link.line_protocols import MODBUS_ASCII
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
@@ -62,6 +63,15 @@ def length(message_length: int) -> int:
     return 2 * (message_length + 1) + len(':\r\n')
 
 
+def _whole_frames(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield the messages of the frames whose check sum is right; where each begins and ends."""
+    for frame in _FRAME.finditer(data):
+        *body, check = bytes.fromhex(frame[1].decode())
+        message = bytes(body)
+        if lrc(message) == check:
+            yield frame.start(), frame.end(), message
+
+
 class AsciiReader(AnswerReader[_T]):
     """Finds an answer in ASCII frames; one that has begun may pause so long, s."""
 
@@ -92,10 +102,7 @@ class AsciiReader(AnswerReader[_T]):
         return self._inter_byte_timeout if self._begun() else _IDLE_TIMEOUT
 
     def _messages(self) -> Iterator[tuple[int, int, bytes]]:
-        for frame in _FRAME.finditer(self._buffer):
-            data = bytes.fromhex(frame[1].decode())
-            if lrc(data[:-1]) == data[-1]:
-                yield frame.start(), frame.end(), data[:-1]
+        return _whole_frames(self._buffer)
 
     def _begun(self) -> re.Match[bytes] | None:
         """Return the frame that has begun and not ended, if it can become an answer."""
@@ -131,6 +138,11 @@ class AsciiLink(SerialLink):
     def _reader(self, request: Request[_T]) -> AsciiReader[_T]:
         timeout = min(INTER_BYTE_TIMEOUT, self._settings.response_timeout)
         return AsciiReader(request, timeout)
+
+    def _messages(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+        for start, end, message in _whole_frames(data):
+            if len(message) in message_lengths(message):
+                yield start, end, message
 
     def _frame_length(self, message_length: int) -> int:
         return length(message_length)

@@ -27,6 +27,7 @@ from typing import Any
 from typing import TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.link.another_master import message_lengths
 from nfo_sinus_driver.link.line_protocols import MODBUS_RTU
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 from nfo_sinus_driver.link.modbus_pdu import Request
@@ -120,6 +121,13 @@ class RtuLink(SerialLink):
 
     def _reader(self, request: Request[_T]) -> RtuReader[_T]:
         return RtuReader(request)
+
+    def _messages(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+        for start in range(len(data)):
+            for length in message_lengths(data[start:]):
+                end = start + length
+                if crc(data[start:end]) == data[end : end + CRC_LENGTH]:
+                    yield start, end + CRC_LENGTH, data[start:end]
 
     def _frame_length(self, message_length: int) -> int:
         return message_length + CRC_LENGTH

@@ -24,6 +24,8 @@ import time
 from typing import Any
 from typing import TypeVar
 
+from nfo_sinus_driver.link.another_master import DOUBTFUL
+from nfo_sinus_driver.link.another_master import AnotherMaster
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
@@ -59,6 +61,8 @@ _FIRST_BYTE_LOST = (
     'receiving too late; use one that switches by itself, or try rs485 true where the port switches'
 )
 
+#: How often a read is asked while another master asks at the same time.
+_TRIES = 3
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
 #: How long a write waits at least for a line that is not silent, s.
@@ -93,6 +97,7 @@ class SerialLink(ModbusLink):
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )
+        self._another = AnotherMaster(self.remarks, settings.response_timeout, self._messages)
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         self._echo = Echo()
         #: When the last request had left.
@@ -101,6 +106,8 @@ class SerialLink(ModbusLink):
         self._confirming = False
         #: Other bytes came with the last answer.
         self._stray = False
+        #: The last answer may be to another master.
+        self._doubtful = False
         #: When the last byte was on the line, as far as we know.
         self._line_end = 0.0
 
@@ -118,6 +125,7 @@ class SerialLink(ModbusLink):
         """Close the port; harmless when it is closed already."""
         self._port.close()
         self._late.clear()
+        self._another.clear()
         self._echo = Echo()
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
@@ -136,7 +144,8 @@ class SerialLink(ModbusLink):
         request = write_and_read_of(unit, address, data, source)
         self._await_silence(request)
         quarantined = self._late.quarantined(unit, time.monotonic())
-        if not quarantined.isdisjoint(answer_kinds(request)):
+        doubted = not quarantined.isdisjoint(answer_kinds(request))
+        if doubted or self._another.is_there(time.monotonic()):
             return self.write(unit, address, data)
         return Reply(*self._ask(request))
 
@@ -156,6 +165,10 @@ class SerialLink(ModbusLink):
         """Return what finds the answer to a request."""
 
     @abstractmethod
+    def _messages(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the messages of the whole frames in some bytes; where each begins and ends."""
+
+    @abstractmethod
     def _frame_length(self, message_length: int) -> int:
         """Return how many bytes the frame of a message has."""
 
@@ -163,6 +176,24 @@ class SerialLink(ModbusLink):
 
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when its last byte came."""
+        if isinstance(request, Write):
+            return self._ask_once(request)
+        for tries_left in reversed(range(1 if isinstance(request, WriteAndRead) else _TRIES)):
+            try:
+                answer = self._ask_once(request)
+            except Refused:
+                if not self._doubtful:
+                    raise
+            except DamagedAnswer:
+                if not tries_left or not self._another.is_there(time.monotonic()):
+                    raise
+            else:
+                if not self._doubtful:
+                    return answer
+        raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
+
+    def _ask_once(self, request: Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request, which may be to another master."""
         self._await_silence(request)
         # a write answer names what was written, and nobody believes it without reading back
         resynced = not isinstance(request, Write) and self._make_certain(request)
@@ -268,12 +299,32 @@ class SerialLink(ModbusLink):
         """
         is_write = isinstance(request, (Write, WriteAndRead))
         wait = self._write_wait if is_write else self._settings.response_timeout
-        data, self._line_end, silent = await_silence(self._port, self._line_end, self._gap, wait)
-        if data:
-            self._late.heard_unasked(time.monotonic())
-        if not silent and not is_write:
-            raise NeverSilent(NEVER_SILENT)
-        return bool(data)
+        give_up = time.monotonic() + self._settings.response_timeout
+        came = False
+        while True:
+            heard = await_silence(self._port, self._line_end, self._gap, wait)
+            data, self._line_end, silent = heard
+            came |= bool(data)
+            now = time.monotonic()
+            self._another.hear(data, now)
+            if not silent and not is_write:
+                self._late.heard_unasked(now)
+                raise NeverSilent(NEVER_SILENT)
+            until = min(self._another.stands_until(request.unit), give_up)
+            if is_write or now >= until:
+                break
+            # what another master asked is answered first
+            if data := self._port.read(until):
+                self._line_end = max(self._line_end, time.monotonic())
+                self._another.hear(data, self._line_end)
+        if late := self._another.take_late(request.unit, now):
+            self._late.quarantine(request.unit, (late,), now)
+        stray = bool(self._another.take_rest(request.unit)) and (
+            came or self._another.is_there(now)
+        )
+        if stray:
+            self._late.heard_unasked(now)
+        return stray
 
     @property
     def _write_wait(self) -> float:
@@ -287,6 +338,7 @@ class SerialLink(ModbusLink):
         frame = self._encode(request)
         self._late.sent(request)
         self._echo.sent(frame)
+        self._another.sent(frame)
         self._port.write(frame)
         self._sent_at = time.monotonic() + len(frame) * self._settings.char_time
         self._line_end = self._sent_at
@@ -303,10 +355,17 @@ class SerialLink(ModbusLink):
             raise
         finally:
             other = reader.other
-            # what comes back before the answer to a write may be its answer
-            if not isinstance(request, Write) and frame in other:
+            now = time.monotonic()
+            # what comes back before the answer to a write may be its answer, and another master may
+            # ask the same as we do
+            alone = not self._another.is_there(now)
+            if alone and not isinstance(request, Write) and frame in other:
                 self._echo.present = True
-            self._stray = bool(self._echo.before or other.replace(frame, b'', 1))
+            stray = self._echo.before + other.replace(frame, b'', 1)
+            self._stray = bool(stray)
+            self._another.hear(stray, now)
+            stands = now < self._another.stands_until(request.unit)
+            self._doubtful = self._another.is_there(now) and (self._stray or stands)
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)
@@ -317,7 +376,7 @@ class SerialLink(ModbusLink):
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         self._late.took(request.unit, arrived - self._sent_at - length)
-        if late or reader.received:
+        if late or (reader.received and not self._doubtful):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.heard_unasked(time.monotonic())
         return answer, arrived
@@ -349,6 +408,9 @@ class SerialLink(ModbusLink):
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
                 return answer, now
+            if self._another.is_there(now) and self._another.was_answered_in(reader.other):
+                # units answer in order: ours was lost, or will be late
+                break
             pause = reader.inter_byte_timeout
             rest = (self._echo.bytes_needed + reader.bytes_needed) * char_time + pause
             deadline = min(max(first, now + rest), last_chance + _PAUSES * pause)
@@ -363,7 +425,8 @@ class SerialLink(ModbusLink):
             # had there been another answer to come, it would be here, too
             raise refusals[0]
         if held or (came and reader.other != frame):
-            if self._lacks_first_byte(request, frame, reader.other + held):
+            another = self._another.is_there(now)
+            if not another and self._lacks_first_byte(request, frame, reader.other + held):
                 raise DamagedAnswer(f'unit {request.unit}: {_FIRST_BYTE_LOST}')
             raise DamagedAnswer(
                 f'unit {request.unit}: {came + len(held)} bytes came that are no answer'

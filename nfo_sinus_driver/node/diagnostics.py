@@ -141,6 +141,7 @@ def _figures(statistics: Statistics) -> dict[str, str]:
         'timeouts': str(statistics.timeouts),
         'damaged': str(statistics.damaged),
         'refused': str(statistics.refused),
+        'foreign frames': str(statistics.foreign_frames),
         'retries': str(statistics.retries),
         'reconnects': str(statistics.reconnects),
         'round trip min': _milliseconds(statistics.round_trip_min),

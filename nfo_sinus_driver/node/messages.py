@@ -155,6 +155,7 @@ def bus_statistics(statistics: Statistics, silent_drives: list[str], stamp: Time
         transactions=statistics.transactions,
         timeouts=statistics.timeouts,
         damaged=statistics.damaged,
+        foreign_frames=statistics.foreign_frames,
         refused=statistics.refused,
         retries=statistics.retries,
         reconnects=statistics.reconnects,

@@ -1,0 +1,205 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Another master on a line of Modbus, by the requests that it sends and the answers to them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import dataclass
+import math
+
+from nfo_sinus_driver.link.interface import Remarks
+from nfo_sinus_driver.link.modbus_pdu import REFUSAL_LENGTH
+
+ANOTHER_MASTER = (
+    'another Modbus master asks the drives on this line: a line has one master, so disconnect it '
+    'or stop its program; until then readings come later, and commands of its own may reach a drive'
+)
+DOUBTFUL = 'another master asked at the same time'
+
+#: How long another master is reckoned with after it was heard, s.
+_RECKONED = 60.0
+#: So many of its frames within that time are no noise.
+_SURE = 3
+#: How many of our own requests may still come back, or be answered by the very same bytes.
+_OWN = 8
+#: More than any frame has.
+_MOST = 600
+#: Functions whose answer tells how long it is; those that are answered by their own beginning.
+_READS = (1, 2, 3, 4)
+_SINGLE = (5, 6)
+_MULTIPLE = (15, 16)
+_READ_WRITE = 23
+_EXCEPTION = 0x80
+
+
+def message_lengths(beginning: bytes) -> set[int]:
+    """Return how long a message that begins like this is, as a request or as an answer."""
+    if len(beginning) < 3 or not beginning[0]:
+        return set()
+    function, told = beginning[1], 3 + beginning[2]
+    if function & _EXCEPTION:
+        return {REFUSAL_LENGTH}
+    if function in _READS:
+        return {6, told}
+    if function in _SINGLE:
+        return {6}
+    if function in _MULTIPLE:
+        return {6, 7 + beginning[6]} if len(beginning) > 6 else {6}
+    if function == _READ_WRITE:
+        return {told, 11 + beginning[10]} if len(beginning) > 10 else {told}
+    return set()
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What another master asked a unit, and until when that may be answered."""
+
+    unit: int
+    function: int
+    answer_head: bytes
+    until: float
+
+    def is_answered_by(self, message: bytes) -> bool:
+        if message[:2] == bytes((self.unit, self.function | _EXCEPTION)):
+            return len(message) == REFUSAL_LENGTH
+        return message.startswith(self.answer_head)
+
+
+def _answer_head(message: bytes) -> bytes:
+    """Return how the answer to a request begins; nothing where a message is no request."""
+    function, length = message[1], len(message)
+    count = int.from_bytes(message[4:6], 'big')
+    if function in _READS and length == 6:
+        size = 2 * count if function > 2 else -(-count // 8)
+        return message[:2] + bytes((size,)) if 0 < size < 251 else b''
+    if function in _SINGLE:
+        return message
+    if function in _MULTIPLE and length > 7:
+        return message[:6]
+    if function == _READ_WRITE and length > 11 and 0 < count < 126:
+        return message[:2] + bytes((2 * count,))
+    return b''
+
+
+class AnotherMaster:
+    """
+    Finds the requests of another master, and the answers to them, among what nobody here asked for.
+
+    Its request stands until its answer has come, or may be late. While it stands, and in every
+    exchange in which anything of it was heard, no answer is certain: one to a read names no
+    register.
+
+    :param messages: yields the whole frames in some bytes: where each begins and ends, and its
+        message.
+    """
+
+    def __init__(
+        self,
+        remarks: Remarks,
+        response_timeout: float,
+        messages: Callable[[bytes], Iterator[tuple[int, int, bytes]]],
+    ) -> None:
+        self._remarks = remarks
+        self._response_timeout = response_timeout
+        self._messages = messages
+        self._buffer = b''
+        self._own: deque[bytes] = deque(maxlen=_OWN)
+        self._standing: dict[int, _Question] = {}
+        self._heard: deque[float] = deque((-math.inf,), maxlen=_SURE)
+
+    def sent(self, frame: bytes) -> None:
+        """Take note of a request of ours: it may come back, and is nobody else's."""
+        self._own.append(frame)
+
+    def is_there(self, now: float) -> bool:
+        """Tell whether another master has been heard of late."""
+        return now < self._heard[-1] + _RECKONED
+
+    def stands_until(self, unit: int) -> float:
+        """Return until when an answer of a unit may be to another master; 0: it is not."""
+        question = self._standing.get(unit)
+        return 0.0 if question is None else question.until
+
+    def take_late(self, unit: int, now: float) -> bytes:
+        """Return how the answer to a request begins that stands no more, but may be late."""
+        question = self._standing.get(unit)
+        if question is None or now < question.until:
+            return b''
+        del self._standing[unit]
+        return question.answer_head
+
+    def hear(self, data: bytes, now: float) -> None:
+        """Take bytes that are no answer to us."""
+        if not data:
+            return
+        self._buffer = (self._buffer + data)[-_MOST:]
+        while self._find(now):
+            pass
+
+    def was_answered_in(self, data: bytes) -> bool:
+        """Tell whether another master's request and the answer to it are in some bytes."""
+        head = b''
+        for start, end, message in self._messages(data):
+            if head and message.startswith(head):
+                return True
+            if not self._is_own(data[start:end], message):
+                head = _answer_head(message) or head
+        return False
+
+    def take_rest(self, unit: int) -> bytes:
+        """Return what is of no frame of another master, for the line is silent now."""
+        if unit in self._standing:
+            # the beginning of the answer, perhaps
+            return b''
+        rest, self._buffer = self._buffer, b''
+        return rest
+
+    def clear(self) -> None:
+        """Forget what was heard: the port is closed."""
+        self._buffer = b''
+        self._standing.clear()
+
+    def _find(self, now: float) -> bool:
+        buffer = self._buffer
+        for start, end, message in self._messages(buffer):
+            if self._is_foreign(buffer[start:end], message, now):
+                self._buffer = buffer[:start] + buffer[end:]
+                return True
+        return False
+
+    def _is_own(self, frame: bytes, message: bytes) -> bool:
+        """Tell whether a frame may be an echo of ours; a write's answer is the same."""
+        return frame in (self._own if message[1] in _SINGLE else [*self._own][-1:])
+
+    def _is_foreign(self, frame: bytes, message: bytes, now: float) -> bool:
+        unit, function = message[:2]
+        if self._is_own(frame, message):
+            return False
+        question = self._standing.get(unit)
+        if question is not None and question.is_answered_by(message):
+            del self._standing[unit]
+            return True
+        head = _answer_head(message)
+        if not head:
+            return False
+        self._remarks.foreign_frames += 1
+        self._heard.append(now)
+        if len(self._heard) == _SURE and now < self._heard[0] + _RECKONED:
+            self._remarks.add(ANOTHER_MASTER)
+        self._standing[unit] = _Question(unit, function, head, now + self._response_timeout)
+        return True
