@@ -336,8 +336,8 @@ LAWS = (
         8,
         'the check sum of an ASCII answer is not looked at',
         'nfo_sinus_driver/link/modbus_ascii.py',
-        '            if lrc(data[:-1]) == data[-1]:',
-        '            if True:',
+        '        if lrc(message) == check:',
+        '        if True:',
         ('test/unit/link/test_ascii_codec.py',),
     ),
     Mutant(
