@@ -61,6 +61,15 @@ _FIRST_BYTE_LOST = (
     'receiving too late; use one that switches by itself, or try rs485 true where the port switches'
 )
 
+_IN_PIECES = (
+    'answers come in pieces with long pauses: the adapter, or the device server, holds bytes back; '
+    'set its latency timer or packing time to the least, or use another one'
+)
+#: A pause within an answer of which the operator hears, s: more than a good adapter makes.
+_LONG_PAUSE = 0.03
+#: No pause is waited for longer, s.
+_MOST_PAUSE = 0.2
+
 #: How often a read is asked while another master asks at the same time.
 _TRIES = 3
 #: How many of the longest pauses within an answer there may be.
@@ -100,6 +109,8 @@ class SerialLink(ModbusLink):
         self._another = AnotherMaster(self.remarks, settings.response_timeout, self._messages)
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         self._echo = Echo()
+        #: How long a pause within an answer may be on this line, s, as far as answers have shown.
+        self._pause = 0.0
         #: When the last request had left.
         self._sent_at = 0.0
         #: The resync read on its way is only about that.
@@ -393,6 +404,7 @@ class SerialLink(ModbusLink):
         length = self._frame_length(request.answer_length)
         last_chance = first + 2 * length * char_time
         came = 0
+        last = longest = 0.0
         refusals: list[Refused] = []
         while True:
             data = self._port.read(deadline)
@@ -404,14 +416,18 @@ class SerialLink(ModbusLink):
             # what comes while the request still leaves is no answer to it
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
+            longest = max(longest, now - last if came else 0.0)
+            last = now
             came += len(data)
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
+                if not reader.other:
+                    self._learn_pause(longest)
                 return answer, now
             if self._another.is_there(now) and self._another.was_answered_in(reader.other):
                 # units answer in order: ours was lost, or will be late
                 break
-            pause = reader.inter_byte_timeout
+            pause = max(reader.inter_byte_timeout, self._pause)
             rest = (self._echo.bytes_needed + reader.bytes_needed) * char_time + pause
             deadline = min(max(first, now + rest), last_chance + _PAUSES * pause)
         held = self._echo.give_up()
@@ -433,6 +449,12 @@ class SerialLink(ModbusLink):
             )
         raise NoAnswer(f'unit {request.unit} did not answer')
 
+
+    def _learn_pause(self, longest: float) -> None:
+        """Take note of the longest pause, s, within an answer that came whole, and of no other."""
+        if longest > _LONG_PAUSE:
+            self._pause = max(self._pause, min(2 * longest, _MOST_PAUSE))
+            self.remarks.add(_IN_PIECES)
 
     def _lacks_first_byte(self, request: Request[_T], frame: bytes, came: bytes) -> bool:
         """Tell whether what came is the answer without its first byte, which is the request's."""
