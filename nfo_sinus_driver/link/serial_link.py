@@ -416,7 +416,9 @@ class SerialLink(ModbusLink):
             # what comes while the request still leaves is no answer to it
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
-            longest = max(longest, now - last if came else 0.0)
+            if came:
+                # less what these bytes took themselves
+                longest = max(longest, now - last - len(data) * char_time)
             last = now
             came += len(data)
             answer = _feed(reader, data, None if believe_refusal else refusals)
