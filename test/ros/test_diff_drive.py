@@ -88,6 +88,7 @@ def test_nodes_joints_and_topics_agree_everywhere() -> None:
     assert drives['nfo_sinus_bus']['drives'] == list(_WHEELS)
     assert sections(_CONFIG / 'nav2' / 'lifecycle_manager.yaml')['lifecycle_manager_drives'] == {
         'node_names': list(_WHEELS), 'autostart': False, 'bond_timeout': 0.0,
+        'service_timeout': 60.0,
     }
     parts = components(_FOLDER / 'robot.urdf')
     assert len(parts) == len(_WHEELS)
