@@ -56,10 +56,8 @@ _RETRY: Literal['retry'] = 'retry'
 #: What is said to a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
 _SLOT: Literal['slot'] = 'slot'
-#: What makes a motor stop, ahead of what only looks whether one does.
-_COMMAND: Literal['command'] = 'command'
-_Rank = Priority | Literal['slot', 'command', 'retry', 'missing']
-_STOPS = (_COMMAND, Priority.STOP)
+_Rank = Priority | Literal['slot', 'retry', 'missing']
+_STOPS = (Priority.STOP, Priority.LOOK)
 _SHARES: dict[_Rank, float] = {
     _RETRY: RETRY_SHARE,
     Priority.TELEMETRY: BACKGROUND_SHARE,
@@ -106,7 +104,7 @@ class Scheduler:
         self._is_missing = is_missing
         #: In order; the values say nothing.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
-            rank: {} for rank in (_COMMAND, *Priority, _SLOT, _RETRY, _MISSING)
+            rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
@@ -243,11 +241,10 @@ class Scheduler:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING
-        commands = transfer.priority is Priority.STOP and transfer.data is not None
-        return _COMMAND if commands else transfer.priority
+        return transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:
-        return transfer.priority is Priority.STOP and transfer.unit in self._told_in_vain
+        return transfer.priority <= Priority.LOOK and transfer.unit in self._told_in_vain
 
 
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,

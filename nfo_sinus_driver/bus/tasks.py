@@ -51,11 +51,13 @@ class Priority(enum.IntEnum):
     """How urgent a transaction is; the least goes first."""
 
     STOP = 0
-    SETPOINT = 1
-    SERVICE = 2
-    POLL = 3
-    TELEMETRY = 4
-    REFRESH = 5
+    #: Looks whether a motor stops, or has to be stopped: no stop waits for it.
+    LOOK = 1
+    SETPOINT = 2
+    SERVICE = 3
+    POLL = 4
+    TELEMETRY = 5
+    REFRESH = 6
 
 
 class Cancelled(BaseException):

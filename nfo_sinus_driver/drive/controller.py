@@ -368,19 +368,19 @@ class Controller:
         with self._stopped_by_itself():
             try:
                 may_run = may_run or await self.method.in_control(Priority.STOP)
-                may_run = may_run or (await self._inverter.look(Priority.STOP)).tuning
+                may_run = may_run or (await self._inverter.look(Priority.LOOK)).tuning
                 if may_run:
                     await self.method.quick_stop(self._inverter.control_mode)
                     told_at = time.monotonic()
                     # a PLC whose data stand still goes on showing what was before
                     await self._inverter.wait_until(
-                        lambda seen: seen.at >= told_at and not seen.driven, Priority.STOP
+                        lambda seen: seen.at >= told_at and not seen.driven, Priority.LOOK
                     )
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()
                 with contextlib.suppress(LinkError):
-                    await self._inverter.look(Priority.STOP)
+                    await self._inverter.look(Priority.LOOK)
                 seen = self._inverter.seen
                 by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
                 if isinstance(error, Refused) and by_fault:
@@ -481,7 +481,7 @@ class Controller:
         if not self.method.plc_time or self.blocked_by_fault:
             return
         with contextlib.suppress(DriveError, LinkError):
-            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.STOP, timeout)
+            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.LOOK, timeout)
             await self.method.release()
 
     def close(self) -> None:

@@ -158,7 +158,7 @@ class DriveState:
             word, at = self.status_word(told.data), told.arrived
         half = self.told_by_word(word, at)
         alarmed = before is not None and word != before.word and alarming(half)
-        priority = Priority.STOP if alarmed else priority
+        priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
             seen = await self._with_control(half, priority, once)
             return await self._with_frequency(seen, priority, once)
@@ -180,7 +180,7 @@ class DriveState:
             else (kind is Kind.FAULT) != seen.faulted
         )
         if news and alarming(replace(seen, word=None)):
-            differs, priority = True, Priority.STOP
+            differs, priority = True, Priority.LOOK
         if differs:
             word, at = await self._read_int(self.word_key, priority, once)
             seen = replace(seen, word=word, at=at)

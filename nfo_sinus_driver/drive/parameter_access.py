@@ -275,7 +275,7 @@ class ParameterAccess:
     ) -> Reply:
         tries = 1 if once else 1 + self._retries
         # what is busy has done nothing; a stop that is sent once is repeated by who wants it
-        busy = 0 if once and priority is Priority.STOP else _BUSY_TRIES
+        busy = 0 if once and priority <= Priority.LOOK else _BUSY_TRIES
         while True:
             try:
                 if data is None:

@@ -307,12 +307,12 @@ class StopSequence:
             self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
             if isinstance(error, DamagedAnswer) and self._outcome is _Outcome.UNHEARD:
-                await self._inverter.look(Priority.STOP, once=True)
+                await self._inverter.look(Priority.LOOK, once=True)
             if self._unheard < _UNHEARD_BEFORE_FORCE:
                 raise
             failure = error
         # one that answers nothing at all ends it here
-        seen = await self._inverter.look(Priority.STOP, once=True)
+        seen = await self._inverter.look(Priority.LOOK, once=True)
         if failure is None:
             seen = await self._newer(seen, reasons, self._told_at)
         if isinstance(failure, Refused) and seen.faulted and not seen.runs_by_bus:
@@ -345,7 +345,7 @@ class StopSequence:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
         obeyed = await self._method.force_stop(control_mode)
         told_at = time.monotonic()
-        seen = await self._inverter.look(Priority.STOP, once=True)
+        seen = await self._inverter.look(Priority.LOOK, once=True)
         if not obeyed:
             return why
         self._told_at = min(self._told_at, told_at)
@@ -366,7 +366,7 @@ class StopSequence:
             if time.monotonic() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-            seen = await self._inverter.look(Priority.STOP, once=True)
+            seen = await self._inverter.look(Priority.LOOK, once=True)
         return seen
 
     def _why_not(self, seen: InverterStatus, refusal: LinkError | None) -> Report | None:

@@ -127,7 +127,7 @@ def test_nothing_goes_between_a_read_and_the_write_behind_it(
     with link.held():
         hold(bus, link)
         waiting = [
-            ask(bus, 3, Priority.STOP),
+            ask(bus, 3, Priority.LOOK),
             bus.run(job()),
             ask(bus, 4, Priority.STOP, packed(1)),
         ]
@@ -156,9 +156,9 @@ def test_most_urgent_goes_first(
         result(future)
     wait_until(lambda: writer.outcomes)
     # a set-point in a slot stands before any other of its rank
-    order = [100, 50, 101, 102, 103]
-    assert link.numbers[1:6] == order
-    assert sorted(link.numbers[6:]) == [104, 105]
+    order = [100, 101, 50, 102, 103, 104]
+    assert link.numbers[1:7] == order
+    assert sorted(link.numbers[7:]) == [105, 106]
 
 
 def test_equals_take_turns_in_the_order_they_came(bus: Bus, link: FakeLink) -> None:

@@ -85,15 +85,16 @@ def test_most_urgent_goes_first() -> None:
     while (taken := scheduler.take()) is not None:
         went.append(kind_of(taken))
         scheduler.took(0.0)
-    assert went[:6] == [
+    assert went[:7] == [
         Priority.STOP,
+        Priority.LOOK,
         _SLOT,
         Priority.SETPOINT,
         Priority.SERVICE,
         Priority.POLL,
         Priority.TELEMETRY,
     ]
-    assert went[6:] == [Priority.REFRESH]
+    assert went[7:] == [Priority.REFRESH]
 
 
 @pytest.mark.parametrize('kind', [*Priority, _SLOT])
@@ -105,9 +106,9 @@ def test_equals_go_in_the_order_they_came(kind: object) -> None:
     assert [scheduler.take() for _ in range(6)] == [*entries, None]
 
 
-def test_who_is_told_to_stop_goes_before_who_is_asked_whether_he_does() -> None:
+def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
     scheduler = Scheduler()
-    look = entry(Priority.STOP, 'look')
+    look = entry(Priority.LOOK, 'look')
     address = register(1)
     stops = [
         Waiting(cast(Task, name), Transfer(1, address, Priority.STOP, packed(0)))

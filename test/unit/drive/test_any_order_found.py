@@ -23,6 +23,7 @@ import itertools
 from any_order_machine import AnyOrder
 from any_order_machines import G2DriveControl
 from any_order_machines import G2ModeScmd
+from any_order_machines import Movitrac
 from drive_rig import MODE
 from drive_rig import RUN
 from drive_rig import SCMD
@@ -227,5 +228,23 @@ def test_a_clean_up_while_a_fault_is_being_acknowledged_stops_first() -> None:
         sent = [bytes.fromhex(frame['hex']) for frame in state.rig.link.frames[frames:]]
         # the transaction that was on the line, and then the run bits
         assert [frame[1] for frame in sent[:2]].count(16) == 1, sent
+    finally:
+        state.rig.close()
+
+
+def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
+    state = Movitrac()
+    state.begin(response_time=30.0)
+    try:
+        for _ in range(9):
+            state.activate(wait=0.0)
+        state.factory_setting(wait=0.0)
+        state.factory_setting(wait=0.0)
+        state.activate(wait=0.0)
+        state.ride(value=20.0, wait=0.4)
+        state.activate(wait=0.0)
+        # a look begins: who has control, and then whether keypad or terminals command
+        state.close_terminal(terminal=42, wait=0.1)
+        state.stop(wait=0.1)
     finally:
         state.rig.close()
