@@ -96,6 +96,25 @@ def _answer_head(message: bytes) -> bytes:
     return b''
 
 
+class Sightings:
+    """When another master was heard; it is reported when it was no mere noise."""
+
+    def __init__(self, remarks: Remarks) -> None:
+        self._remarks = remarks
+        self._heard: deque[float] = deque((-math.inf,), maxlen=_SURE)
+
+    def add(self, now: float, remark: str) -> None:
+        """Count a request of another master."""
+        self._remarks.foreign_frames += 1
+        self._heard.append(now)
+        if len(self._heard) == _SURE and now < self._heard[0] + _RECKONED:
+            self._remarks.add(remark)
+
+    def is_there(self, now: float) -> bool:
+        """Tell whether another master has been heard of late."""
+        return now < self._heard[-1] + _RECKONED
+
+
 class AnotherMaster:
     """
     Finds the requests of another master, and the answers to them, among what nobody here asked for.
@@ -114,13 +133,12 @@ class AnotherMaster:
         response_timeout: float,
         messages: Callable[[bytes], Iterator[tuple[int, int, bytes]]],
     ) -> None:
-        self._remarks = remarks
+        self._sightings = Sightings(remarks)
         self._response_timeout = response_timeout
         self._messages = messages
         self._buffer = b''
         self._own: deque[bytes] = deque(maxlen=_OWN)
         self._standing: dict[int, _Question] = {}
-        self._heard: deque[float] = deque((-math.inf,), maxlen=_SURE)
 
     def sent(self, frame: bytes) -> None:
         """Take note of a request of ours: it may come back, and is nobody else's."""
@@ -128,7 +146,7 @@ class AnotherMaster:
 
     def is_there(self, now: float) -> bool:
         """Tell whether another master has been heard of late."""
-        return now < self._heard[-1] + _RECKONED
+        return self._sightings.is_there(now)
 
     def stands_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
@@ -197,9 +215,6 @@ class AnotherMaster:
         head = _answer_head(message)
         if not head:
             return False
-        self._remarks.foreign_frames += 1
-        self._heard.append(now)
-        if len(self._heard) == _SURE and now < self._heard[0] + _RECKONED:
-            self._remarks.add(ANOTHER_MASTER)
+        self._sightings.add(now, ANOTHER_MASTER)
         self._standing[unit] = _Question(unit, function, head, now + self._response_timeout)
         return True

@@ -26,6 +26,7 @@ import time
 
 from nfo_sinus_driver.link import nmt
 from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link.another_client import AnotherClient
 from nfo_sinus_driver.link.can import FUNCTION_CODE
 from nfo_sinus_driver.link.can import CanPort
 from nfo_sinus_driver.link.can import Frame
@@ -65,10 +66,12 @@ _INTERFACE = re.compile(r'[^/:\s]+')
 _FRAME_BITS = 108
 #: The longest value that comes in one answer, bytes.
 _EXPEDITED = 4
+#: How many times is read what another client's requests have made uncertain.
+_TRIES = 3
 
 
 class _Ambiguous(DamagedAnswer):
-    """An answer came that may belong to an earlier write."""
+    """An answer came that may belong to an earlier request, or to another client."""
 
 
 class CanopenLink:
@@ -91,6 +94,9 @@ class CanopenLink:
     late to a question asked before, no answer to another write. Not told apart is an answer that is
     told twice just when the next one is lost.
 
+    Another client may ask the same nodes: an answer that may be to it is not believed, and what is
+    read is read again (:class:`AnotherClient`).
+
     How long a number is, and where the sub-indices of an array begin, is for the node to say
     [C102]; above this link a number has the length of the catalog (:class:`ObjectShapes`).
 
@@ -109,6 +115,7 @@ class CanopenLink:
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds
         )
+        self._another = AnotherClient(self.remarks)
         #: The nodes that were made operational.
         self._started: set[int] = set()
         self._shapes = ObjectShapes()
@@ -124,7 +131,8 @@ class CanopenLink:
         :raises ValueError: it is none of them; the message says what to write.
         """
         if _INTERFACE.fullmatch(port):
-            wanted = ((sdo.ANSWERS, FUNCTION_CODE), (nmt.HEARTBEATS, FUNCTION_CODE))
+            identifiers = sdo.ANSWERS, sdo.REQUESTS, nmt.HEARTBEATS
+            wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
             return cls(SocketCan(port, wanted), settings)
         serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
         return cls(LawicelPort(serial, settings.baud_rate), settings)
@@ -173,6 +181,15 @@ class CanopenLink:
         return reply
 
     def _read_object(self, unit: int, address: Address, sub_index: int) -> Reply:
+        for _ in range(_TRIES - 1):
+            try:
+                return self._read_once(unit, address, sub_index)
+            except DamagedAnswer:
+                if not self._another.is_there(time.monotonic()):
+                    raise
+        return self._read_once(unit, address, sub_index)
+
+    def _read_once(self, unit: int, address: Address, sub_index: int) -> Reply:
         upload = Upload(unit, address.index, sub_index)
         kinds = upload.kinds[:1] + (sdo.SEGMENTS if address.size > _EXPEDITED else ())
         questions = ((upload, kinds), *self._resync_reads(unit))
@@ -275,27 +292,38 @@ class CanopenLink:
 
     def _transact(self, transfer: Transfer) -> float:
         """Carry out a transfer; return when its last answer came."""
+        unit = transfer.unit
         self._drain()
-        self.supervision.asks(transfer.unit, writes=False)
+        self.supervision.asks(unit, writes=False)
+        self._another.begins(unit)
         arrived = 0.0
         while transfer.request is not None:
             self._late.sent(transfer)
             sent = time.monotonic()
             self.supervision.send_due(sent)
-            self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.request))
+            self._send(unit, transfer.request)
             try:
                 arrived = self._receive(transfer, sent)
             except Refused:
-                self._late.release(transfer.unit)
+                self._release(unit)
                 raise
             except (NoAnswer, DamagedAnswer):
                 self._late.expect(transfer, time.monotonic())
                 if transfer.has_begun:
-                    self._port.send(Frame(sdo.REQUESTS + transfer.unit, transfer.abort()))
+                    self._send(unit, transfer.abort())
                 raise
-            # a node answers in order: whatever was still to come has come before this
-            self._late.release(transfer.unit)
+            self._release(unit)
         return arrived
+
+    def _send(self, unit: int, message: bytes) -> None:
+        frame = Frame(sdo.REQUESTS + unit, message)
+        self._another.sent(frame)
+        self._port.send(frame)
+
+    def _release(self, unit: int) -> None:
+        """Expect nothing more of what a node was asked before the request that it has answered."""
+        self._late.release(unit)
+        self._late.quarantine(unit, self._another.meanwhile, time.monotonic())
 
     def _drain(self) -> None:
         """Take what came unasked: an answer that is late, one to somebody else, a boot-up."""
@@ -305,10 +333,16 @@ class CanopenLink:
     def _take(self, until: float) -> Sequence[Frame]:
         """Return what has come, as the port does; note which nodes have started anew."""
         frames = self._port.receive(until)
-        self._note_restarts(frames)
+        self._note(frames)
         return frames
 
-    def _note_restarts(self, frames: Sequence[Frame]) -> AbstractSet[int]:
+    def _note(self, frames: Sequence[Frame]) -> AbstractSet[int]:
+        """Take note of what others ask; return which nodes have started anew."""
+        now = time.monotonic()
+        for frame in frames:
+            kinds = self._another.hear(frame, now)
+            if kinds:
+                self._late.quarantine(frame.identifier - sdo.REQUESTS, kinds, now)
         restarted = self.supervision.heard(frames)
         self._started -= restarted
         return restarted
@@ -316,23 +350,20 @@ class CanopenLink:
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
-        quarantined = self._late.quarantined(unit, sent)
         deadline = sent + self._settings.response_timeout
         other = 0
         while True:
             frames = self._port.receive(min(deadline, self.supervision.sign_due))
             now = time.monotonic()
             self.supervision.send_due(now)
-            if unit in self._note_restarts(frames):
+            if unit in self._note(frames):
                 raise NoAnswer(f'unit {unit} has started anew')
             for frame in frames:
                 if frame.identifier != sdo.ANSWERS + unit:
                     continue
                 told = sdo.kind(frame.data)
-                if told in transfer.kinds and told in quarantined:
-                    if isinstance(transfer, Download):
-                        raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')
-                elif told in transfer.kinds:
+                if told is not None and told in transfer.kinds:
+                    self._require_certain(transfer, told, now)
                     self._require_one(transfer, frame, sent, now)
                     if transfer.take(frame.data):
                         return now
@@ -345,6 +376,20 @@ class CanopenLink:
         silent = NoAnswer(f'unit {unit} did not answer{": " if hint else ""}{hint}')
         silent.hint = hint
         raise silent
+
+    def _require_certain(self, transfer: Transfer, told: Kind, now: float) -> None:
+        """
+        Make sure that an answer is none to an earlier request, nor to another client.
+
+        :raises DamagedAnswer: it may be.
+        """
+        unit = transfer.unit
+        if sdo.is_among(told, self._late.quarantined(unit, now)) or (
+            transfer.has_begun and self._another.disturbed(unit)
+        ):
+            raise _Ambiguous(
+                f'unit {unit} answered, but perhaps to an earlier request or to another client'
+            )
 
     def _require_one(self, transfer: Transfer, answer: Frame, sent: float, now: float) -> None:
         """

@@ -155,7 +155,7 @@ class Remarks:
     """
     What a link has noticed about its line although it works; any thread may read it.
 
-    :ivar foreign_frames: how many frames of another master have been seen.
+    :ivar foreign_frames: how many requests of another master have been heard.
     """
 
     def __init__(self) -> None:

@@ -26,6 +26,7 @@ from __future__ import annotations
 from abc import ABC
 from abc import abstractmethod
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 import struct
 from typing import NamedTuple
 
@@ -78,6 +79,8 @@ class Kind(NamedTuple):
 
 #: The kinds of segments.
 SEGMENTS = (Kind(_UPLOADED_SEGMENT), Kind(_DOWNLOADED_SEGMENT))
+#: An abort of whatever the node did last.
+_ANY_ABORT = Kind(_ABORT)
 
 
 def kind(message: bytes) -> Kind | None:
@@ -89,6 +92,25 @@ def kind(message: bytes) -> Kind | None:
         _, index, sub_index = _HEAD.unpack_from(message)
         return Kind(command, index, sub_index)
     return Kind(command) if Kind(command) in SEGMENTS else None
+
+
+def kinds_asked_for(request: bytes) -> frozenset[Kind]:
+    """Return the kinds of answers to what a client sends; none where it ends a transfer."""
+    if len(request) != _LENGTH:
+        return frozenset()
+    command = request[0] & _COMMAND
+    if command == _ABORT:
+        return frozenset()
+    if command not in (_UPLOAD, _DOWNLOAD):
+        return frozenset((*SEGMENTS, _ANY_ABORT))
+    _, index, sub_index = _HEAD.unpack_from(request)
+    begun = _UPLOADED if command == _UPLOAD else _DOWNLOADED
+    return frozenset((Kind(begun, index, sub_index), Kind(_ABORT, index, sub_index)))
+
+
+def is_among(told: Kind, kinds: AbstractSet[Kind]) -> bool:
+    """Tell whether an answer may be one of some kinds."""
+    return told in kinds or (told.command == _ABORT and _ANY_ABORT in kinds)
 
 
 class Transfer(ABC):

@@ -152,10 +152,13 @@ class Bus:
             return
         if fate.what == 'refuse' and command in (1, 2):
             answer = b'\x80' + frame.data[1:4] + (0x08000022).to_bytes(4, 'little')
-        start = max(self._free.get(unit, 0.0), self.now + FRAME_TIME + fate.delay * TIMEOUT)
         for _ in range(2 if fate.what == 'double' else 1):
-            start += FRAME_TIME
-            self.arrive(start, Frame(0x580 + unit, answer))
+            self.answer(unit, answer, fate.delay * TIMEOUT)
+
+    def answer(self, unit: int, answer: bytes, delay: float = 0.0) -> None:
+        """Let a node answer, behind what it answers already."""
+        start = max(self._free.get(unit, 0.0), self.now + FRAME_TIME + delay) + FRAME_TIME
+        self.arrive(start, Frame(0x580 + unit, answer))
         self._free[unit] = start
 
     def receive(self, until: float) -> Sequence[Frame]:

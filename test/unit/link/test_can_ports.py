@@ -361,6 +361,13 @@ def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) ->
     assert paper.options == [(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected)]
 
 
+def test_a_link_lets_in_answers_signs_of_life_and_what_others_ask(paper: PaperSocket) -> None:
+    CanopenLink.on_port('can0', LineSettings(125_000, '8N1')).open()
+    ((_, _, filters),) = paper.options
+    identifiers = [identifier for identifier, _ in struct.iter_unpack('=II', filters)]
+    assert sorted(identifiers) == [0x580, 0x600, 0x700]
+
+
 def test_frames_of_a_socket(paper: PaperSocket) -> None:
     port = make()
     port.open()
