@@ -100,9 +100,10 @@ class CanopenLink:
     How long a number is, and where the sub-indices of an array begin, is for the node to say
     [C102]; above this link a number has the length of the catalog (:class:`ObjectShapes`).
 
-    A node is made operational before the first write to it, and again when it has started anew:
-    reading changes nothing. From then on the client's heartbeat is sent, by the thread that asks:
-    a node that watches over it notices when that thread is gone (:class:`CanopenSupervision`).
+    A node is made operational before the first write to it, and again when it has started anew or
+    was silent: reading changes nothing. From then on the client's heartbeat is sent, by the thread
+    that asks: a node that watches over it notices when that thread is gone
+    (:class:`CanopenSupervision`).
     """
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
@@ -307,8 +308,11 @@ class CanopenLink:
             except Refused:
                 self._release(unit)
                 raise
-            except (NoAnswer, DamagedAnswer):
+            except (NoAnswer, DamagedAnswer) as error:
                 self._late.expect(transfer, time.monotonic())
+                if isinstance(error, NoAnswer):
+                    # another master may have stopped the node, which answers nothing then
+                    self._started.discard(unit)
                 if transfer.has_begun:
                     self._send(unit, transfer.abort())
                 raise

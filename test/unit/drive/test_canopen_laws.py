@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import time
 
 from canopen_rig import CanopenRig
 from drive_rig import PATIENCE
@@ -27,6 +28,7 @@ from support.examples import FULL
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import Server
 
 #: Each reading in one of them at least.
@@ -216,3 +218,15 @@ def test_a_lost_answer_to_the_end_of_the_watch_is_no_failed_clean_up(
         monkeypatch.setattr(link.supervision, '_write', lose)
         assert 'the bus keeps control' in rig.answer(rig.drive.disconnect(PATIENCE))
         assert rig.told(Cause.WATCH_LEFT)
+
+
+def test_the_motor_of_a_node_that_another_master_stops_stands(tmp_path: Path) -> None:
+    with CanopenRig(tmp_path, lost_after=1.0, response_timeout=0.2) as rig:
+        rig.connect()
+        with rig.turning(20.0):
+            server = rig.far.servers['canopen']
+            assert isinstance(server, Server)
+            stop = Frame(0, bytes((2, 1)))
+            rig.touch(lambda: list(server.receive(stop, time.monotonic())))
+            wait_until(lambda: rig.told(Cause.LOST_IN_USE))
+            rig.still()

@@ -321,6 +321,17 @@ def test_a_node_is_made_operational_before_the_first_write() -> None:
     assert len(starts(bench)) == 3
 
 
+def test_a_node_that_was_silent_is_made_operational_again_by_the_next_write() -> None:
+    bench = Bench(GOOD, DROP)
+    bench.write(A)
+    with pytest.raises(NoAnswer):
+        bench.read(B)
+    assert len(starts(bench)) == 1
+    bench.write(A)
+    bench.write(A)
+    assert starts(bench) == [START, START]
+
+
 @pytest.mark.parametrize('reads', [0, 1])
 def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
     bench = Bench()
