@@ -28,6 +28,7 @@ from support.examples import FULL
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.simulator import can_line
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import Server
 
@@ -230,3 +231,23 @@ def test_the_motor_of_a_node_that_another_master_stops_stands(tmp_path: Path) ->
             rig.touch(lambda: list(server.receive(stop, time.monotonic())))
             wait_until(lambda: rig.told(Cause.LOST_IN_USE))
             rig.still()
+
+
+def test_another_sdo_client_is_reported_and_nothing_of_it_is_published(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # it writes an object that the driver reads, and reads a text in segments
+    foreign = ('2B7B200009090000', '400A100000000000', '6000000000000000', '7000000000000000')
+    frames = tuple(Frame(0x601, bytes.fromhex(data)) for data in foreign)
+    monkeypatch.setattr(can_line, '_FOREIGN', frames)
+    with CanopenRig(tmp_path) as rig:
+        rig.connect()
+        with rig.turning(20.0):
+            rig.notes[1].snapshots.clear()
+            rig.simulator.inject('traffic', 50.0)
+            wait_until(lambda: rig.bus.statistics().foreign_frames >= 50)
+            wait_until(lambda: rig.notes[1].snapshots)
+            assert all(abs(shown.actual - 20) < 0.5 for shown in rig.notes[1].snapshots)
+            (remark,) = rig.bus.remarks
+            assert 'another SDO client asks node 1' in remark
+            assert not rig.told(Cause.LOST_IN_USE)
