@@ -506,6 +506,8 @@ class Profile:
         its name; this one is the first.
     :ivar start_settings: what :meth:`ControlMethod.require_startable` depends on: none of these
         settings changes while the motor is enabled.
+    :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
+        protocol; where one is not there, what the protocol says itself.
     :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
         the protocol over which that is so.
     """
@@ -526,6 +528,7 @@ class Profile:
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
     start_settings: frozenset[str] = frozenset()
+    line_check: Mapping[str, str] = field(default_factory=dict)
     holds_control: Mapping[str, str] = field(default_factory=dict)
     words: Mapping[str, Profile] = field(default_factory=dict)
 

@@ -362,8 +362,8 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar='SECONDS',
-        help="set the drive's own time-out (SioTot, with AutoStop on), so that it stops by itself "
-        'when the line is cut (default: leave it as it is)',
+        help="set the drive's own time-out, so that it stops by itself when the line is cut "
+        '(default: leave it as it is)',
     )
     add(
         '--period',

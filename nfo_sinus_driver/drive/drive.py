@@ -188,6 +188,12 @@ class Drive:
         """The counters and times of what is said to this drive."""
         return self._bus.statistics(self._unit)
 
+    @property
+    def line_check(self) -> str:
+        """What to look at, in this order, while the drive has never answered."""
+        protocol = self._bus.protocol
+        return self.inverter.model.profile.line_check.get(protocol.name, protocol.check)
+
     def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
         """Run a coroutine on the bus; what goes wrong on the line is explained."""
 
@@ -195,7 +201,7 @@ class Drive:
             try:
                 return await command()
             except LinkError as error:
-                check = None if self.inverter.identity else self._bus.protocol.check
+                check = None if self.inverter.identity else self.line_check
                 raise DriveError(explain(error, self._unit, check=check)) from error
             except Cancelled:
                 raise DriveError(Cause.ENDING) from None

@@ -29,8 +29,8 @@ BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
 _FORMAT = re.compile(r'([78])([EON])([12])')
 #: Most protocols are for drives that leave the factory set to another one [C93].
 _CHECK = (
-    'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc for '
-    'Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity'
+    'the protocol that the drive is set to (the factory setting may be another one), RS232 or '
+    'RS485 (there may be a jumper for that), the address, baud rate and parity'
 )
 
 

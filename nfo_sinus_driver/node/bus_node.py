@@ -101,7 +101,7 @@ class BusNode(Node):
             statistics,
             error,
             silent,
-            self.bus_context.bus.protocol.check if nobody else '',
+            self._check if nobody else '',
             self.bus_context.bus.remarks,
         )
         self._diagnostics.publish(diagnostics.array(status, stamp))
@@ -110,6 +110,12 @@ class BusNode(Node):
             if remark not in self._logged_remarks:
                 self._logged_remarks.add(remark)
                 self.get_logger().warning(remark)
+
+    @property
+    def _check(self) -> str:
+        """What to look at while no drive answers: what all have alike, or what is of the line."""
+        found = {drive.line_check for drive in self.bus_context.drives}
+        return found.pop() if len(found) == 1 else self.bus_context.bus.protocol.check
 
     def _log_port(self, error: str | None) -> None:
         """Say what the port does, on change."""

@@ -81,6 +81,12 @@ class ManagedDrive:
         self._drive = Drive(bus, self._concrete, listener)
 
     @property
+    def line_check(self) -> str:
+        """What to look at while the drive has never answered."""
+        known = self._settings.model != AUTO
+        return self._drive.line_check if known else self._bus.protocol.check
+
+    @property
     def drive(self) -> Drive:
         """The present one."""
         return self._drive

@@ -110,14 +110,14 @@ BUS_SETTINGS = (
     Setting(
         'protocol',
         'modbus_rtu',
-        'Protocol on the line, as BusType in the drive says',
+        'Protocol on the line, the one that the drive is set to',
         constraints=f'one of {", ".join(PROTOCOLS)}',
         fixed=True,
     ),
     Setting(
         'baud_rate',
         0,
-        'Bit rate, bit/s, as SiBaud in the drive says; 0: the factory default of the protocol',
+        'Bit rate of the line, bit/s, that of the drive; 0: the factory default of the protocol',
         constraints=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as '
         'the protocol has it',
         fixed=True,
@@ -125,8 +125,8 @@ BUS_SETTINGS = (
     Setting(
         'char_format',
         '',
-        'Data bits, parity and stop bits, as SiProt in the drive says; '
-        "'': the factory default of the protocol",
+        "Data bits, parity and stop bits, those of the drive; '': the factory default of the "
+        'protocol',
         constraints='such as 8E1, 8O1, 8N2; with 7 for modbus_ascii',
         fixed=True,
     ),
@@ -267,8 +267,8 @@ DRIVE_SETTINGS = (
     Setting(
         'drive_timeout',
         0.0,
-        "The drive's own time-out (G2: SioTot, with AutoStop = ON), s: it stops the motor when "
-        'this driver dies; 0: leave it as it is',
+        "The drive's own time-out, s: it stops the motor when this driver dies; 0: leave it as it "
+        'is',
         0,
         LONGEST_DRIVE_TIMEOUT,
         unit='s',
@@ -310,8 +310,7 @@ DRIVE_SETTINGS = (
     Setting(
         'frequency_scale',
         0.1,
-        'What one count of a frequency is, Hz, where the drive has a scale that no bus tells, '
-        'such as FrqScl',
+        'What one count of a frequency is, Hz, where the drive has a scale that no bus tells',
         1e-6,
         1e6,
         unit='Hz',
@@ -319,7 +318,7 @@ DRIVE_SETTINGS = (
     Setting(
         'torque_scale',
         1.0,
-        'The same of a torque, % of the nominal one, such as TrqScl',
+        'The same of a torque, % of the nominal one',
         1e-6,
         1e6,
         unit='%',
@@ -327,7 +326,7 @@ DRIVE_SETTINGS = (
     Setting(
         'process_scale',
         0.1,
-        'The same of a process value, in its unit, such as RegScl',
+        'The same of a process value, in its unit',
         1e-6,
         1e6,
     ),

@@ -69,6 +69,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
 }
 #: What a driver says where nobody answers, and what is to be checked, in order.
 SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
+_SILENCE_OF_OTHERS = 'no response', 'protocol', 'RS485', 'the address,', 'baud', 'parity'
 _SILENCE_OF_MOVITRACS = 'no response', 'power', 'USS 11A', 'P880', 'P842', 'wires'
 _SILENCE_OF_NODES = 'no response', 'power', 'the node id', 'the bit rate', 'CAN_H', '120 ohms'
 
@@ -150,7 +151,9 @@ class Way:
             return 'has no path to unit', 'table of units', 'serial port'
         if self.protocol == 'canopen':
             return _SILENCE_OF_NODES
-        return _SILENCE_OF_MOVITRACS if self.protocol == 'movitrac' else SILENCE
+        if self.protocol == 'movitrac':
+            return _SILENCE_OF_MOVITRACS
+        return SILENCE if self.model == 'sinus_g2' else _SILENCE_OF_OTHERS
 
     @property
     def noise(self) -> tuple[str, ...]:

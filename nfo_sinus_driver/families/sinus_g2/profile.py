@@ -504,6 +504,12 @@ PROFILE = Profile(
     most=MOST,
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
+    # [C93]
+    line_check=dict.fromkeys(
+        ('modbus_rtu', 'modbus_ascii', 'modbus_tcp', 'classic'),
+        'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc '
+        'for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity',
+    ),
     # [M0 §6.4]
     holds_control={
         'canopen': 'the CANopen module holds the drive in bus mode from the first request on, '

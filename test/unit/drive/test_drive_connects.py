@@ -81,6 +81,12 @@ def test_nobody_at_this_address(make_rig: MakeRig) -> None:
     assert not rig.drive.snapshot.connected
 
 
+def test_what_to_check_is_in_the_words_of_the_model(make_rig: MakeRig) -> None:
+    rig = make_rig(model='sinus_optimal', address=7, response_timeout=0.05, retries=0)
+    message = rig.refused(rig.drive.connect())
+    assert 'BusType' not in message and 'the protocol that the drive is set to' in message
+
+
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
 def test_each_protocol_says_what_to_check(protocol: LineProtocol) -> None:
     silent = NoAnswer('unit 3 did not answer')
