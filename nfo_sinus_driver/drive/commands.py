@@ -153,6 +153,12 @@ async def _stands(
         return False
 
 
+async def read_scales(inverter: DriveState) -> None:
+    """Read the scale of speeds, and report one that is not the one before."""
+    if await inverter.scales.read():
+        inverter.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(inverter.scales.speed))
+
+
 async def read_limits(inverter: DriveState, control_mode: str) -> profile.Limits:
     """
     Read what a set-point may be, in the unit of a control mode.

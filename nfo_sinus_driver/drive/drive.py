@@ -37,6 +37,7 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import carry_out
+from nfo_sinus_driver.drive.commands import read_scales
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
@@ -435,7 +436,7 @@ class Drive:
             raise DriveError(
                 Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
             ) from error
-        await self._read_scales()
+        await read_scales(inverter)
         await inverter.read_control_mode()
         await inverter.timeout.read()
         inverter.require_fresh(await inverter.look(Priority.SERVICE))
@@ -460,11 +461,6 @@ class Drive:
         if self._controller is None and held:
             inverter.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
-
-    async def _read_scales(self) -> None:
-        scales = self.inverter.scales
-        if await scales.read():
-            self.inverter.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(scales.speed))
 
     def _set_disconnected(self) -> None:
         self.inverter.lost()

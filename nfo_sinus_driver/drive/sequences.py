@@ -36,6 +36,7 @@ from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.commands import read_limits
+from nfo_sinus_driver.drive.commands import read_scales
 from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
@@ -410,6 +411,8 @@ class StartSequence:
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self._method.require_startable()
+        # it may have been changed since the drive was connected, at its keypad
+        await read_scales(inverter)
         return control_mode, await read_limits(inverter, control_mode)
 
     async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:

@@ -386,7 +386,9 @@ class Setpoint:
 
     def _limited(self, request: Request) -> float:
         limits, most = self._limits, min(self.most, request.most)
-        return max(limits.least, -most, min(limits.most, most, request.value))
+        taken = max(limits.least, min(limits.most, request.value))
+        # beyond what the drive takes, rather than beyond what the user allows
+        return max(-most, min(most, taken))
 
     def _accept(self, request: Request) -> float:
         """Take note that a request counts; return what it is limited to."""

@@ -169,6 +169,18 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(make_rig: MakeRig, e
         )
 
 
+def test_setpoint_max_is_kept_where_it_is_less_than_the_drive_takes(make_rig: MakeRig) -> None:
+    rig = make_rig(
+        parameters={'control.mode': 'PI-Reg', 'pi_reg.setmin': 100.0, 'pi_reg.setmax': 400.0},
+        setpoint_max=50.0,
+    )
+    rig.connect()
+    rig.enable()
+    rig.drive.set_setpoint(80.0)
+    wait_until(lambda: rig.drive.snapshot.setpoint_clamped)
+    assert rig.drive.snapshot.setpoint == 50.0
+
+
 @every_way
 @pytest.mark.parametrize('most', ['nominal', 'less', 'the_drive'])
 def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: str) -> None:

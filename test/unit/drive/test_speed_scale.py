@@ -66,6 +66,19 @@ def test_speeds_are_in_rpm_whatever_the_scale(way: str, scale: tuple[int, int]) 
     rig.close()
 
 
+def test_a_scale_that_was_changed_since_connect_counts_from_the_next_enable_on() -> None:
+    rig = rig_of('G2, Modbus, MODE', 1, 1)
+    rig.answer(rig.drive.connect())
+    rig.drive.activate()
+    rig.far.memory.put('fieldbus.spd_scl_numerator', 10)
+    rig.answer(rig.drive.enable())
+    rig.send(300.0)
+    rig.pass_time(4.0)
+    assert rig.far.motor.speed == pytest.approx(300.0, abs=10)
+    assert [text for _, _, text in rig.notes.events if says(text, Cause.SPEED_SCALE)]
+    rig.close()
+
+
 def test_a_speed_that_the_scale_cannot_carry_is_clamped() -> None:
     rig = rig_of('G2, Modbus, MODE', 1, 10, setpoint_max=9000.0)
     rig.answer(rig.drive.connect())
