@@ -50,12 +50,10 @@ def log_call(node: Node, service: str, detail: str = '') -> None:
 
 
 def _log_later(node: Node, name: str, detail: str) -> None:
-    # the node may be destroyed meanwhile
-    with contextlib.suppress(InvalidHandle, rclpy_implementation.RCLError):
-        deadline = time.monotonic() + _KNOWN_WITHIN
-        while not (clients := _clients(node, name)) and time.monotonic() < deadline:
-            time.sleep(_LOOK_PERIOD)
-        _log(node, name, detail, clients)
+    deadline = time.monotonic() + _KNOWN_WITHIN
+    while not (clients := _clients(node, name)) and time.monotonic() < deadline:
+        time.sleep(_LOOK_PERIOD)
+    _log(node, name, detail, clients)
 
 
 def _log(node: Node, name: str, detail: str, clients: list[str]) -> None:
@@ -66,10 +64,12 @@ def _log(node: Node, name: str, detail: str, clients: list[str]) -> None:
 
 def _clients(node: Node, service: str) -> list[str]:
     found = []
-    for name, namespace in sorted(set(node.get_node_names_and_namespaces())):
-        # one may have ended meanwhile
-        with contextlib.suppress(NodeNameNonExistentError):
-            clients = node.get_client_names_and_types_by_node(name, namespace)
-            if any(called == service for called, _ in clients):
-                found.append(f'{namespace.rstrip("/")}/{name}')
+    # the node may be destroyed meanwhile; and its command is given, so nothing spoils the answer
+    with contextlib.suppress(InvalidHandle, rclpy_implementation.RCLError):
+        for name, namespace in sorted(set(node.get_node_names_and_namespaces())):
+            # one may have ended meanwhile
+            with contextlib.suppress(NodeNameNonExistentError):
+                clients = node.get_client_names_and_types_by_node(name, namespace)
+                if any(called == service for called, _ in clients):
+                    found.append(f'{namespace.rstrip("/")}/{name}')
     return found

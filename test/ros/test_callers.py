@@ -1,0 +1,41 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A command that was given is answered, whatever its line in the log runs into."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from nfo_sinus_driver.node.callers import log_call
+
+
+@pytest.mark.parametrize('error', [rclpy_implementation.RCLError('x'), InvalidHandle('x')])
+def test_what_the_middleware_cannot_tell_spoils_no_answer(error: Exception) -> None:
+    def fail(*_: Any) -> None:
+        raise error
+
+    logger = SimpleNamespace(info=lambda text: None)
+    node: Any = SimpleNamespace(
+        resolve_service_name=lambda name: name,
+        get_node_names_and_namespaces=fail,
+        get_logger=lambda: logger,
+    )
+    log_call(node, '~/stop')
