@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 import math
-import time
 
+from nfo_sinus_driver.link import Clock
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
 from nfo_sinus_driver.link import NoAnswer
@@ -101,9 +101,9 @@ class Tally:
         """Record how long one round of polling took, s."""
         self.cycle_time = seconds
 
-    def statistics(self, cycle_time: float) -> Statistics:
+    def statistics(self, cycle_time: float, now: float) -> Statistics:
         """Return the present figures."""
-        start = time.monotonic() - _WINDOW
+        start = now - _WINDOW
         busy = sum(seconds for end, seconds in self._busy.copy() if end >= start)
         trips = sorted(self._round_trips.copy())
         return Statistics(
@@ -128,7 +128,8 @@ def _at(trips: list[float], share: float) -> float:
 class Recorder:
     """Takes the measurements of a line; written by the bus worker alone, read by anyone."""
 
-    def __init__(self) -> None:
+    def __init__(self, now: Clock) -> None:
+        self._now = now
         self._line = Tally()
         self._units: dict[int, Tally] = {}
 
@@ -159,10 +160,10 @@ class Recorder:
         if unit is not None:
             # who only asks leaves no trace: this is called by any thread
             tally = self._units.get(unit) or Tally()
-            return tally.statistics(tally.cycle_time)
+            return tally.statistics(tally.cycle_time, self._now())
         cycles = (tally.cycle_time for tally in self._units.copy().values())
         known = (cycle for cycle in cycles if not math.isnan(cycle))
-        return self._line.statistics(max(known, default=math.nan))
+        return self._line.statistics(max(known, default=math.nan), self._now())
 
     def _of(self, unit: int) -> Tally:
         if unit not in self._units:

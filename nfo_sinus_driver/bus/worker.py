@@ -58,6 +58,7 @@ from nfo_sinus_driver.bus.tasks import inquire
 from nfo_sinus_driver.bus.tasks import log_unexpected
 from nfo_sinus_driver.bus.tasks import set_up
 from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Clock
 from nfo_sinus_driver.link import Connecting
 from nfo_sinus_driver.link import GatewaySilent
 from nfo_sinus_driver.link import Identification
@@ -83,11 +84,15 @@ class Bus:
     What is read and written with it is awaited by coroutines on the worker.
 
     :param max_requests: how many are sent a second at most, stops aside; 0: no limit.
+    :param now: the steady clock of the link, and of all that run on the bus, s.
     :raises LinkError: a transaction fails, as the link does.
     """
 
-    def __init__(self, link: Link, max_requests: float = 0.0) -> None:
+    def __init__(
+        self, link: Link, max_requests: float = 0.0, now: Clock = time.monotonic
+    ) -> None:
         self._link = link
+        self.now = now
         self._request_period = 1 / max_requests if max_requests else 0.0
         #: Until then only stops are sent.
         self._paced_until = -math.inf
@@ -97,14 +102,14 @@ class Bus:
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
         self._scheduler = Scheduler(
-            self.silences.is_silent, lambda unit: self.silences.is_missing(unit, time.monotonic())
+            self.silences.is_silent, lambda unit: self.silences.is_missing(unit, self.now())
         )
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
         self._tasks: set[Task] = set()
         #: For coroutines on the worker to count in.
-        self.recorder = Recorder()
+        self.recorder = Recorder(now)
         #: How many coroutines read parameters again and again; they share the time for it.
         self._refreshing = 0
         #: The units whose settings are read for the first time, and those for which that was begun.
@@ -261,7 +266,7 @@ class Bus:
 
     def sleep(self, seconds: float) -> Pause:
         """Let time pass (to be awaited)."""
-        return Pause(time.monotonic() + seconds)
+        return Pause(self.now() + seconds)
 
     @property
     def current(self) -> Task | None:
@@ -376,7 +381,7 @@ class Bus:
         supervision = self._link.supervision
         if supervision is None:
             return math.inf
-        now = time.monotonic()
+        now = self.now()
         if now >= supervision.due:
             try:
                 supervision.serve()
@@ -401,7 +406,7 @@ class Bus:
                 item()
 
     def _ring_timers(self) -> None:
-        now = time.monotonic()
+        now = self.now()
         while (task := self._sleepers.take_due(now)) is not None:
             self._end_pause(task)
 
@@ -411,7 +416,7 @@ class Bus:
 
     def _rest(self, until: float) -> None:
         if not self._inbox and not self._stopping:
-            self._awake.wait(None if until == math.inf else max(0.0, until - time.monotonic()))
+            self._awake.wait(None if until == math.inf else max(0.0, until - self.now()))
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
         """Step a task and file what it awaits next."""
@@ -433,7 +438,7 @@ class Bus:
             self._sleepers.add(task, awaited.until)
 
     def _send_next(self) -> bool:
-        now = time.monotonic()
+        now = self.now()
         entry = self._scheduler.take(
             missing=now >= self.silences.missing_from, only_stops=now < self._paced_until
         )
@@ -481,7 +486,7 @@ class Bus:
         self.spawn(wait())
 
     def _transact(self, transfer: Transfer) -> Reply:
-        started = time.monotonic()
+        started = self.now()
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
         try:
@@ -510,7 +515,7 @@ class Bus:
         return reply
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
-        now = time.monotonic()
+        now = self.now()
         self.silences.note(unit, now, error, now - started)
         self._scheduler.took(now - started)
         if isinstance(error, PortError):
@@ -539,7 +544,7 @@ class Bus:
         self.recorder.opened()
 
     def _open_when_due(self) -> None:
-        now = time.monotonic()
+        now = self.now()
         if now >= self._port.reopen_at and self._port.open(now + REOPEN_PERIOD):
             self.recorder.opened()
 

@@ -25,7 +25,6 @@ from collections.abc import Awaitable
 from collections.abc import Callable
 from dataclasses import replace
 import math
-import time
 from typing import Any
 from typing import TypeVar
 
@@ -135,7 +134,7 @@ async def carry_out(
                 refusal = Refusal(str(error))
                 refusal.__cause__ = error
         if isinstance(step, profile.Write):
-            written_at = time.monotonic()
+            written_at = registers.now()
 
 
 async def _stands(

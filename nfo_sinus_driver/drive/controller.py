@@ -27,7 +27,6 @@ from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
 import math
-import time
 
 from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.bus import Priority
@@ -163,7 +162,7 @@ class Controller:
         """Turn the table by one event, and do what leaving a state means."""
         before = self._state
         self._state = control_state.TRANSITIONS.get((before, event), before)
-        self._since = time.monotonic()
+        self._since = self._bus.now()
         if event is ControlEvent.STOPPED:
             self._stopped_at = self._since
         if self._state is before:
@@ -371,7 +370,7 @@ class Controller:
                 may_run = may_run or (await self._inverter.look(Priority.LOOK)).tuning
                 if may_run:
                     await self.method.quick_stop(self._inverter.control_mode)
-                    told_at = time.monotonic()
+                    told_at = self._bus.now()
                     # a PLC whose data stand still goes on showing what was before
                     await self._inverter.wait_until(
                         lambda seen: seen.at >= told_at and not seen.driven, Priority.LOOK
@@ -558,7 +557,7 @@ class Controller:
     def refused(self, reason: Report) -> None:
         """Stop because of a set-point; the next status may tell a better reason."""
         self._stop()
-        self._refusal = (time.monotonic(), reason)
+        self._refusal = (self._bus.now(), reason)
 
     def _explain_refusal(self, seen: InverterStatus) -> bool:
         if self._refusal is None or seen.at <= self._refusal[0]:

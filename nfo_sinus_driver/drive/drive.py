@@ -22,7 +22,6 @@ from collections.abc import Coroutine
 from collections.abc import Sequence
 from concurrent.futures import Future
 import math
-import time
 from typing import Any
 from typing import TypeVar
 
@@ -296,10 +295,10 @@ class Drive:
         if not self.heard:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)
-        until = time.monotonic() + patience
+        until = self._bus.now() + patience
         answer = await self._deactivate(patience)
         if self._controller is not None and answer is not None:
-            await self._controller.leave(until - time.monotonic())
+            await self._controller.leave(until - self._bus.now())
         return answer
 
     @on_bus
@@ -307,7 +306,7 @@ class Drive:
         """
         Take control and run at set-point 0, then follow set-points that come in.
 
-        :param asked_at: when somebody asked for that, s of ``time.monotonic``, if not just now: it
+        :param asked_at: when somebody asked for that, s of the clock, if not just now: it
             is refused if a stop was confirmed since.
         """
         self._require_active()

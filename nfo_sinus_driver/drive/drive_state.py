@@ -23,7 +23,6 @@ from dataclasses import replace
 from fractions import Fraction
 import logging
 import math
-import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import Priority
@@ -203,7 +202,7 @@ class DriveState:
         longest = self.settings.lost_after
         # who looks at low priority waits for its turn, while others see newer ones
         newest = seen.at if self.seen is None else max(seen.at, self.seen.at)
-        if self.plc_time and time.monotonic() - newest >= longest:
+        if self.plc_time and self.bus.now() - newest >= longest:
             raise DriveError(Cause.OLD_DATA, seconds=longest)
 
     async def wait_until(
@@ -218,9 +217,9 @@ class DriveState:
         :param timeout: how long it may take, s; by default :data:`TIMEOUT`.
         :raises DriveError: it takes longer.
         """
-        deadline = time.monotonic() + (TIMEOUT if timeout is None else timeout)
+        deadline = self.bus.now() + (TIMEOUT if timeout is None else timeout)
         while not wanted(await self.look(priority)):
-            if time.monotonic() > deadline:
+            if self.bus.now() > deadline:
                 raise DriveError(self.report(Cause.NOT_CONFIRMED))
             await self.bus.sleep(LOOK_PERIOD)
 
@@ -397,7 +396,7 @@ class DriveState:
 
     def polled(self, role: Role, value: float) -> None:
         """Take note of what a poll has measured just now."""
-        self._polled[role] = Measured(value, time.monotonic())
+        self._polled[role] = Measured(value, self.bus.now())
 
     def forget_polled(self) -> None:
         """Take note that what was polled is not known of the drive that is there now."""

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 import logging
 import math
-import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
@@ -69,7 +68,7 @@ class OperatingClock:
     Every reading says within one tick when the drive's hours would have begun if it had had power
     all the time. While it has power all readings agree, and together they are finer than a tick;
     one that does not fit shows that it was off, and nothing from before can be mapped any more.
-    Operating times are in hours, moments in seconds of ``time.monotonic``.
+    Operating times are in hours, moments in seconds of the clock of the bus.
     """
 
     def __init__(self) -> None:
@@ -167,7 +166,7 @@ class ErrorLog:
         return hours
 
     def note_sighting(self, entry: int, at: float) -> None:
-        """Remember when an entry came, s of ``time.monotonic``."""
+        """Remember when an entry came, s of the clock of the bus."""
         self._sightings = [(entry, at), *self._sightings[: _REMEMBERED - 1]]
 
     def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
@@ -275,7 +274,7 @@ class ErrorLog:
         if now > then - TICK:
             age = max(0.0, now - then)
             at = self.clock.moment(then)
-            latest = time.monotonic() - max(0.0, age - TICK) * _HOUR
+            latest = self._inverter.bus.now() - max(0.0, age - TICK) * _HOUR
         if not math.isnan(sighted_at):
             at = sighted_at
         return LogEntry(code, self._inverter.text_of(code), round(then, 1), age, at, latest)
@@ -353,7 +352,7 @@ class ErrorLogMonitor:
         return _PERIOD
 
     async def _look(self) -> None:
-        log, known, began = self._error_log, self._known, time.monotonic()
+        log, known, began = self._error_log, self._known, self._inverter.bus.now()
         news = await log.newer_than(known, Priority.TELEMETRY)
         now = await log.read_time(Priority.TELEMETRY)
         newest = self._known = news[0] if news else known or 0
@@ -371,7 +370,7 @@ class ErrorLogMonitor:
                 log.note_sighting(entry, at)
         self._looked_at = began
         if news:
-            self._told_at = time.monotonic()
+            self._told_at = self._inverter.bus.now()
             self._tell(log.understood(news, now))
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:

@@ -72,6 +72,8 @@ class ParameterAccess:
     ) -> None:
         self.model = model
         self._bus = bus
+        #: The clock of the bus.
+        self.now = bus.now
         self._unit = unit
         self._retries = retries
         #: How many requests nobody answered.

@@ -28,7 +28,6 @@ from concurrent.futures import Future
 import contextlib
 import functools
 import logging
-import time
 from typing import Any
 from typing import Concatenate
 from typing import ParamSpec
@@ -209,7 +208,7 @@ class Parameters:
         self._data, self._values = {}, {}
         keys = self.available(only)
         self._unread = self._total = len(keys)
-        started = time.monotonic()
+        started = self._bus.now()
         try:
             with self._bus.introducing(inverter.settings.address):
                 await self._read_first(keys)
@@ -220,13 +219,13 @@ class Parameters:
             self._unread = 0
         self._keys = tuple(key for key in keys if key in self._data)
         if keys:
-            took = time.monotonic() - started
+            took = self._bus.now() - started
             inverter.tell(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
         pause = _PROGRESS
-        tell_at = time.monotonic() + pause
+        tell_at = self._bus.now() + pause
         refusals = 0
         while keys and refusals < _REFUSALS:
             refused: dict[str, Refused] = {}
@@ -237,9 +236,9 @@ class Parameters:
                 except Refused as error:
                     # by a busy drive, perhaps: asked again when the others are read
                     refused[key] = error
-                if time.monotonic() > tell_at:
+                if self._bus.now() > tell_at:
                     pause *= 2
-                    tell_at = time.monotonic() + pause
+                    tell_at = self._bus.now() + pause
                     self._inverter.tell(
                         Severity.INFO, Cause.SETTINGS_BEING_READ, progress=self.progress
                     )
@@ -277,7 +276,7 @@ class Parameters:
         self._rounds += 1
         skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
-        started = time.monotonic()
+        started = self._bus.now()
         for number, key in enumerate(due, start=1):
             if inverter.connected and inverter.answering:
                 try:
@@ -289,7 +288,7 @@ class Parameters:
                     inverter.missed()
             # many drives on a line take their time, so that other things go on, too
             pace = _ROUND * sharers() / len(due)
-            await self._bus.sleep(started + number * pace - time.monotonic())
+            await self._bus.sleep(started + number * pace - self._bus.now())
             if keys is not self._keys:
                 # they are read anew
                 return

@@ -21,7 +21,6 @@ from collections.abc import Callable
 from collections.abc import Coroutine
 import logging
 import math
-import time
 from typing import Any
 from typing import TypeVar
 
@@ -242,7 +241,7 @@ class Poller:
     async def _poll_for_ever(self) -> None:
         polled_at = -math.inf
         while True:
-            started = time.monotonic()
+            started = self._bus.now()
             due = started >= polled_at + self._period
             try:
                 if not self._inverter.connected:
@@ -270,11 +269,11 @@ class Poller:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
             heard_at = self._bus.silences.heard_at(self._unit)
-            strikes_in = heard_at + inverter.timeout.seconds - time.monotonic()
+            strikes_in = heard_at + inverter.timeout.seconds - self._bus.now()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
-        pause = polled_at + self._period - time.monotonic()
+        pause = polled_at + self._period - self._bus.now()
         # however seldom somebody wants to read the status, a motor that runs is watched, and so is
         # one whose run command may still stand, for a fault that ends would let it go on
         controller = self._controller
@@ -316,7 +315,7 @@ class Poller:
     @property
     def _silent_for_long(self) -> bool:
         """It has answered nobody for so long that it is lost."""
-        silent = self._bus.silences.lasts(self._unit, time.monotonic())
+        silent = self._bus.silences.lasts(self._unit, self._bus.now())
         return silent >= self._inverter.settings.lost_after
 
     @property
@@ -325,7 +324,7 @@ class Poller:
         inverter = self._inverter
         stands = self._setpoint.armed and 0 in (inverter.frequency, inverter.speed)
         period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
-        return stands or time.monotonic() - self._mode_read_at > period
+        return stands or self._bus.now() - self._mode_read_at > period
 
     @property
     def _slow_period(self) -> float:
@@ -381,7 +380,7 @@ class Poller:
         last = self.snapshot.actual
         seen = await self._look()
         if self._mode_is_due:
-            self._mode_read_at = time.monotonic()
+            self._mode_read_at = self._bus.now()
             before = inverter.control_mode
             mode = await self._insist(lambda: inverter.read_control_mode(Priority.POLL, once=True))
             if mode != before and self._controller:
@@ -393,7 +392,7 @@ class Poller:
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
-            age = time.monotonic() - inverter.last_polled(role).at
+            age = self._bus.now() - inverter.last_polled(role).at
             if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
         self._publish(seen)
@@ -413,11 +412,11 @@ class Poller:
         if role is Role.ACTUAL_FREQUENCY and seen and not math.isnan(seen.frequency):
             # it came with the status
             return inverter.frequency
-        asked_at = time.monotonic()
+        asked_at = self._bus.now()
         value = await self._read_measured(role)
         inverter.polled(role, value)
         if role in inverter.model.roles:
-            self._turn = time.monotonic() - asked_at
+            self._turn = self._bus.now() - asked_at
         return value
 
     async def _read_measured(self, role: Role) -> float:
@@ -448,7 +447,7 @@ class Poller:
                 raise
             except LinkError:
                 self._inverter.unanswered()
-                now = time.monotonic()
+                now = self._bus.now()
                 failing_since = min(failing_since, now)
                 in_vain = now - failing_since >= self._inverter.settings.lost_after
                 if self._silent_for_long or in_vain:
@@ -460,7 +459,7 @@ class Poller:
                 return answer
 
     def _failed(self, error: LinkError | DriveError) -> None:
-        inverter, now = self._inverter, time.monotonic()
+        inverter, now = self._inverter, self._bus.now()
         inverter.unanswered()
         if not inverter.connected:
             self._failures += 1
@@ -520,7 +519,7 @@ def take_snapshot(
     """Return the snapshot of a poll; without a status while the drive is not connected."""
     standing = (inverter.connected, setpoint.armed, inverter.settings.method)
     if seen is None:
-        return Snapshot(time.monotonic(), *standing)
+        return Snapshot(inverter.bus.now(), *standing)
     code = seen.listed
     return Snapshot(
         seen.at,

@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from collections.abc import Iterator
 import contextlib
-import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family
@@ -133,13 +132,13 @@ class Procedures:
         It waits for its turn with the stops, so that none that comes later overtakes it. Only a
         drive that is busy is told again for a while, for it has done nothing.
         """
-        deadline = time.monotonic() + _LONGEST_BUSY
+        deadline = self._bus.now() + _LONGEST_BUSY
         while True:
             try:
                 await self.controller.method.begin(procedure, access.require_wanted)
                 return
             except Refused as error:
-                if error.code != Refused.BUSY or time.monotonic() >= deadline:
+                if error.code != Refused.BUSY or self._bus.now() >= deadline:
                     raise
             await self._bus.sleep(_BUSY_PERIOD)
 
@@ -158,9 +157,9 @@ class Procedures:
         access.require_wanted()
         control_mode = inverter.control_mode or await inverter.read_control_mode()
         await controller.take_control(control_mode)
-        deadline = time.monotonic() + drive_state.TIMEOUT
+        deadline = self._bus.now() + drive_state.TIMEOUT
         while not (await inverter.look(Priority.SERVICE)).standby:
-            if time.monotonic() > deadline:
+            if self._bus.now() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)
                 raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))

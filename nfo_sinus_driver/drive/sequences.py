@@ -22,7 +22,6 @@ from collections.abc import Iterator
 import contextlib
 import enum
 import math
-import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
@@ -120,7 +119,7 @@ class StopSequence:
     def overdue(self) -> bool:
         """A stop is not confirmed although there was time; no fault keeps the motor still."""
         waiting = self._task is not None and not self.blocked_by_fault
-        return waiting and time.monotonic() >= self._due
+        return waiting and self._bus.now() >= self._due
 
     @property
     def blocked_by_fault(self) -> bool:
@@ -149,7 +148,7 @@ class StopSequence:
         Where that is going on already nothing has to be added: nobody is let start the motor
         meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
         """
-        if self.blocked_by_fault and time.monotonic() > self._tried_at + _RETRY_PERIOD:
+        if self.blocked_by_fault and self._bus.now() > self._tried_at + _RETRY_PERIOD:
             self.request_anew()
         if self._task is None:
             self._outcome = None
@@ -157,7 +156,7 @@ class StopSequence:
             self._told_at = self._force_at = math.inf
             self._refusals = self._unheard = 0
             self.forced = False
-            self._due = time.monotonic() + drive_state.TIMEOUT
+            self._due = self._bus.now() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
@@ -182,14 +181,14 @@ class StopSequence:
         """
         task = self._task
         if patience is not None:
-            self._force_at = min(self._force_at, time.monotonic() + patience / 2)
-        deadline = time.monotonic() + (drive_state.TIMEOUT if patience is None else patience)
+            self._force_at = min(self._force_at, self._bus.now() + patience / 2)
+        deadline = self._bus.now() + (drive_state.TIMEOUT if patience is None else patience)
         while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
             lost = patience is None and not self._inverter.connected and self._outcome is not None
-            if lost or time.monotonic() > deadline:
+            if lost or self._bus.now() > deadline:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
             raise DriveError(Cause.STOP_UNCONFIRMED_AT_END)
@@ -201,12 +200,12 @@ class StopSequence:
         while await self._attempt() is not _Outcome.CONFIRMED:
             if self.blocked_by_fault:
                 await self._fault_gone()
-                self._due = complain_at = time.monotonic() + drive_state.TIMEOUT
+                self._due = complain_at = self._bus.now() + drive_state.TIMEOUT
                 continue
             stands = self._stands
-            if time.monotonic() >= complain_at or (stood and not stands):
+            if self._bus.now() >= complain_at or (stood and not stands):
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
-                complain_at = time.monotonic() + pause
+                complain_at = self._bus.now() + pause
                 why = self._unconfirmed
                 if stands:
                     standing = self._inverter.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
@@ -227,7 +226,7 @@ class StopSequence:
     def _stands(self) -> bool:
         """The drive has just shown that the motor stands, and no run command."""
         seen = self._inverter.seen
-        if seen is None or time.monotonic() - seen.at > _RETRY_PERIOD:
+        if seen is None or self._bus.now() - seen.at > _RETRY_PERIOD:
             return False
         # a code that is not in the manual shows nothing
         shows = seen.state is not State.UNKNOWN or seen.standby
@@ -251,7 +250,7 @@ class StopSequence:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
         if not self._inverter.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
-        elif self._is_lost or time.monotonic() >= self._due:
+        elif self._is_lost or self._bus.now() >= self._due:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif self._outcome is _Outcome.BUSY:
@@ -263,7 +262,7 @@ class StopSequence:
     def _is_lost(self) -> bool:
         """The drive has been silent for so long that the next poll gives it up."""
         settings = self._inverter.settings
-        silent = self._bus.silences.lasts(settings.address, time.monotonic())
+        silent = self._bus.silences.lasts(settings.address, self._bus.now())
         return silent >= settings.lost_after
 
     async def _attempt(self) -> _Outcome:
@@ -278,7 +277,7 @@ class StopSequence:
         if self._reasons > reasons:
             self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
             self._told_at = math.inf
-        self._tried_at = time.monotonic()
+        self._tried_at = self._bus.now()
         self._report_fault()
         return self._outcome
 
@@ -296,10 +295,10 @@ class StopSequence:
         failure: LinkError | None = None
         try:
             await self._method.stop(control_mode)
-            self._told_at = min(self._told_at, time.monotonic())
+            self._told_at = min(self._told_at, self._bus.now())
             self._refusals = self._unheard = 0
         except Refused as error:
-            if error.code == Refused.BUSY and time.monotonic() < self._due:
+            if error.code == Refused.BUSY and self._bus.now() < self._due:
                 self._unconfirmed = report_of(error)
                 return _Outcome.BUSY
             failure = error
@@ -340,12 +339,12 @@ class StopSequence:
             return True
         shows_at = min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
         # what a PLC has from before says nothing of a motor that may well be ramping down
-        return seen.at > self._told_at and time.monotonic() >= shows_at
+        return seen.at > self._told_at and self._bus.now() >= shows_at
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
         obeyed = await self._method.force_stop(control_mode)
-        told_at = time.monotonic()
+        told_at = self._bus.now()
         seen = await self._inverter.look(Priority.LOOK, once=True)
         if not obeyed:
             return why
@@ -362,9 +361,9 @@ class StopSequence:
 
         :param reasons: those that the stop was for; with a new one it has to be written again.
         """
-        until = time.monotonic() + _RETRY_PERIOD
+        until = self._bus.now() + _RETRY_PERIOD
         while self._reasons == reasons and seen.at <= told_at:
-            if time.monotonic() > until:
+            if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
             seen = await self._inverter.look(Priority.LOOK, once=True)
@@ -391,7 +390,7 @@ class StartSequence:
     def __init__(self, inverter: DriveState, method: Commands) -> None:
         self._inverter = inverter
         self._method = method
-        #: When the start has to be over, s of ``time.monotonic``.
+        #: When the start has to be over, s of the clock of the bus.
         self._deadline = math.inf
 
     async def check(self) -> tuple[str, Limits]:
@@ -427,18 +426,18 @@ class StartSequence:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
         await self._method.run(self._await_start)
-        run_at = time.monotonic()
+        run_at = self._inverter.bus.now()
         # behind a PLC a status from before the run command is shown for a while
         await self._await_start(lambda now: now.runs and now.at > run_at)
 
     async def _await_status(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait for a step that every drive makes soon."""
-        left = self._deadline - time.monotonic()
+        left = self._deadline - self._inverter.bus.now()
         await self._inverter.wait_until(wanted, timeout=min(left, drive_state.TIMEOUT))
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait until the drive has made a step on its way to run."""
-        deadline = min(time.monotonic() + drive_state.TIMEOUT, self._deadline)
+        deadline = min(self._inverter.bus.now() + drive_state.TIMEOUT, self._deadline)
         delayed = False
         while True:
             seen = await self._inverter.look(Priority.SERVICE)
@@ -455,7 +454,7 @@ class StartSequence:
                 delay = await self._inverter.read_start_delay()
                 self._deadline += delay
                 deadline += delay
-            if time.monotonic() > deadline:
+            if self._inverter.bus.now() > deadline:
                 cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
                 raise DriveError(self._inverter.report(cause))
             await self._inverter.bus.sleep(drive_state.LOOK_PERIOD)
@@ -467,7 +466,7 @@ class StartSequence:
         The set-point of an earlier session is removed before, where the drive lets us: one that has
         kept its run command, too, would turn the motor at once.
         """
-        self._deadline = time.monotonic() + _START_TIMEOUT
+        self._deadline = self._inverter.bus.now() + _START_TIMEOUT
         if not self._inverter.settings_need_control:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)

@@ -22,7 +22,6 @@ from dataclasses import replace
 import enum
 import functools
 import math
-import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.bus import LatestValue
@@ -65,7 +64,7 @@ class Request(NamedTuple):
     A set-point that somebody asks for.
 
     :ivar value: in the unit of the control mode.
-    :ivar at: when it came in, s of ``time.monotonic``.
+    :ivar at: when it came in, s of the clock of the bus.
     :ivar most: what whoever asks limits it to, in either direction.
     """
 
@@ -141,7 +140,7 @@ class Setpoint:
         """Ask for a set-point, from any thread; it must be finite, and counts only while armed."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
-        self._own = Request(value, time.monotonic())
+        self._own = Request(value, self._bus.now())
         if self.armed:
             self._bus.request(self._slot)
 
@@ -157,7 +156,7 @@ class Setpoint:
 
     @property
     def armed_at(self) -> float:
-        """Since when it does, s of ``time.monotonic``; infinite while it does not."""
+        """Since when it does, s of the clock of the bus; infinite while it does not."""
         return self._armed_at
 
     @property
@@ -169,7 +168,7 @@ class Setpoint:
     def age(self) -> float:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
         at = self._request.at
-        return time.monotonic() - at if at > self._armed_at else NAN
+        return self._bus.now() - at if at > self._armed_at else NAN
 
     def connected(self) -> None:
         """Find out anew whether the drive tells its status with a set-point that it takes."""
@@ -188,7 +187,7 @@ class Setpoint:
         self._limits = limits
         follows = self._inverter.settings.follows_setpoints
         self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
-        self._armed_at = time.monotonic()
+        self._armed_at = self._bus.now()
         self._keys, self._written = {}, {}
         self._encode.cache_clear()
         if self._target is not None:
@@ -227,7 +226,7 @@ class Setpoint:
         """
         Return the slowest that the drive can have been told to turn since then, in one direction.
 
-        :param at: s of ``time.monotonic``; longer ago than 10 s nobody knows any more.
+        :param at: s of the clock of the bus; longer ago than 10 s nobody knows any more.
         """
         return min(
             (max(0.0, -value if reverse else value) for value, until in self._had if until >= at),
@@ -247,7 +246,7 @@ class Setpoint:
     def _may_have(self, value: float) -> None:
         """Take note that the drive may have a set-point from now on; NaN: nobody knows which."""
         value = 0.0 if math.isnan(value) else value
-        oldest = time.monotonic() - _REMEMBERED
+        oldest = self._bus.now() - _REMEMBERED
         self._had = [one for one in self._had if one[1] >= oldest]
         if (value, math.inf) not in self._had:
             self._had.append((value, math.inf))
@@ -256,7 +255,7 @@ class Setpoint:
         """Take note that the drive has a set-point, and none of the others any more."""
         self.commanded = value
         self._may_have(value)
-        now = time.monotonic()
+        now = self._bus.now()
         self._had = [
             (one, until if one == value else min(until, now)) for one, until in self._had
         ]
@@ -270,7 +269,7 @@ class Setpoint:
     def _is_old(self, at: float) -> bool:
         """Tell whether a request waited so long for the line that it has expired meanwhile."""
         timeout = self._inverter.settings.setpoint_timeout
-        return bool(timeout) and time.monotonic() - at > timeout
+        return bool(timeout) and self._bus.now() - at > timeout
 
     # --- together with the other drives of the line, on the bus -------------------------------
 
@@ -337,7 +336,7 @@ class Setpoint:
     def due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
         assert self._target is not None
-        now, period = time.monotonic(), self._rewrite_period
+        now, period = self._bus.now(), self._rewrite_period
         found: list[tuple[Address, bytes]] = []
         before_all = self._meant(self._standing)
         for address, data in self._encode(self._limited(request), before_all):
@@ -362,8 +361,8 @@ class Setpoint:
     async def _read_back(self) -> None:
         """Find out whether the drive took what was told to all; if not, give it its own."""
         ((address, key),) = self._keys.items()
-        await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - time.monotonic())
-        self._read_back_at = time.monotonic()
+        await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - self._bus.now())
+        self._read_back_at = self._bus.now()
         try:
             kept = await self._registers.read_data(key, Priority.POLL, once=True)
         except LinkError as error:
@@ -458,7 +457,7 @@ class Setpoint:
 
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf
-        self._written[address] = data, time.monotonic()
+        self._written[address] = data, self._bus.now()
         if len(self._written) == len(self._keys):
             self._has(self._meant(self._standing))
 
@@ -501,7 +500,7 @@ class Setpoint:
         """Tell whether a refusal only means that the drive is busy, and not for long yet."""
         if error.code != Refused.BUSY:
             return False
-        now = time.monotonic()
+        now = self._bus.now()
         self._busy_since = min(self._busy_since, now)
         return now < self._busy_since + _LONGEST_BUSY
 
@@ -524,7 +523,7 @@ class Setpoint:
             while True:
                 timeout = self._inverter.settings.setpoint_timeout
                 last = max(self._request.at, self._armed_at)
-                left = last + timeout - time.monotonic() if timeout else math.inf
+                left = last + timeout - self._bus.now() if timeout else math.inf
                 if left > 0 or self._expired:
                     await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
                 else:
@@ -557,7 +556,7 @@ class Setpoint:
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
                 address, data = self._registers.target(step)
-                self._written[address] = data, time.monotonic()
+                self._written[address] = data, self._bus.now()
                 self._busy_since = math.inf
             if self._request is before:
                 self._has(0.0)

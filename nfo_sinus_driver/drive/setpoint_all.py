@@ -21,7 +21,6 @@ from collections.abc import Iterable
 from collections.abc import Mapping
 import dataclasses
 import math
-import time
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.bus import LatestValue
@@ -73,7 +72,7 @@ class SetpointAll:
         """Ask for a set-point, from any thread; a :class:`ValueError` if it is not finite."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
-        self._request = Request(value, time.monotonic())
+        self._request = Request(value, self._bus.now())
         self._bus.request(self._slot)
 
     def _make(self) -> Transfer | None:

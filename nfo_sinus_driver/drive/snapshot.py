@@ -36,7 +36,7 @@ class Measured(NamedTuple):
     """
     A measured value; NaN where the drive tells none.
 
-    :ivar at: when it arrived, s of ``time.monotonic``; minus infinity before the first.
+    :ivar at: when it arrived, s of the clock of the bus; minus infinity before the first.
     """
 
     value: float = NAN
@@ -51,7 +51,7 @@ class Snapshot:
     """
     One poll of a drive; NaN where nothing was measured.
 
-    :ivar at: when the status arrived, s of ``time.monotonic``.
+    :ivar at: when the status arrived, s of the clock of the bus.
     :ivar status: ``None`` while the drive is not connected.
     :ivar control_mode: the manual's label, ``''`` while unknown.
     :ivar unit: of ``setpoint`` and ``actual``.
@@ -121,10 +121,10 @@ class LogEntry:
     :ivar text: as on the display.
     :ivar operating_time: the drive's operating time when it happened, h; NaN if it does not tell.
     :ivar age: operating hours ago; NaN if the drive does not tell.
-    :ivar at: when it happened, s of ``time.monotonic``, as exactly as that is known: it was seen
+    :ivar at: when it happened, s of the clock of the bus, as exactly as that is known: it was seen
         to come, or the drive is known to have had power ever since; else NaN.
     :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
-    :ivar latest: it cannot have been later, s of ``time.monotonic``; NaN if there is no age.
+    :ivar latest: it cannot have been later, s of the clock of the bus; NaN if there is no age.
     """
 
     code: int

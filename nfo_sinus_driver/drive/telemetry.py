@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
@@ -83,7 +82,7 @@ async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> N
             denied[role] += error.code in _NONE_SUCH and not inverter.tuning
 
     while True:
-        started = time.monotonic()
+        started = inverter.bus.now()
         rate = inverter.settings.telemetry_rate
         if rate and inverter.connected and inverter.answering and not yields():
             try:
@@ -96,10 +95,10 @@ async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> N
                     Role.ACTUAL_FREQUENCY: inverter.frequency,
                     Role.ACTUAL_SPEED: inverter.speed,
                 }
-                inverter.listener.on_telemetry(Telemetry(time.monotonic(), {**values, **polled}))
+                inverter.listener.on_telemetry(Telemetry(inverter.bus.now(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost
                 inverter.missed()
                 values.update(dict.fromkeys(FAST, NAN))
         period = 1 / rate if rate else _OFF_PERIOD
-        await inverter.bus.sleep(period - (time.monotonic() - started))
+        await inverter.bus.sleep(period - (inverter.bus.now() - started))

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import time
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import InverterStatus
@@ -130,12 +129,12 @@ class Tuning:
         self, procedure: Procedure, access: ExclusiveAccess, progress: Progress
     ) -> Report:
         inverter, what = self._inverter, procedure.value
-        started = time.monotonic()
+        started = inverter.bus.now()
         begun = False
         told_code, told_at = -1, 0.0
         while True:
             seen = await inverter.look(Priority.POLL)
-            elapsed = time.monotonic() - started
+            elapsed = inverter.bus.now() - started
             if seen.code != told_code or elapsed > told_at + _TELL_PERIOD:
                 told_code, told_at = seen.code, elapsed
                 progress(seen, elapsed)

@@ -15,6 +15,7 @@
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import Connecting
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import GatewayFault
@@ -47,6 +48,7 @@ __all__ = [
     'BIT_RATES',
     'PROTOCOLS',
     'Address',
+    'Clock',
     'Connecting',
     'DamagedAnswer',
     'GatewayFault',

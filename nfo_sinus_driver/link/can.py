@@ -73,7 +73,7 @@ class CanPort(Protocol):
 
     def receive(self, until: float) -> Sequence[Frame]:
         """
-        Return what has come; wait for the first frame until a moment of ``time.monotonic``, s.
+        Return what has come; wait for the first frame until a moment of the clock, s.
 
         :returns: none when the time is over, or when what came was no whole frame.
         :raises PortError: it is gone.

@@ -33,6 +33,7 @@ from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
 from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
@@ -109,7 +110,10 @@ class CanopenLink:
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
     protocol = CANOPEN
 
-    def __init__(self, port: CanPort, settings: LineSettings) -> None:
+    def __init__(
+        self, port: CanPort, settings: LineSettings, now: Clock = time.monotonic
+    ) -> None:
+        self._now = now
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -120,7 +124,7 @@ class CanopenLink:
         #: The nodes that were made operational.
         self._started: set[int] = set()
         self._shapes = ObjectShapes()
-        self.supervision = CanopenSupervision(port, self._take, self.read, self.write)
+        self.supervision = CanopenSupervision(port, now, self._take, self.read, self.write)
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
@@ -186,7 +190,7 @@ class CanopenLink:
             try:
                 return self._read_once(unit, address, sub_index)
             except DamagedAnswer:
-                if not self._another.is_there(time.monotonic()):
+                if not self._another.is_there(self._now()):
                     raise
         return self._read_once(unit, address, sub_index)
 
@@ -194,7 +198,7 @@ class CanopenLink:
         upload = Upload(unit, address.index, sub_index)
         kinds = upload.kinds[:1] + (sdo.SEGMENTS if address.size > _EXPEDITED else ())
         questions = ((upload, kinds), *self._resync_reads(unit))
-        certain = self._late.first_certain(unit, questions, time.monotonic())
+        certain = self._late.first_certain(unit, questions, self._now())
         if certain is not upload:
             self._resync_read(certain)
         try:
@@ -283,7 +287,7 @@ class CanopenLink:
         """Read something, so that the next answer is believed again; if not, then not."""
         try:
             questions = self._resync_reads(unit)
-            self._resync_read(self._late.first_certain(unit, questions, time.monotonic()))
+            self._resync_read(self._late.first_certain(unit, questions, self._now()))
         except PortError:
             raise
         except LinkError:
@@ -300,7 +304,7 @@ class CanopenLink:
         arrived = 0.0
         while transfer.request is not None:
             self._late.sent(transfer)
-            sent = time.monotonic()
+            sent = self._now()
             self.supervision.send_due(sent)
             self._send(unit, transfer.request)
             try:
@@ -309,7 +313,7 @@ class CanopenLink:
                 self._release(unit)
                 raise
             except (NoAnswer, DamagedAnswer) as error:
-                self._late.expect(transfer, time.monotonic())
+                self._late.expect(transfer, self._now())
                 if isinstance(error, NoAnswer):
                     # another master may have stopped the node, which answers nothing then
                     self._started.discard(unit)
@@ -327,7 +331,7 @@ class CanopenLink:
     def _release(self, unit: int) -> None:
         """Expect nothing more of what a node was asked before the request that it has answered."""
         self._late.release(unit)
-        self._late.quarantine(unit, self._another.meanwhile, time.monotonic())
+        self._late.quarantine(unit, self._another.meanwhile, self._now())
 
     def _drain(self) -> None:
         """Take what came unasked: an answer that is late, one to somebody else, a boot-up."""
@@ -342,7 +346,7 @@ class CanopenLink:
 
     def _note(self, frames: Sequence[Frame]) -> AbstractSet[int]:
         """Take note of what others ask; return which nodes have started anew."""
-        now = time.monotonic()
+        now = self._now()
         for frame in frames:
             kinds = self._another.hear(frame, now)
             if kinds:
@@ -358,7 +362,7 @@ class CanopenLink:
         other = 0
         while True:
             frames = self._port.receive(min(deadline, self.supervision.sign_due))
-            now = time.monotonic()
+            now = self._now()
             self.supervision.send_due(now)
             if unit in self._note(frames):
                 raise NoAnswer(f'unit {unit} has started anew')
@@ -407,7 +411,7 @@ class CanopenLink:
         self._late.note(transfer, answer.data, now, 0.0)
         if self._late.repeated is not None and now < sent + soonest:
             until = sent + max(soonest, self._late.longest(unit))
-            while time.monotonic() < until:
+            while self._now() < until:
                 came = self._take(until)
                 if any(frame.identifier == answer.identifier for frame in came):
                     raise DamagedAnswer(f'unit {unit}: an answer came twice')

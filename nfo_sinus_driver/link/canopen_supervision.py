@@ -28,13 +28,13 @@ from collections.abc import Generator
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 import math
-import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import nmt
 from nfo_sinus_driver.link.can import CanPort
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import Refused
 from nfo_sinus_driver.link.interface import Reply
 
@@ -72,11 +72,13 @@ class CanopenSupervision:
     def __init__(
         self,
         port: CanPort,
+        now: Clock,
         take: Callable[[float], Sequence[Frame]],
         read: Callable[[int, Address], Reply],
         write: Callable[[int, Address, bytes], Reply],
     ) -> None:
         self._port = port
+        self.now = now
         self._take = take
         self._read = read
         self._write = write
@@ -139,7 +141,7 @@ class CanopenSupervision:
 
     def serve(self) -> None:
         """Send what is due, and take what came unasked (PortError: the port is lost)."""
-        now = time.monotonic()
+        now = self.now()
         self.send_due(now)
         while self._take(0.0):
             continue
@@ -242,7 +244,7 @@ class CanopenWatch:
         request = self._request
         assert request is not None
         told: bytes | None = None
-        reply = Reply(b'', time.monotonic())
+        reply = Reply(b'', self._supervision.now())
         try:
             if request.data is None:
                 reply = self._read(self._unit, request.address)

@@ -36,6 +36,7 @@ from nfo_sinus_driver.link.classic import Select
 from nfo_sinus_driver.link.classic import Value
 from nfo_sinus_driver.link.classic import nameless
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
@@ -112,7 +113,8 @@ class ClassicLink:
     #: [M0 §6.1.2], [C10].
     protocol = CLASSIC
 
-    def __init__(self, port: Port, settings: LineSettings) -> None:
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        self._now = now
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -192,7 +194,7 @@ class ClassicLink:
             with contextlib.suppress(NoAnswer, DamagedAnswer):
                 _, _, early = self._transact(request)
                 if early:
-                    self._late.expect(request, time.monotonic())
+                    self._late.expect(request, self._now())
             return self.write(unit, address, data)
         except LinkError as error:
             error.maybe_done = True
@@ -216,7 +218,7 @@ class ClassicLink:
             self._listen(request)
         answer, arrived, early = self._transact(request)
         if early:
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
             self._clear(unit)
             self._listen(request)
             answer, arrived, _ = self._transact(request)
@@ -232,7 +234,7 @@ class ClassicLink:
         self._listen(request)
         if request.unit == BROADCAST:
             return self._call(request)
-        began = time.monotonic()
+        began = self._now()
         try:
             answer, arrived, _ = self._transact(request)
         except _Ambiguous:
@@ -248,7 +250,7 @@ class ClassicLink:
         sent = self._send(request)
         self._last = None
         until = sent + min(_TURNAROUND, _TURNAROUND_MARGIN * self._slowest)
-        while time.monotonic() < until:
+        while self._now() < until:
             # an echo, or what is late: nobody answers this
             self._port.read(until)
         return sent
@@ -296,7 +298,7 @@ class ClassicLink:
         :raises NotReady: all are.
         """
         questions = ((number, (number,)) for number in (*numbers, *_EVERYWHERE))
-        return self._late.first_certain(unit, questions, time.monotonic())
+        return self._late.first_certain(unit, questions, self._now())
 
     def _listen(self, request: Request) -> None:
         """Take what came unasked; wait for it where it could pass for the answer to a request."""
@@ -307,14 +309,14 @@ class ClassicLink:
             until = max(until, last.arrived + pause)
         while True:
             if self._port.read(until) and last:
-                self._late.expect(last.request, time.monotonic())
-            if time.monotonic() >= until:
+                self._late.expect(last.request, self._now())
+            if self._now() >= until:
                 return
 
     def _send(self, request: Request) -> float:
         """Hand a request to the port; return when its last byte will have left."""
         frame = classic.encode(request)
-        began = time.monotonic()
+        began = self._now()
         self._port.write(frame)
         return began + len(frame) * self._settings.char_time
 
@@ -330,7 +332,7 @@ class ClassicLink:
         try:
             answer, arrived, more = self._receive(request, sent)
         except (NoAnswer, DamagedAnswer):
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
             # if the adapter still echoes, the next echo will tell
             self._echoes = False
             raise
@@ -340,7 +342,7 @@ class ClassicLink:
         took = arrived - sent - len(classic.encode(answer)) * self._settings.char_time
         self._slowest = max(took, _KEPT_OF_SLOWEST * self._slowest)
         if more:
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
         again = before is not None and before.request == request and isinstance(answer, Value)
         # a character less, for no clock is exact
         least = (classic.LONGEST_ANSWER - 1) * self._settings.char_time
@@ -348,7 +350,7 @@ class ClassicLink:
 
     def _receive(self, request: Request, sent: float) -> tuple[Message, float, bool]:
         """Return the answer, when it came, and whether more came behind it."""
-        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        quarantined = self._late.quarantined(request.unit, self._now())
         longest = classic.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
         deadline = sent + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
@@ -358,7 +360,7 @@ class ClassicLink:
         came = 0
         while True:
             data = self._port.read(deadline)
-            now = time.monotonic()
+            now = self._now()
             if not data:
                 if now < deadline:
                     continue

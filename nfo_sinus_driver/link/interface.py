@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
@@ -32,6 +33,10 @@ _CHECK = (
     'the protocol that the drive is set to (the factory setting may be another one), RS232 or '
     'RS485 (there may be a jumper for that), the address, baud rate and parity'
 )
+
+
+#: A steady clock, in seconds; as ``time.monotonic``.
+Clock = Callable[[], float]
 
 
 class Address(NamedTuple):
@@ -139,7 +144,7 @@ class Supervision(Protocol):
 
     @property
     def due(self) -> float:
-        """When :meth:`serve` has to be called again, s of ``time.monotonic``; or infinity."""
+        """When :meth:`serve` has to be called again, s of the clock of the link; or infinity."""
 
     def serve(self) -> None:
         """Send what is due, and take what came unasked (PortError: the port is lost)."""

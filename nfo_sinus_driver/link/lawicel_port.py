@@ -23,6 +23,7 @@ import time
 from nfo_sinus_driver.link import lawicel
 from nfo_sinus_driver.link.can import CANNOT_SEND
 from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.port import Port
 
@@ -42,7 +43,8 @@ class LawicelPort:
     :raises ValueError: there is no such bit rate; the message says which there are.
     """
 
-    def __init__(self, port: Port, rate: int) -> None:
+    def __init__(self, port: Port, rate: int, now: Clock = time.monotonic) -> None:
+        self._now = now
         self._port = port
         self._rate = rate
         self._set_rate = lawicel.bit_rate(rate)
@@ -101,17 +103,17 @@ class LawicelPort:
 
     def _hear_out(self, silence: float) -> None:
         """Wait until it says nothing more: a late answer would count for another command."""
-        now = time.monotonic()
+        now = self._now()
         end = now + _LONGEST_TALK
         while now < end and self._port.read(min(now + silence, end)):
-            now = time.monotonic()
+            now = self._now()
         self._reader = lawicel.Reader()
 
     def _ask(self, command: bytes) -> lawicel.Heard:
         """Return what the adapter says to a command that was given alone."""
         self._port.write(command)
-        until = time.monotonic() + _REPLY_TIME
+        until = self._now() + _REPLY_TIME
         heard = self._reader.feed(b'')
-        while not heard.done and not heard.refused and time.monotonic() < until:
+        while not heard.done and not heard.refused and self._now() < until:
             heard = self._reader.feed(self._port.read(until))
         return heard

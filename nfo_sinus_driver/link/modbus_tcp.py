@@ -36,6 +36,7 @@ from urllib.parse import urlsplit
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link import telegram
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import Connecting
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import GatewayFault
@@ -144,7 +145,9 @@ class TcpLink(ModbusLink):
         port: int,
         response_timeout: float,
         connection: Callable[[str, int], Connection] = TcpConnection,
+        now: Clock = time.monotonic,
     ) -> None:
+        self._now = now
         self._host = host
         self._port = port
         self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
@@ -163,7 +166,7 @@ class TcpLink(ModbusLink):
         self._unanswered = False
         #: How many connections in a row the gateway has closed after one answer.
         self._closings = 0
-        self._blocks = telegram.Blocks(self._ask)
+        self._blocks = telegram.Blocks(self._ask, now)
         self.remarks = Remarks()
 
     @classmethod
@@ -179,7 +182,7 @@ class TcpLink(ModbusLink):
         """
         if self._begun is None:
             self._begin()
-        if not self._go_on(time.monotonic() + _SLICE):
+        if not self._go_on(self._now() + _SLICE):
             raise Connecting
 
     def close(self) -> None:
@@ -219,7 +222,7 @@ class TcpLink(ModbusLink):
 
     def _begin(self) -> None:
         self._begun = self._make(self._host, self._port)
-        self._begun_until = time.monotonic() + _CONNECT_TIMEOUT
+        self._begun_until = self._now() + _CONNECT_TIMEOUT
         try:
             self._begun.open()
         except OSError as error:
@@ -231,7 +234,7 @@ class TcpLink(ModbusLink):
         assert self._begun is not None
         try:
             if not self._begun.connected(until):
-                if time.monotonic() < self._begun_until:
+                if self._now() < self._begun_until:
                     return False
                 raise TimeoutError('timed out')
         except OSError as error:
@@ -257,14 +260,14 @@ class TcpLink(ModbusLink):
         """Connect once more, in the middle of a request."""
         self.close()
         self._begin()
-        if not self._go_on(time.monotonic() + self._response_timeout):
+        if not self._go_on(self._now() + self._response_timeout):
             self._drop_begun()
             raise self._unreachable(TimeoutError('timed out'))
 
     def _usable(self) -> Connection:
         """Return the connection that the next request goes by."""
         if self._begun is not None:
-            self._go_on(time.monotonic())
+            self._go_on(self._now())
         connection = self._connection
         if connection is None:
             raise PortError(f'{self._name} is not connected')
@@ -325,11 +328,11 @@ class TcpLink(ModbusLink):
         self._number = self._number % 0xFFFF + 1
         self._unanswered = True
         connection.write(encode(request, self._number))
-        deadline = time.monotonic() + self._response_timeout
+        deadline = self._now() + self._response_timeout
         others: list[int] = []
         while True:
             data = connection.read(deadline)
-            now = time.monotonic()
+            now = self._now()
             for number, message in self._reader.feed(data):
                 if number == self._number:
                     self._note_answer()

@@ -24,6 +24,7 @@ import time
 from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import movitrac_refusal
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
@@ -102,7 +103,8 @@ class MovitracLink:
     #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
     protocol = MOVITRAC
 
-    def __init__(self, port: Port, settings: LineSettings) -> None:
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        self._now = now
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -123,7 +125,7 @@ class MovitracLink:
     def open(self) -> None:
         """Open the port."""
         self._port.open()
-        self._line_end = time.monotonic()
+        self._line_end = self._now()
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -236,12 +238,12 @@ class MovitracLink:
 
     def _first_certain(self, *requests: Enquiry) -> Enquiry:
         questions = ((request, (request.index,)) for request in requests)
-        return self._late.first_certain(requests[0].unit, questions, time.monotonic())
+        return self._late.first_certain(requests[0].unit, questions, self._now())
 
     def _response_time(self, unit: int) -> float:
         """Return how much later than at once a drive may answer, s."""
         longest = self._late.longest(unit)
-        unsettled = bool(self._late.quarantined(unit, time.monotonic()))
+        unsettled = bool(self._late.quarantined(unit, self._now()))
         return LONGEST_RESPONSE_TIME if unsettled or not longest else longest
 
     def _is_doubtful(self, request: Request, answer: Answer, arrived: float, sent: float) -> bool:
@@ -255,7 +257,7 @@ class MovitracLink:
 
     def _listen(self, request: Request, until: float) -> None:
         """Wait as long as the right answer may take, if this was none (DamagedAnswer: it came)."""
-        while (now := time.monotonic()) < until:
+        while (now := self._now()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
                 raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')
@@ -272,7 +274,9 @@ class MovitracLink:
         gap = _GAP * self._settings.char_time
         longest = movitrac.LONGEST_ANSWER * self._settings.char_time
         wait = max(_WRITE_WAIT, longest) if is_write else self._settings.response_timeout
-        data, self._line_end, silent = await_silence(self._port, self._line_end, gap, wait)
+        data, self._line_end, silent = await_silence(
+            self._port, self._now, self._line_end, gap, wait
+        )
         self._heard_unasked(data)
         if not silent and not is_write:
             raise NeverSilent(NEVER_SILENT)
@@ -280,7 +284,7 @@ class MovitracLink:
     def _heard_unasked(self, data: bytes) -> None:
         """Take note of bytes that nobody asked for, unless switching a transmitter makes them."""
         if not movitrac.is_glitch(data):
-            self._late.heard_unasked(time.monotonic())
+            self._late.heard_unasked(self._now())
 
     # --- one transaction --------------------------------------------------------------------------
 
@@ -291,7 +295,7 @@ class MovitracLink:
         response_time = self._response_time(unit)
         self._late.sent(request)
         self._echo.sent(frame)
-        sent = time.monotonic() + len(frame) * char_time
+        sent = self._now() + len(frame) * char_time
         self._line_end = sent
         self._port.write(frame)
         reader = Reader(request)
@@ -301,7 +305,7 @@ class MovitracLink:
             if self._is_doubtful(request, answer, arrived, sent):
                 self._listen(request, sent + response_time + length)
         except (NoAnswer, DamagedAnswer):
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
             self._last = b''
             raise
         finally:
@@ -322,14 +326,14 @@ class MovitracLink:
 
         :param due: when it begins at last, if the drive is as fast as it can be.
         """
-        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        quarantined = self._late.quarantined(request.unit, self._now())
         longest = movitrac.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
         deadline = due + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
         last_chance = deadline + 2 * longest
         while True:
             data = self._port.read(deadline)
-            now = time.monotonic()
+            now = self._now()
             if not data:
                 if now < deadline:
                     continue

@@ -44,7 +44,7 @@ class Port(Protocol):
 
     def read(self, until: float) -> bytes:
         """
-        Return what has come; wait for the first byte until a moment of ``time.monotonic``, s.
+        Return what has come; wait for the first byte until a moment of the clock, s.
 
         :raises PortError: it is gone.
         """

@@ -33,7 +33,8 @@ class _LinkClass(Protocol):
         """Return the link on a port; it is not open yet."""
 
 
-def _link_class(protocol: LineProtocol) -> _LinkClass:
+def link_class(protocol: LineProtocol) -> _LinkClass:
+    """Return what makes links of a protocol."""
     module, name = protocol.link.split('.')
     return cast('_LinkClass', getattr(importlib.import_module(f'{__package__}.{module}'), name))
 
@@ -82,4 +83,4 @@ def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
     found = protocol_of(protocol)
     found.require_baud_rate(settings.baud_rate)
     found.require_char_format(settings.char_format)
-    return _link_class(found).on_port(port, settings)
+    return link_class(found).on_port(port, settings)

@@ -27,6 +27,7 @@ from typing import TypeVar
 from nfo_sinus_driver.link.another_master import DOUBTFUL
 from nfo_sinus_driver.link.another_master import AnotherMaster
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.interface import LinkError
@@ -99,7 +100,8 @@ class SerialLink(ModbusLink):
     for that.
     """
 
-    def __init__(self, port: Port, settings: LineSettings) -> None:
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        self._now = now
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -130,7 +132,7 @@ class SerialLink(ModbusLink):
     def open(self) -> None:
         """Open the port."""
         self._port.open()
-        self._line_end = time.monotonic()
+        self._line_end = self._now()
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -154,9 +156,9 @@ class SerialLink(ModbusLink):
         """
         request = write_and_read_of(unit, address, data, source)
         self._await_silence(request)
-        quarantined = self._late.quarantined(unit, time.monotonic())
+        quarantined = self._late.quarantined(unit, self._now())
         doubted = not quarantined.isdisjoint(answer_kinds(request))
-        if doubted or self._another.is_there(time.monotonic()):
+        if doubted or self._another.is_there(self._now()):
             return self.write(unit, address, data)
         return Reply(*self._ask(request))
 
@@ -196,7 +198,7 @@ class SerialLink(ModbusLink):
                 if not self._doubtful:
                     raise
             except DamagedAnswer:
-                if not tries_left or not self._another.is_there(time.monotonic()):
+                if not tries_left or not self._another.is_there(self._now()):
                     raise
             else:
                 if not self._doubtful:
@@ -226,11 +228,11 @@ class SerialLink(ModbusLink):
             self._transact(request)
         if self._late.repeated is not None:
             # it may be the one before, told twice
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
 
     def _make_certain(self, request: Request[Any]) -> bool:
         """Have the unit answer something else first, if needed; tells whether it was asked."""
-        unit, now = request.unit, time.monotonic()
+        unit, now = request.unit, self._now()
         if request.answer_head not in self._late.quarantined(unit, now):
             return False
         questions = [(request, (request.answer_head,)), *self._resync_reads(unit)]
@@ -259,7 +261,7 @@ class SerialLink(ModbusLink):
         """Make sure that the answer, if it ``names_it`` not itself, is not the one before again."""
         if self._late.repeated is None:
             return
-        now = time.monotonic()
+        now = self._now()
         doubt = self._late.doubt_about(request, now, names_it=names_it)
         if doubt is Doubt.LISTEN:
             self._listen(request)
@@ -276,14 +278,14 @@ class SerialLink(ModbusLink):
         try:
             stray |= self._await_silence(request)
             reads = self._resync_reads(request.unit)
-            self._resync_read(self._late.first_certain(request.unit, reads, time.monotonic()))
+            self._resync_read(self._late.first_certain(request.unit, reads, self._now()))
             if not stray and not self._stray:
                 return
         except (NotReady, NeverSilent):
             pass
         except (NoAnswer, DamagedAnswer):
             # the right answer may be as late as that to the other
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
             raise
         finally:
             self._confirming = False
@@ -293,10 +295,10 @@ class SerialLink(ModbusLink):
         """Wait as long as the right answer may take, if this was the one before, told twice."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
-        while (now := time.monotonic()) < until:
+        while (now := self._now()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
-                self._late.heard_unasked(time.monotonic())
+                self._late.heard_unasked(self._now())
                 raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _await_silence(self, request: Request[Any]) -> bool:
@@ -310,13 +312,13 @@ class SerialLink(ModbusLink):
         """
         is_write = isinstance(request, (Write, WriteAndRead))
         wait = self._write_wait if is_write else self._settings.response_timeout
-        give_up = time.monotonic() + self._settings.response_timeout
+        give_up = self._now() + self._settings.response_timeout
         came = False
         while True:
-            heard = await_silence(self._port, self._line_end, self._gap, wait)
+            heard = await_silence(self._port, self._now, self._line_end, self._gap, wait)
             data, self._line_end, silent = heard
             came |= bool(data)
-            now = time.monotonic()
+            now = self._now()
             self._another.hear(data, now)
             if not silent and not is_write:
                 self._late.heard_unasked(now)
@@ -326,7 +328,7 @@ class SerialLink(ModbusLink):
                 break
             # what another master asked is answered first
             if data := self._port.read(until):
-                self._line_end = max(self._line_end, time.monotonic())
+                self._line_end = max(self._line_end, self._now())
                 self._another.hear(data, self._line_end)
         if late := self._another.take_late(request.unit, now):
             self._late.quarantine(request.unit, (late,), now)
@@ -351,22 +353,22 @@ class SerialLink(ModbusLink):
         self._echo.sent(frame)
         self._another.sent(frame)
         self._port.write(frame)
-        self._sent_at = time.monotonic() + len(frame) * self._settings.char_time
+        self._sent_at = self._now() + len(frame) * self._settings.char_time
         self._line_end = self._sent_at
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
         except (NoAnswer, DamagedAnswer):
-            self._late.expect(request, time.monotonic())
+            self._late.expect(request, self._now())
             raise
         except Refused:
             self._late.release(request.unit)
             length = len(reader.frame) * self._settings.char_time
-            self._late.note(request, reader.frame, time.monotonic(), length)
+            self._late.note(request, reader.frame, self._now(), length)
             raise
         finally:
             other = reader.other
-            now = time.monotonic()
+            now = self._now()
             # what comes back before the answer to a write may be its answer, and another master may
             # ask the same as we do
             alone = not self._another.is_there(now)
@@ -389,7 +391,7 @@ class SerialLink(ModbusLink):
         self._late.took(request.unit, arrived - self._sent_at - length)
         if late or (reader.received and not self._doubtful):
             # it may answer an earlier write of the same, or answer twice: one more may come
-            self._late.heard_unasked(time.monotonic())
+            self._late.heard_unasked(self._now())
         return answer, arrived
 
     def _receive(
@@ -397,7 +399,7 @@ class SerialLink(ModbusLink):
     ) -> tuple[_T, float]:
         char_time = self._settings.char_time
         # an exception names neither register nor length: it may belong to the earlier request
-        quarantined = self._late.quarantined(request.unit, time.monotonic())
+        quarantined = self._late.quarantined(request.unit, self._now())
         believe_refusal = refusal_head(request) not in quarantined
         first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much rubbish again, however long somebody keeps talking
@@ -408,7 +410,7 @@ class SerialLink(ModbusLink):
         refusals: list[Refused] = []
         while True:
             data = self._port.read(deadline)
-            now = time.monotonic()
+            now = self._now()
             if not data:
                 if now < deadline:
                     continue

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-import time
 from typing import NamedTuple
 
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.port import Port
 
 #: What is wrong where there is none.
@@ -39,23 +39,26 @@ class Heard(NamedTuple):
     silent: bool
 
 
-def await_silence(port: Port, line_end: float, gap: float, wait: float) -> Heard:
+def await_silence(
+    port: Port, now: Clock, line_end: float, gap: float, wait: float
+) -> Heard:
     """
     Wait for silence on a line; all times are in seconds.
 
+    :param now: the clock of the port.
     :param line_end: when the last byte was on the line, as far as is known.
     :param gap: how long the silence has to last.
     :param wait: how much longer than that it is waited for.
     """
-    give_up = max(line_end + gap, time.monotonic()) + wait
+    give_up = max(line_end + gap, now()) + wait
     came = b''
     while True:
         data = port.read(line_end + gap)
-        now = time.monotonic()
+        moment = now()
         if data:
             came += data
-            line_end = max(line_end, now)
-            if now > give_up:
+            line_end = max(line_end, moment)
+            if moment > give_up:
                 return Heard(came, line_end, silent=False)
-        elif now >= line_end + gap:
+        elif moment >= line_end + gap:
             return Heard(came, line_end, silent=True)

@@ -36,10 +36,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import struct
-import time
 from typing import TypeVar
 
 from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import Interrupted
 from nfo_sinus_driver.link.interface import LinkError
 from nfo_sinus_driver.link.interface import NoData
@@ -103,12 +103,14 @@ class Block:
     One block: what stands in it, and how old that is.
 
     :param ask: sends a request of Modbus; returns its answer and when that came.
+    :param now: the clock of these moments, s.
     :param unit: who has it.
     :param start: its first register.
     """
 
-    def __init__(self, ask: Ask[bytes], unit: int, start: int) -> None:
+    def __init__(self, ask: Ask[bytes], now: Clock, unit: int, start: int) -> None:
         self._ask = ask
+        self._now = now
         self._unit = unit
         self._start = start
         #: STW1 and set-point as they are written with every transaction; ``None``: nothing is.
@@ -148,12 +150,12 @@ class Block:
         beside, self._beside = self._beside, None
         if address.sub_index == ACTUAL and beside is not None:
             shared, at = beside
-            if time.monotonic() - at <= _SHARED_FOR:
+            if self._now() - at <= _SHARED_FOR:
                 return Reply(self._part(shared[0], address), shared[1], requests=0)
         told, arrived = self._exchange()
         reply = Reply(self._part(told, address), arrived)
         if address.sub_index == STATUS:
-            self._beside = (told, arrived), time.monotonic()
+            self._beside = (told, arrived), self._now()
         return reply
 
     def write(self, address: Address, data: bytes) -> Reply:
@@ -169,7 +171,7 @@ class Block:
         except NoData:
             # it was written all the same
             return Reply(b'', arrived)
-        self._beside = (told, arrived), time.monotonic()
+        self._beside = (told, arrived), self._now()
         return reply
 
     def _part(self, told: tuple[int, ...], address: Address) -> bytes:
@@ -184,7 +186,7 @@ class Block:
 
     def _exchange(self, write: _Written | None = None) -> _Told:
         """Carry out a transaction; return the five registers, and since when they were seen."""
-        began = time.monotonic()
+        began = self._now()
         self._beside = None
         if self._command is not None and began - self._sent_at > PLC_TIME:
             live = self._live
@@ -196,7 +198,7 @@ class Block:
         if not self._known:
             # nothing is written to registers that may be something else
             self._look()
-            began = time.monotonic()
+            began = self._now()
         command, live = self._command_after(write)
         # it may be carried out even if no answer comes
         before = self._sent_at, self._live, self._command
@@ -307,15 +309,16 @@ class Block:
 class Blocks:
     """The blocks of one line, by unit and first register."""
 
-    def __init__(self, ask: Ask[bytes]) -> None:
+    def __init__(self, ask: Ask[bytes], now: Clock) -> None:
         self._ask = ask
+        self._now = now
         self._blocks: dict[tuple[int, int], Block] = {}
 
     def __call__(self, unit: int, address: Address) -> Block:
         """Return the block that a parameter stands in."""
         place = unit, address.index
         if place not in self._blocks:
-            self._blocks[place] = Block(self._ask, *place)
+            self._blocks[place] = Block(self._ask, self._now, *place)
         return self._blocks[place]
 
     def forget(self) -> None:

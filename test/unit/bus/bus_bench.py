@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from types import SimpleNamespace
 from typing import Any
 
 from fake_link import PATIENCE
@@ -35,8 +34,6 @@ from nfo_sinus_driver.bus import LatestValue
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.bus import Task
 from nfo_sinus_driver.bus import Transfer
-from nfo_sinus_driver.bus import statistics as statistics_module
-from nfo_sinus_driver.bus import worker as bus_module
 from nfo_sinus_driver.link import LinkError
 
 UNIT = 1
@@ -124,9 +121,7 @@ class Clock:
         return self.now
 
 
-def take_time(
-    link: FakeLink, monkeypatch: pytest.MonkeyPatch, took: dict[int, float]
-) -> Clock:
+def take_time(link: FakeLink, took: dict[int, float]) -> Clock:
     """Let transactions take a time by their register, on a clock of their own."""
     clock = Clock(took)
 
@@ -134,7 +129,5 @@ def take_time(
         clock.now += took.get(done.number, 0.0)
         return packed(done.number)
 
-    link.answer = answer
-    for module in (bus_module, statistics_module):
-        monkeypatch.setattr(module, 'time', SimpleNamespace(monotonic=clock.monotonic))
+    link.answer, link.clock = answer, clock.monotonic
     return clock

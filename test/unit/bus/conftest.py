@@ -33,7 +33,7 @@ def link() -> FakeLink:
 @pytest.fixture
 def bus(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bus]:
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.01)
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
     yield bus
     bus.close()

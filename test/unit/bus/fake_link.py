@@ -66,6 +66,7 @@ class FakeLink:
 
     :ivar done: every transaction, in order.
     :ivar answer: called with each; returns the bytes, or raises.
+    :ivar clock: its steady clock.
     :ivar opening: called when the port is opened; may raise.
     """
 
@@ -75,6 +76,7 @@ class FakeLink:
 
     def __init__(self) -> None:
         self.done: list[Done] = []
+        self.clock: Callable[[], float] = time.monotonic
         self.answer: Callable[[Done], bytes] = lambda done: packed(done.number)
         self.opening: Callable[[], None] = lambda: None
         self.closing: Callable[[], None] = lambda: None
@@ -105,6 +107,9 @@ class FakeLink:
     def numbers(self) -> list[int]:
         """The registers asked for, in order."""
         return [done.number for done in self.done]
+
+    def now(self) -> float:
+        return self.clock()
 
     def open(self) -> None:
         self.opening()

@@ -145,7 +145,7 @@ def test_most_urgent_goes_first(
     bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # in no time, so that the background has no claim
-    take_time(link, monkeypatch, {})
+    take_time(link, {})
     writer = Writer(bus)
     with link.held():
         futures = [hold(bus, link)]
@@ -230,7 +230,7 @@ def test_words_that_never_stand_still(bus: Bus, link: FakeLink) -> None:
 def test_stop_goes_before_the_background_s_share(
     bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = take_time(link, monkeypatch, {0: 1.0})
+    clock = take_time(link, {0: 1.0})
     with link.held():
         # so much of the line that the background has a claim
         hold(bus, link, Priority.POLL)
@@ -255,8 +255,8 @@ def test_background_has_a_sixth_of_the_time_each(
         Priority.TELEMETRY: background,
         Priority.REFRESH: background,
     }
-    clock = take_time(link, monkeypatch, {int(key): value for key, value in took.items()})
-    bus = Bus(link)
+    clock = take_time(link, {int(key): value for key, value in took.items()})
+    bus = Bus(link, now=link.now)
     rounds = 4000
 
     async def chatter(priority: Priority) -> None:
@@ -285,8 +285,8 @@ def test_set_point_goes_before_all_that_the_background_is_owed(
     link: FakeLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the shortest read there is takes 6.4 ms, at 57600 bit/s
-    take_time(link, monkeypatch, {0: 1.0, 1: 0.0064, 50: 0.0064})
-    bus = Bus(link)
+    take_time(link, {0: 1.0, 1: 0.0064, 50: 0.0064})
+    bus = Bus(link, now=link.now)
     bus.start()
     writer = Writer(bus)
     for _ in range(20):

@@ -114,7 +114,7 @@ def test_link_that_raises_when_it_is_opened(
         raise error
 
     link.opening = opening
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
     future = ask(bus, 1, Priority.POLL)
     assert isinstance(failure(future), PortError)

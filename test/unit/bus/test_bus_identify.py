@@ -77,7 +77,7 @@ def link() -> _Link:
 
 @pytest.fixture
 def bus(link: _Link) -> Iterator[Bus]:
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
     yield bus
     bus.close()

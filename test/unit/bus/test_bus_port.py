@@ -108,7 +108,7 @@ def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
 def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bus_module, 'REOPEN_PERIOD', 0.01)
     link.opening = raiser(PortError('absent'))
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     assert str(bus.port_error) == 'the port is not open yet'
     bus.start()
     assert str(failure(ask(bus, 1, Priority.POLL))) == 'absent'
@@ -159,7 +159,7 @@ def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:
 
 
 def test_close_ends_everything(link: FakeLink) -> None:
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
 
     async def sleeper() -> None:
@@ -185,7 +185,7 @@ def test_close_ends_everything(link: FakeLink) -> None:
 
 
 def test_close_waits_for_the_transaction_on_the_line(link: FakeLink) -> None:
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
     with link.held():
         future = hold(bus, link)
@@ -198,7 +198,7 @@ def test_close_waits_for_the_transaction_on_the_line(link: FakeLink) -> None:
 
 
 def test_coroutine_that_will_not_end_does_not_keep_the_bus(link: FakeLink) -> None:
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
 
     begun = threading.Event()
@@ -222,7 +222,7 @@ def test_coroutine_that_will_not_end_does_not_keep_the_bus(link: FakeLink) -> No
 def test_start_and_close_leave_no_thread(link: FakeLink) -> None:
     before = threading.active_count()
     for _ in range(3):
-        bus = Bus(link)
+        bus = Bus(link, now=link.now)
         bus.start()
         assert bus.alive
         bus.close()
@@ -230,7 +230,7 @@ def test_start_and_close_leave_no_thread(link: FakeLink) -> None:
 
 
 def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = take_time(link, monkeypatch, {})
+    clock = take_time(link, {})
     script: list[tuple[float, LinkError | None]] = [
         (0.010, None),
         (0.020, None),
@@ -250,7 +250,7 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
         return packed(1)
 
     link.answer = answer
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
     bus.start()
     for _ in range(6):  # one of them is not ready at first and asked again
         wait_until(ask(bus, 1, Priority.POLL).done)

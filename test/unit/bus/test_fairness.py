@@ -34,7 +34,7 @@ _ENOUGH = 400
 
 def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None:
     link = FakeLink()
-    bus = Bus(link)
+    bus = Bus(link, now=link.now)
 
     def write() -> Transfer:
         # wanted again before it is written: somebody publishes faster than the line can carry

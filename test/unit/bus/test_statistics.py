@@ -23,7 +23,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from nfo_sinus_driver.bus import statistics as module
 from nfo_sinus_driver.bus.statistics import Recorder
 from nfo_sinus_driver.link import DamagedAnswer
 from nfo_sinus_driver.link import LinkError
@@ -32,14 +31,12 @@ from nfo_sinus_driver.link import Refused
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    clock = SimpleNamespace(now=500.0)
-    monkeypatch.setattr(module, 'time', SimpleNamespace(monotonic=lambda: clock.now))
-    return clock
+def clock() -> SimpleNamespace:
+    return SimpleNamespace(now=500.0)
 
 
 def test_nothing_measured_yet(clock: SimpleNamespace) -> None:
-    figures = Recorder().statistics()
+    figures = Recorder(lambda: clock.now).statistics()
     assert (figures.transactions, figures.utilisation, figures.reconnects) == (0, 0.0, 0)
     times = (
         figures.cycle_time,
@@ -56,7 +53,7 @@ def test_nothing_measured_yet(clock: SimpleNamespace) -> None:
     ('count', 'p99'), [(1, 1.0), (2, 2.0), (99, 99.0), (100, 99.0), (200, 198.0), (1000, 990.0)]
 )
 def test_round_trips(clock: SimpleNamespace, count: int, p99: float) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     for number in reversed(range(count)):
         recorder.transaction(1, clock.now, number + 1.0, None)
     figures = recorder.statistics()
@@ -68,7 +65,7 @@ def test_round_trips(clock: SimpleNamespace, count: int, p99: float) -> None:
 
 
 def test_old_round_trips_are_forgotten(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     recorder.transaction(1, clock.now, 99.0, None)
     for _ in range(1000):
         recorder.transaction(1, clock.now, 1.0, None)
@@ -76,7 +73,7 @@ def test_old_round_trips_are_forgotten(clock: SimpleNamespace) -> None:
 
 
 def test_utilisation_is_that_of_the_last_two_seconds(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     recorder.transaction(1, clock.now, 0.5, NoAnswer())
     clock.now += 1.0
     recorder.transaction(2, clock.now, 0.3, None)
@@ -90,14 +87,14 @@ def test_utilisation_is_that_of_the_last_two_seconds(clock: SimpleNamespace) -> 
 
 
 def test_utilisation_is_never_more_than_all(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     for _ in range(3):
         recorder.transaction(1, clock.now, 1.0, None)
     assert recorder.statistics().utilisation == 1.0
 
 
 def test_every_opening_but_the_first_is_a_reconnect(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     seen = []
     for _ in range(4):
         recorder.opened()
@@ -106,7 +103,7 @@ def test_every_opening_but_the_first_is_a_reconnect(clock: SimpleNamespace) -> N
 
 
 def test_cycle_time_is_that_of_the_slowest(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     recorder.cycle(1, 0.1)
     recorder.cycle(2, 0.3)
     assert recorder.statistics().cycle_time == 0.3
@@ -119,9 +116,9 @@ def test_cycle_time_is_that_of_the_slowest(clock: SimpleNamespace) -> None:
     assert math.isnan(recorder.statistics().cycle_time)
 
 
-def test_read_while_it_is_written() -> None:
+def test_read_while_it_is_written(clock: SimpleNamespace) -> None:
     # a slow reader must never fail because the worker goes on
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     ended = threading.Event()
 
     def work() -> None:
@@ -143,7 +140,7 @@ def test_read_while_it_is_written() -> None:
 
 
 def test_each_unit_has_its_own_figures(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     for unit, seconds, error in (
         (1, 0.01, None),
         (1, 0.03, None),
@@ -171,7 +168,7 @@ def test_each_unit_has_its_own_figures(clock: SimpleNamespace) -> None:
 
 
 def test_a_unit_that_was_connected_to_again_has_reconnects(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     for unit in (1, 2, 2, 2):
         recorder.connected(unit)
     found = [recorder.statistics(unit).reconnects for unit in (1, 2, 3, None)]
@@ -179,7 +176,7 @@ def test_a_unit_that_was_connected_to_again_has_reconnects(clock: SimpleNamespac
 
 
 def test_who_only_asks_leaves_no_trace(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     assert recorder.statistics(9).transactions == 0
     assert math.isnan(recorder.statistics(9).round_trip_median)
     recorder.cycle(9, math.nan)
@@ -187,7 +184,7 @@ def test_who_only_asks_leaves_no_trace(clock: SimpleNamespace) -> None:
 
 
 def test_what_is_kept_of_a_unit_is_bounded(clock: SimpleNamespace) -> None:
-    recorder = Recorder()
+    recorder = Recorder(lambda: clock.now)
     recorder.transaction(1, clock.now, 99.0, None)
     for _ in range(1000):
         recorder.transaction(1, clock.now, 1.0, LinkError())

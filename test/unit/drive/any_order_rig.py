@@ -24,18 +24,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
-from collections.abc import Iterator
 from collections.abc import Sequence
 from concurrent.futures import Future
 import contextlib
 import functools
 from random import Random
 import struct
-import sys
-import time
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 from support.addresses import Words
 from support.addresses import packed
@@ -94,17 +89,6 @@ class Clock:
 
     def monotonic(self) -> float:
         return self.now
-
-    @contextlib.contextmanager
-    def in_driver(self) -> Iterator[None]:
-        """Let the driver see this clock."""
-        seen = SimpleNamespace(monotonic=self.monotonic, time=self.monotonic)
-        with contextlib.ExitStack() as stack:
-            for name, module in tuple(sys.modules.items()):
-                driver = name.startswith('nfo_sinus_driver.') and '.simulator' not in name
-                if driver and getattr(module, 'time', None) is time:
-                    stack.enter_context(mock.patch.object(module, 'time', seen))
-            yield
 
 
 class Notes:
@@ -338,8 +322,6 @@ class Rig:
         link: Callable[[Rig], Any] = DirectLink,
     ) -> None:
         self.clock = Clock()
-        self._stack = contextlib.ExitStack()
-        self._stack.enter_context(self.clock.in_driver())
         self.far = far
         self.far.step = _SLICE
         self.far.advance_to(self.clock.now)
@@ -356,7 +338,7 @@ class Rig:
     def begin(self) -> None:
         """Start a driver."""
         self.notes = Notes(self.clock)
-        self.bus = Bus(self.link)
+        self.bus = Bus(self.link, now=self.clock.monotonic)
         self.drive = Drive(self.bus, self.settings, self.notes)
 
     def kill(self) -> None:
@@ -365,7 +347,6 @@ class Rig:
 
     def close(self) -> None:
         self.kill()
-        self._stack.close()
 
     def send(self, value: float | None) -> None:
         """Let a program send a set-point again and again from now on; ``None``: it ends."""

@@ -54,7 +54,7 @@ class FramedLink(FaultyLine, MovitracLink):
 
     def __init__(self, rig: Rig) -> None:
         FaultyLine.__init__(self, rig)
-        MovitracLink.__init__(self, _Port(self, rig), SETTINGS)
+        MovitracLink.__init__(self, _Port(self, rig), SETTINGS, rig.clock.monotonic)
 
     def open(self) -> None:
         """Open the port."""

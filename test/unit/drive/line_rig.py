@@ -142,7 +142,6 @@ class LineRig:
     ) -> None:
         self.clock = Clock()
         self._stack = contextlib.ExitStack()
-        self._stack.enter_context(self.clock.in_driver())
         # the motors need not be exact here, and the time is long
         self._stack.enter_context(mock.patch.object(simulated, '_STEP', 0.05))
         kind = _kind(protocol, baud)
@@ -157,7 +156,8 @@ class LineRig:
         for far in self.fars.values():
             far.advance_to(self.clock.now)
         self.line = Line(self, kind)
-        self.bus = Bus(kind.link(self.line, kind.settings))
+        now = self.clock.monotonic
+        self.bus = Bus(kind.link(self.line, kind.settings, now), now=now)
         settings = {'model': kind.model, **settings}
         self.notes = {address: TimedNotes(self.clock) for address in self.fars}
         self.drives = {

@@ -29,7 +29,7 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link.protocols import _link_class
+from nfo_sinus_driver.link.protocols import link_class
 from nfo_sinus_driver.link.protocols import protocol_of
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
@@ -37,7 +37,7 @@ from nfo_sinus_driver.simulator.family import simulated_drive
 _NEVER = float('inf')
 for _protocol in PROTOCOLS.values():
     # loaded before a rig lets all modules of the driver see its clock
-    _link_class(_protocol)
+    link_class(_protocol)
 
 
 class MemoryPort:
@@ -156,7 +156,7 @@ class MemoryRig(Rig):
                 port, [far], [far], rig.clock.monotonic, gateway_timeout=0.1, paced=True,
                 turnaround=0.005, echo=False, always_heard=True, trace=None,
             )
-            made = _link_class(protocol_of(protocol))(port, line)
+            made = link_class(protocol_of(protocol))(port, line, rig.clock.monotonic)
             made.frames = port.sent
             return made
 

@@ -64,7 +64,7 @@ class Kind(NamedTuple):
 
     model: str
     settings: LineSettings
-    link: Callable[[Any, LineSettings], Any]
+    link: Callable[[Any, LineSettings, Clock], Any]
     spoken: Any
     wait: float
     variant: Mapping[str, str]
@@ -192,7 +192,9 @@ class NoiseRig(Rig):
         """Start a driver."""
         self.notes = TimedNotes(self.clock)
         self.line = Line(self, self._kind, self._seed)
-        self.bus = Bus(self._kind.link(self.line, self._kind.settings))
+        now = self.clock.monotonic
+        link = self._kind.link(self.line, self._kind.settings, now)
+        self.bus = Bus(link, now=now)
         self.drive = Drive(self.bus, self.settings, self.notes)
 
     def close(self) -> None:

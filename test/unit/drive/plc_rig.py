@@ -60,7 +60,7 @@ class PlcLink(FaultyLine, TcpLink):
 
     def __init__(self, rig: PlcRig) -> None:
         FaultyLine.__init__(self, rig)
-        TcpLink.__init__(self, 'plc', 502, _TIMEOUT)
+        TcpLink.__init__(self, 'plc', 502, _TIMEOUT, now=rig.clock.monotonic)
         self.plc_rig = rig
         self._request = 0
 

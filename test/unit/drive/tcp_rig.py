@@ -135,7 +135,7 @@ class _Link(TcpLink):
     """The link, which counts what it sends for the rig."""
 
     def __init__(self, gateway: Gateway, response_timeout: float) -> None:
-        super().__init__('gateway', 502, response_timeout, gateway.connect)
+        super().__init__('gateway', 502, response_timeout, gateway.connect, gateway.clock.monotonic)
         self._gateway = gateway
 
     @property

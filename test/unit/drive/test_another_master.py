@@ -55,7 +55,7 @@ class SharedRig(MemoryRig):
 
     def begin(self) -> None:
         self.notes = TimedNotes(self.clock)
-        self.bus = Bus(self.link)
+        self.bus = Bus(self.link, now=self.clock.monotonic)
         self.drive = Drive(self.bus, self.settings, self.notes)
 
     def require_truth(self) -> None:

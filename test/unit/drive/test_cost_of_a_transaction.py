@@ -128,32 +128,31 @@ class Counter:
 def calls_per_transaction(drives: int) -> float:
     """Return what a transaction costs while drives are polled as fast as the line allows."""
     clock, settings = Clock(), LineSettings(baud_rate=57600)
-    with clock.in_driver():
-        line = Line(clock, settings)
-        bus = Bus(RtuLink(line, settings))
-        made = [Drive(bus, DriveSettings(address=n + 1), Nobody()) for n in range(drives)]
+    line = Line(clock, settings)
+    bus = Bus(RtuLink(line, settings, clock.monotonic), now=clock.monotonic)
+    made = [Drive(bus, DriveSettings(address=n + 1), Nobody()) for n in range(drives)]
 
-        def step() -> None:
-            until = bus.step()
-            if clock.now < until < clock.now + 10:
-                clock.now = until
+    def step() -> None:
+        until = bus.step()
+        if clock.now < until < clock.now + 10:
+            clock.now = until
 
-        connected = [drive.connect() for drive in made]
-        while not all(future.done() for future in connected):
+    connected = [drive.connect() for drive in made]
+    while not all(future.done() for future in connected):
+        step()
+    for drive in made:
+        drive.activate()
+    begun = line.requests
+    while line.requests < begun + 40 * drives:
+        step()
+    begun, counter = line.requests, Counter()
+    sys.setprofile(counter)
+    try:
+        while line.requests < begun + _TRANSACTIONS:
             step()
-        for drive in made:
-            drive.activate()
-        begun = line.requests
-        while line.requests < begun + 40 * drives:
-            step()
-        begun, counter = line.requests, Counter()
-        sys.setprofile(counter)
-        try:
-            while line.requests < begun + _TRANSACTIONS:
-                step()
-        finally:
-            sys.setprofile(None)
-        bus.close()
+    finally:
+        sys.setprofile(None)
+    bus.close()
     return counter.calls / _TRANSACTIONS
 
 

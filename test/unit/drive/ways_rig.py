@@ -120,7 +120,7 @@ class TelegramLink(_PlainLink):
         super().__init__(rig)
         self._plc = Plc({1: rig.far}, PlcSetting())
         (self._unit,) = self._plc.units
-        self._blocks = Blocks(self._ask)
+        self._blocks = Blocks(self._ask, rig.clock.monotonic)
 
     def _ask(self, request: Any) -> tuple[bytes, float]:
         self._rig.elapse(_TURN)

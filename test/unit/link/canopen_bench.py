@@ -16,19 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 import heapq
 import itertools
-from types import SimpleNamespace
 from typing import TypeVar
-from unittest import mock
 
 from canopen_far_end import Server
 
-from nfo_sinus_driver.link import canopen_link
-from nfo_sinus_driver.link import canopen_supervision
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address
@@ -177,22 +172,14 @@ class Bench:
 
     def __init__(self, *fates: Fate) -> None:
         self.bus = Bus(fates)
-        self.link = CanopenLink(self.bus, SETTINGS)
-        self.do(self.link.open)
-
-    def do(self, action: Callable[[], _T]) -> _T:
-        clock = SimpleNamespace(monotonic=self.bus.monotonic)
-        with (
-            mock.patch.object(canopen_link, 'time', clock),
-            mock.patch.object(canopen_supervision, 'time', clock),
-        ):
-            return action()
+        self.link = CanopenLink(self.bus, SETTINGS, self.bus.monotonic)
+        self.link.open()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
-        return self.do(lambda: self.link.read(unit, address))
+        return self.link.read(unit, address)
 
     def write(self, address: Address, value: bytes = b'\1\2', unit: int = UNIT) -> Reply:
-        return self.do(lambda: self.link.write(unit, address, value))
+        return self.link.write(unit, address, value)
 
     @property
     def asked(self) -> list[int]:

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TypeVar
 
 from classic_far_end import FarEnd
@@ -50,20 +49,16 @@ class Bench:
     def __init__(self, *fates: Fate, settings: LineSettings = SETTINGS, unit: int = UNIT) -> None:
         self.wire = Wire(settings)
         self.drive = FarEnd(self.wire, iter(fates))
-        self.link = ClassicLink(self.wire, settings)
+        self.link = ClassicLink(self.wire, settings, self.wire.monotonic)
         self.unit = unit
-        self.do(self.link.open)
-
-    def do(self, action: Callable[[], _T]) -> _T:
-        with self.wire.time():
-            return action()
+        self.link.open()
 
     def read(self, address: Address, unit: int | None = None) -> Reply:
-        return self.do(lambda: self.link.read(self.unit if unit is None else unit, address))
+        return self.link.read(self.unit if unit is None else unit, address)
 
     def write(self, address: Address, *words: int, unit: int | None = None) -> Reply:
         unit = self.unit if unit is None else unit
-        return self.do(lambda: self.link.write(unit, address, packed(*words)))
+        return self.link.write(unit, address, packed(*words))
 
     def refused(self, code: int, *words: str) -> Refused:
         with pytest.raises(Refused) as raised:

@@ -139,7 +139,7 @@ class Unit:
     def __init__(self, settings: LineSettings = SETTINGS) -> None:
         self.wire = Wire(settings)
         self.wire.far_end = self._take
-        self.link = RtuLink(self.wire, settings)
+        self.link = RtuLink(self.wire, settings, self.wire.monotonic)
         self.link.use_resync_reads(1, (ONE, TWO))
         self.answers: dict[int, Callable[[bytes], bytes]] = {
             3: lambda frame: opinion.read_answer(1, [len(self.functions)] * frame[5]),
@@ -151,8 +151,7 @@ class Unit:
         self.late: dict[int, float] = {}
         self.functions: list[int] = []
         self._free = 0.0
-        with self.wire.time():
-            self.link.open()
+        self.link.open()
 
     def _take(self, frame: bytes, end: float) -> None:
         self.functions.append(frame[1])
@@ -161,12 +160,10 @@ class Unit:
         self._free = self.wire.arrive(start, answer)
 
     def identify(self) -> Identification:
-        with self.wire.time():
-            return asked_all(self.link.identify(1))
+        return asked_all(self.link.identify(1))
 
     def read(self, address: Address = ONE) -> bytes:
-        with self.wire.time():
-            return self.link.read(1, address).data
+        return self.link.read(1, address).data
 
 
 def silent(frame: bytes) -> bytes:

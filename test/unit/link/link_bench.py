@@ -65,21 +65,18 @@ class Bench:
     ) -> None:
         self.wire = self.wire_class(settings)
         self.slave = Slave(self.wire, iter(fates or []))
-        self.link = self.link_class(self.wire, settings)
-        with self.wire.time():
-            self.link.open()
-            if not trusted:
-                # as behind a line that has told something twice before
-                self.link._late.heard_unasked(self.wire.now)
+        self.link = self.link_class(self.wire, settings, self.wire.monotonic)
+        self.link.open()
+        if not trusted:
+            # as behind a line that has told something twice before
+            self.link._late.heard_unasked(self.wire.now)
         self.link.use_resync_reads(UNIT, resync)
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
-        with self.wire.time():
-            return self.link.read(unit, address)
+        return self.link.read(unit, address)
 
     def write(self, address: Address, *words: int, unit: int = UNIT) -> Reply:
-        with self.wire.time():
-            return self.link.write(unit, address, packed(*words))
+        return self.link.write(unit, address, packed(*words))
 
     def expect(self, error: type[LinkError], action: Callable[[], object]) -> LinkError:
         with pytest.raises(error) as raised:
@@ -90,8 +87,7 @@ class Bench:
     def write_and_read(
         self, address: Address, data: bytes, source: Address
     ) -> Reply:
-        with self.wire.time():
-            return self.link.write_and_read(UNIT, address, data, source)
+        return self.link.write_and_read(UNIT, address, data, source)
 
     @property
     def asked(self) -> list[int]:

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TypeVar
 
 from movitrac_far_end import FarEnd
@@ -57,18 +56,14 @@ class Bench:
         self.wire.gap = 2 * settings.char_time
         self.drive = FarEnd(self.wire, iter(fates))
         self.drive.sizes[LONG.index] = 8
-        self.link = MovitracLink(self.wire, settings)
-        self.do(self.link.open)
-
-    def do(self, action: Callable[[], _T]) -> _T:
-        with self.wire.time():
-            return action()
+        self.link = MovitracLink(self.wire, settings, self.wire.monotonic)
+        self.link.open()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
-        return self.do(lambda: self.link.read(unit, address))
+        return self.link.read(unit, address)
 
     def write(self, address: Address, value: bytes = VALUE, unit: int = UNIT) -> Reply:
-        return self.do(lambda: self.link.write(unit, address, value))
+        return self.link.write(unit, address, value)
 
     @property
     def asked(self) -> list[int]:

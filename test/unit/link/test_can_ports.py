@@ -26,13 +26,11 @@ import socket
 import struct
 import threading
 import tty
-from types import SimpleNamespace
 from typing import Any
 
 from canopen_far_end import Server
 import pytest
 
-from nfo_sinus_driver.link import lawicel_port
 from nfo_sinus_driver.link import socketcan
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
@@ -101,14 +99,12 @@ class Adapter:
 
 
 @pytest.fixture
-def adapter(monkeypatch: pytest.MonkeyPatch) -> Adapter:
-    adapter = Adapter()
-    monkeypatch.setattr(lawicel_port, 'time', SimpleNamespace(monotonic=adapter.monotonic))
-    return adapter
+def adapter() -> Adapter:
+    return Adapter()
 
 
 def test_an_adapter_goes_onto_the_bus_and_off_it(adapter: Adapter) -> None:
-    port = LawicelPort(adapter, 125_000)
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
     assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now == pytest.approx(0.1), 'it was heard out, and else nothing waited for'
@@ -123,7 +119,7 @@ def test_an_adapter_that_was_left_on_the_bus(adapter: Adapter) -> None:
     # it refuses what is half said, and frames come until it is off the bus
     adapter.says[b'\r\r\r'] = b'\a' + ANSWER_LINE
     adapter.says[b'C\r'] = ANSWER_LINE[5:] + b'\r'
-    port = LawicelPort(adapter, 125_000)
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
     assert port.receive(0.0) == []
     assert port.trouble == ''
@@ -133,13 +129,13 @@ def test_late_answers_of_an_adapter_count_for_what_they_answer(adapter: Adapter)
     adapter.says |= {b'\r\r\r': b'\r\r\a', b'C\r': b'\a'}
     for adapter.slow in (0.04, 0.15):
         adapter.told.clear()
-        LawicelPort(adapter, 125_000).open()
+        LawicelPort(adapter, 125_000, adapter.monotonic).open()
         # what it refused was not the bit rate
         assert adapter.told[-4:] == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     adapter.slow = 0.04
     adapter.says[b'S4\r'] = b'\a'
     with pytest.raises(PortError, match='cannot do 125000 bit/s'):
-        LawicelPort(adapter, 125_000).open()
+        LawicelPort(adapter, 125_000, adapter.monotonic).open()
 
 
 def test_an_adapter_that_never_ceases_to_talk_is_used_all_the_same(
@@ -150,14 +146,14 @@ def test_an_adapter_that_never_ceases_to_talk_is_used_all_the_same(
         return b't'
 
     monkeypatch.setattr(adapter, 'read', talk)
-    LawicelPort(adapter, 125_000).open()
+    LawicelPort(adapter, 125_000, adapter.monotonic).open()
     assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now < 2.0
 
 
 def test_an_adapter_that_answers_no_command_is_used_all_the_same(adapter: Adapter) -> None:
     adapter.says.clear()
-    LawicelPort(adapter, 125_000).open()
+    LawicelPort(adapter, 125_000, adapter.monotonic).open()
     assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now == pytest.approx(0.3)
 
@@ -169,17 +165,17 @@ def test_an_adapter_that_answers_no_command_is_used_all_the_same(adapter: Adapte
 def test_an_adapter_that_refuses(adapter: Adapter, command: bytes, problem: str) -> None:
     adapter.says[command] = b'\a'
     with pytest.raises(PortError, match=problem):
-        LawicelPort(adapter, 125_000).open()
+        LawicelPort(adapter, 125_000, adapter.monotonic).open()
     assert not adapter.is_open
 
 
 def test_a_bit_rate_that_there_is_not(adapter: Adapter) -> None:
     with pytest.raises(ValueError, match='bit rate 9600: there are 10000'):
-        LawicelPort(adapter, 9600)
+        LawicelPort(adapter, 9600, adapter.monotonic)
 
 
 def test_frames_of_an_adapter_in_pieces(adapter: Adapter) -> None:
-    port = LawicelPort(adapter, 125_000)
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
     adapter.coming = b'z\r' + ANSWER_LINE + ANSWER_LINE
     found: list[Frame] = []
@@ -189,7 +185,7 @@ def test_frames_of_an_adapter_in_pieces(adapter: Adapter) -> None:
 
 
 def test_what_an_adapter_could_not_send(adapter: Adapter) -> None:
-    port = LawicelPort(adapter, 125_000)
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
     adapter.coming = b'\a'
     assert port.receive(0.0) == []

@@ -91,7 +91,7 @@ def test_who_a_node_is() -> None:
     inquiry = bench.link.identify(UNIT)
     while not inquiry.done:
         try:
-            bench.do(inquiry.ask)
+            inquiry.ask()
         except Refused as error:
             assert 'no such object' in str(error)
     assert bench.asked == [0x1018, 0x1018, 0x1018, 0x1008, 0x100A]
@@ -106,7 +106,7 @@ def test_who_a_node_is() -> None:
 
 def test_write_and_read_is_two_transfers() -> None:
     bench = Bench()
-    reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, b'\1\2', B))
+    reply = bench.link.write_and_read(UNIT, A, b'\1\2', B)
     assert reply.data == bench.answer_of(1)
     assert bench.asked == [A.index, B.index]
 
@@ -114,7 +114,7 @@ def test_write_and_read_is_two_transfers() -> None:
 @pytest.mark.parametrize('what', ['answer', 'refuse', 'drop', 'double'])
 def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: str) -> None:
     bench = Bench(Fate(what=what))
-    assert bench.do(lambda: bench.link.read_then_write(UNIT, A, B, b'\1\2')).data == b''
+    assert bench.link.read_then_write(UNIT, A, B, b'\1\2').data == b''
     assert [(index, writes) for _, index, _, writes, _ in bench.bus.begun] == [
         (A.index, False),
         (B.index, True),
@@ -124,7 +124,7 @@ def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: st
 def test_a_write_that_fails_behind_a_read_may_be_done() -> None:
     bench = Bench(Fate(), Fate(what='refuse'))
     with pytest.raises(Refused) as raised:
-        bench.do(lambda: bench.link.read_then_write(UNIT, A, B, b'\1\2'))
+        bench.link.read_then_write(UNIT, A, B, b'\1\2')
     assert raised.value.maybe_done
 
 
@@ -284,8 +284,8 @@ def test_closing_ends_every_quarantine() -> None:
     bench = Bench(DROP)
     with pytest.raises(NoAnswer):
         bench.read(A)
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.read(A)
     assert bench.asked == [A.index, A.index]
 
@@ -315,8 +315,8 @@ def test_a_node_is_made_operational_before_the_first_write() -> None:
     bench.write(A)
     bench.write(A, unit=6)
     assert starts(bench) == [START, Frame(0, b'\x01\x06')]
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.write(A)
     assert len(starts(bench)) == 3
 

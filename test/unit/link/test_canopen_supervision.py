@@ -55,7 +55,7 @@ class _Objects:
     def carry_out(self, seconds: float) -> Watch:
         watch = self.bench.link.supervision.watch(UNIT, seconds)
         while not watch.done:
-            self.bench.do(watch.step)
+            watch.step()
         return watch
 
 
@@ -65,7 +65,7 @@ def elapse(bench: Bench, seconds: float) -> list[tuple[float, Frame]]:
     supervision = bench.link.supervision
     while (due := supervision.due) < until:
         bench.bus.now = max(due, bench.bus.now)
-        bench.do(supervision.serve)
+        supervision.serve()
     bench.bus.now = until
     return bench.bus.other[before:]
 
@@ -89,8 +89,8 @@ def test_whoever_has_written_is_heard_while_it_says_nothing_else() -> None:
     bench = Bench()
     bench.write(A)
     assert len([frame for _, frame in elapse(bench, 2.0) if frame == BEAT]) >= 19
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     assert elapse(bench, 1.0) == []
 
 
@@ -185,13 +185,13 @@ def test_a_node_that_has_nothing_for_it() -> None:
 def test_a_step_that_nobody_answers_is_done_again() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
     watch = far.bench.link.supervision.watch(UNIT, 1.5)
-    far.bench.do(watch.step)
+    watch.step()
     far.bench.bus.heal(DROP)
     with pytest.raises(NoAnswer):
-        far.bench.do(watch.step)
+        watch.step()
     while not watch.done:
         try:
-            far.bench.do(watch.step)
+            watch.step()
         except (NoAnswer, DamagedAnswer):
             far.bench.bus.now += TIMEOUT
     assert watch.means == HEARTBEAT_MEANS
@@ -200,8 +200,8 @@ def test_a_step_that_nobody_answers_is_done_again() -> None:
 def test_the_heartbeat_goes_on_when_the_adapter_is_back() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
     far.carry_out(1.5)
-    far.bench.do(far.bench.link.close)
-    far.bench.do(far.bench.link.open)
+    far.bench.link.close()
+    far.bench.link.open()
     assert BEAT in [frame for _, frame in elapse(far.bench, 1.0)]
 
 

@@ -141,8 +141,8 @@ def test_closing_ends_every_quarantine() -> None:
     bench = Bench(Fate(what='drop'))
     with pytest.raises(NoAnswer):
         bench.read(A)
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.read(A)
     assert bench.asked == [0x1E, 0x1E]
 

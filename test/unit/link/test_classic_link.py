@@ -167,7 +167,7 @@ def test_there_is_nothing_to_ask() -> None:
 
 def test_write_and_read_takes_two_transactions() -> None:
     bench = Bench()
-    reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, packed(7), B))
+    reply = bench.link.write_and_read(UNIT, A, packed(7), B)
     assert reply.data == bench.answer_of(1)
     assert bench.drive.requests == [(1, 0x1E, 7, 'answer'), (1, 0xB6, None, 'answer')]
 
@@ -176,7 +176,7 @@ def test_write_and_read_takes_two_transactions() -> None:
 def test_any_word_there_and_back(data: bytes) -> None:
     bench = Bench()
     word = int.from_bytes(data, 'big')
-    assert bench.do(lambda: bench.link.write(UNIT, A, data)).data == b''
+    assert bench.link.write(UNIT, A, data).data == b''
     assert bench.drive.requests[0][1:3] == (A.index, word)
     bench.drive.values = {A.index: lambda: word}
     assert bench.read(A).data == data

@@ -107,8 +107,8 @@ def test_a_serial_fault_that_is_old_or_may_be_is_left(before: int, pause: float)
 
 def test_what_was_known_of_a_drive_ends_with_the_connection() -> None:
     bench = own_fault_bench(38, 0.1, 1 << 10)
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.refused(Refused.DEVICE_FAILURE, 'Sio Fail')
     assert SIO_ERR not in bench.asked
 

@@ -200,8 +200,7 @@ def test_opening_again_forgets_the_echo() -> None:
     bench = EchoingBench()
     bench.read(A)
     bench.link.close()
-    with bench.wire.time():
-        bench.link.open()
+    bench.link.open()
     bench.echo = lambda frame: b''
     before = bench.wire.now
     assert bench.write(A, 5).data == b''
@@ -378,7 +377,7 @@ def test_every_answer_belongs_to_its_request(
     fates: list[Fate], steps: list[tuple[str, float]], echoes: bool
 ) -> None:
     bench = (EchoingBench if echoes else Bench)(list(one_thing_at_a_time(fates)))
-    with bench.wire.time(), contextlib.suppress(LinkError):
+    with contextlib.suppress(LinkError):
         # the first read tells whether there is an echo
         bench.link.read(UNIT, D)
     for what, pause in steps:

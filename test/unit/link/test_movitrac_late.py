@@ -135,8 +135,8 @@ def test_closing_ends_every_quarantine() -> None:
     bench = Bench(DROP)
     with pytest.raises(NoAnswer):
         bench.read(A)
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.read(A)
     assert bench.asked == [A.index, A.index]
 

@@ -91,7 +91,7 @@ def test_reply_says_when_its_last_byte_came() -> None:
 
 def test_write_and_read_is_two_transactions() -> None:
     bench = Bench()
-    reply = bench.do(lambda: bench.link.write_and_read(UNIT, A, VALUE, B))
+    reply = bench.link.write_and_read(UNIT, A, VALUE, B)
     assert reply.data == bench.answer_of(1)
     assert bench.asked == [A.index, B.index]
 
@@ -99,7 +99,7 @@ def test_write_and_read_is_two_transactions() -> None:
 @pytest.mark.parametrize('what', ['answer', 'refuse', 'drop', 'damage', 'double'])
 def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: str) -> None:
     bench = Bench(Fate(what=what))
-    reply = bench.do(lambda: bench.link.read_then_write(UNIT, A, B, VALUE))
+    reply = bench.link.read_then_write(UNIT, A, B, VALUE)
     assert reply.data == b''
     assert [request[1:3] for request in bench.drive.requests] == [
         (A.index, None),
@@ -110,7 +110,7 @@ def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: st
 def test_a_write_that_fails_behind_a_read_may_be_done() -> None:
     bench = Bench(Fate(), Fate(what='refuse'))
     with pytest.raises(Exception, match='P800') as raised:
-        bench.do(lambda: bench.link.read_then_write(UNIT, A, B, VALUE))
+        bench.link.read_then_write(UNIT, A, B, VALUE)
     assert vars(raised.value)['maybe_done']
 
 

@@ -178,7 +178,7 @@ def test_nothing_comes_between_the_acknowledging_and_the_stop(
     bench = inv_st(*sub_indices)
     bench.bus.servers[UNIT].objects[MODE, 0] = bytes(2)
     mode = number(MODE, 2, signed=False)
-    bench.do(lambda: bench.link.read_then_write(UNIT, WITH_ACK, mode, b'\1\0'))
+    bench.link.read_then_write(UNIT, WITH_ACK, mode, b'\1\0')
     assert asked(bench) == expected
 
 
@@ -194,8 +194,8 @@ def test_another_refusal_does_not_tell_how_an_array_is_numbered() -> None:
 def test_what_was_learnt_is_forgotten_when_the_port_is_closed() -> None:
     bench = inv_st(0, 1)
     bench.read(WITHOUT_ACK)
-    bench.do(bench.link.close)
-    bench.do(bench.link.open)
+    bench.link.close()
+    bench.link.open()
     bench.bus.servers[UNIT] = Server({(INV_ST, each): b'' for each in (0, 1, 2)})
     bench.read(WITHOUT_ACK)
     assert asked(bench) == [2, 1, 2]

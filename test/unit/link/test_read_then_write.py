@@ -60,8 +60,7 @@ def modbus(request: pytest.FixtureRequest) -> Callable[..., Bench]:
 
 
 def acknowledge_and_stop(bench: Bench) -> Reply:
-    with bench.wire.time():
-        return bench.link.read_then_write(UNIT, ACK, STOP, packed(0))
+    return bench.link.read_then_write(UNIT, ACK, STOP, packed(0))
 
 
 def failing(bench: Bench) -> LinkError:
@@ -167,7 +166,7 @@ SCMD = register(0x2A)
 
 
 def classic_acknowledge_and_stop(bench: ClassicBench) -> Reply:
-    return bench.do(lambda: bench.link.read_then_write(bench.unit, INV_ST_ACK, SCMD, packed(0)))
+    return bench.link.read_then_write(bench.unit, INV_ST_ACK, SCMD, packed(0))
 
 
 @pytest.mark.parametrize('what', ['answer', 'drop', 'damage', 'double', 'late', 'lump'])

@@ -17,14 +17,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field
 import itertools
 import struct
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -94,15 +91,13 @@ class Plc:
 
 
 @pytest.fixture
-def plc() -> Iterator[Plc]:
-    far = Plc()
-    with mock.patch.object(telegram, 'time', SimpleNamespace(monotonic=lambda: far.now)):
-        yield far
+def plc() -> Plc:
+    return Plc()
 
 
 @pytest.fixture
 def block(plc: Plc) -> telegram.Block:
-    return telegram.Block(plc.ask, 7, START)
+    return telegram.Block(plc.ask, lambda: plc.now, 7, START)
 
 
 def command(word: int, setpoint: int = 0) -> bytes:
@@ -331,30 +326,29 @@ STEP = st.one_of(
 def test_no_run_word_ever_follows_a_gap(steps: list[tuple[str, int]]) -> None:
     """Judged by what the PLC gets: after a gap of a second nothing runs without a beginning."""
     plc = Plc()
-    block = telegram.Block(plc.ask, 7, START)
-    with mock.patch.object(telegram, 'time', SimpleNamespace(monotonic=lambda: plc.now)):
-        for what, value in steps:
-            try:
-                if what == 'read':
-                    block.read(STATUS)
-                elif what == 'begin':
-                    block.write(BEGIN, command(value & ~1))
-                elif what == 'next':
-                    block.write(NEXT, command(value | 1))
-                elif what == 'clear':
-                    block.write(CLEAR, (value | 1).to_bytes(2, 'big'))
-                elif what == 'setpoint':
-                    block.write(SETPOINT, value.to_bytes(2, 'big'))
-                elif what == 'wait':
-                    plc.now += value / 1000
-                elif what == 'lose':
-                    plc.loses = value
-                elif what == 'slow':
-                    plc.takes = value / 1000
-                else:
-                    block.forget()
-            except LinkError:
-                pass
+    block = telegram.Block(plc.ask, lambda: plc.now, 7, START)
+    for what, value in steps:
+        try:
+            if what == 'read':
+                block.read(STATUS)
+            elif what == 'begin':
+                block.write(BEGIN, command(value & ~1))
+            elif what == 'next':
+                block.write(NEXT, command(value | 1))
+            elif what == 'clear':
+                block.write(CLEAR, (value | 1).to_bytes(2, 'big'))
+            elif what == 'setpoint':
+                block.write(SETPOINT, value.to_bytes(2, 'big'))
+            elif what == 'wait':
+                plc.now += value / 1000
+            elif what == 'lose':
+                plc.loses = value
+            elif what == 'slow':
+                plc.takes = value / 1000
+            else:
+                block.forget()
+        except LinkError:
+            pass
     last, life, stopped = -1e9, -1, True
     for at, word, setpoint, count in plc.written:
         assert count != life

@@ -31,8 +31,7 @@ from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 def test_write_and_read() -> None:
     unit = Unit()
-    with unit.wire.time():
-        reply = unit.link.write_and_read(1, TWO, packed(1, 2), ONE)
+    reply = unit.link.write_and_read(1, TWO, packed(1, 2), ONE)
     assert reply.data == packed(1)
     assert reply.arrived == unit.wire.now
     request = WriteAndRead(1, 0x258, packed(1, 2), 0x2A5, 1)
@@ -42,19 +41,18 @@ def test_write_and_read() -> None:
 def test_its_answer_is_put_in_quarantine_as_that_of_a_read() -> None:
     unit = Unit()
     unit.late[23] = 1.5
-    with unit.wire.time(), pytest.raises(NoAnswer) as error:
+    with pytest.raises(NoAnswer) as error:
         unit.link.write_and_read(1, ONE, packed(7), ONE)
     assert error.value.maybe_done
     unit.late.clear()
-    with unit.wire.time():
-        # what is written is never held back: it goes alone, for its answer names it
-        assert unit.link.write_and_read(1, ONE, packed(7), ONE).data == b''
+    # what is written is never held back: it goes alone, for its answer names it
+    assert unit.link.write_and_read(1, ONE, packed(7), ONE).data == b''
     assert unit.functions == [23, 6]
 
 
 def test_write_and_read_refused() -> None:
     unit = Unit()
     unit.answers[23] = refuses
-    with unit.wire.time(), pytest.raises(Refused) as refusal:
+    with pytest.raises(Refused) as refusal:
         unit.link.write_and_read(1, ONE, packed(7), ONE)
     assert refusal.value.code == Refused.ILLEGAL_FUNCTION

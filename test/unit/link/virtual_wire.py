@@ -19,19 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Iterator
-import contextlib
 from dataclasses import dataclass
 import heapq
 import itertools
-from types import SimpleNamespace
-from unittest import mock
 
 import pymodbus_opinion as opinion
 
-from nfo_sinus_driver.link import classic_link
-from nfo_sinus_driver.link import movitrac_link
-from nfo_sinus_driver.link import serial_link
-from nfo_sinus_driver.link import silence
 from nfo_sinus_driver.link.interface import LineSettings
 
 #: Functions of Modbus that write.
@@ -77,15 +70,6 @@ class Wire:
     def unpack(self, data: bytes) -> bytes:
         """The RTU frame for what went over this line."""
         return data
-
-    @contextlib.contextmanager
-    def time(self) -> Iterator[None]:
-        """Let the link see this clock."""
-        clock = SimpleNamespace(monotonic=self.monotonic)
-        with contextlib.ExitStack() as stack:
-            for module in (serial_link, classic_link, movitrac_link, silence):
-                stack.enter_context(mock.patch.object(module, 'time', clock))
-            yield
 
     def arrive(self, at: float, data: bytes, *, lump: bool = False) -> float:
         """Let bytes come, the first one's end a character after ``at``; return the last's."""

@@ -1,0 +1,436 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The driver below ROS and the simulated drives on one line, in virtual time and one thread.
+
+Link, bus and drive are the real ones, and so are the simulated line and its drives; what stands
+between is :mod:`support.rig_line`. The bus is stepped in place of its worker. So a minute of a
+drive takes a second or two, nothing waits, and the same test always goes the same way. At the end
+the laws are judged by every frame that was on the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from dataclasses import field
+import math
+from typing import Any
+from typing import NamedTuple
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Event
+from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from support import telegram_laws
+from support import trace_laws
+from support.rig_line import Clock
+from support.rig_line import Line
+from support.said import Said
+from support.said import said
+from support.said import says
+from support.variants import hardest
+from support.variants import ramps
+
+#: How far the clock goes at a time while nothing is due, s.
+SLICE = 0.02
+#: How often a program gives its set-point, s.
+_SENDING_PERIOD = 0.1
+#: How long a drive takes to refuse something, s.
+_TURN = 0.005
+
+
+@dataclass(frozen=True)
+class Way:
+    """
+    One way to command a drive.
+
+    :ivar protocol: of the line, as the simulator calls it; ``telegram1`` goes through a PLC.
+    :ivar options: of the simulated drive; :ivar driver: other settings of the driver.
+    """
+
+    protocol: str
+    model: str = 'sinus_g2'
+    method: str = 'mode_scmd'
+    reference: str = 'fieldbus'
+    options: Mapping[str, str] = field(default_factory=dict)
+    driver: Mapping[str, Any] = field(default_factory=dict)
+
+
+_OLD = {'classic_dialect': 'v5.0'}
+#: A law that is new is tested over all of them, and a way that is new with every law.
+WAYS: Mapping[str, Way] = {
+    'rtu': Way('modbus_rtu'),
+    'ascii': Way('modbus_ascii'),
+    'tcp': Way('modbus_tcp'),
+    'classic': Way('classic'),
+    'classic v5.0': Way('classic', options={'dialect': '5.0'}, driver=_OLD),
+    'canopen': Way('canopen'),
+    'rtu, control word': Way('modbus_rtu', method='drive_control'),
+    'classic, control word': Way('classic', method='drive_control'),
+    'canopen, control word': Way('canopen', method='drive_control'),
+    'optimal': Way('modbus_rtu', 'sinus_optimal'),
+    'optimal ascii': Way('modbus_ascii', 'sinus_optimal'),
+    'optimal, control word': Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),
+    'movitrac': Way('movitrac', 'movitrac31', 'function_bits'),
+    'telegram1 g2': Way('telegram1', method='telegram1'),
+    'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
+    'telegram1 sinus_h': Way('telegram1', 'sinus_h', 'telegram1'),
+}
+
+
+class Noted(NamedTuple):
+    """An event, and when it was reported."""
+
+    at: float
+    severity: Severity
+    text: Said
+
+
+class Notes:
+    """A listener that keeps what is reported of one drive."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.snapshots: list[Snapshot] = []
+        self.telemetry: list[Telemetry] = []
+        self.events: list[Noted] = []
+        self.parameters: list[str] = []
+        self.entries: list[LogEntry] = []
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The newest one."""
+        return self.snapshots[-1] if self.snapshots else None
+
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        self.snapshots.append(snapshot)
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        self.telemetry.append(telemetry)
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        self.parameters += keys
+
+    def on_log_entry(self, entry: LogEntry) -> None:
+        self.entries.append(entry)
+
+    def on_event(self, event: Event) -> None:
+        self.events.append(Noted(self._clock.now, event.severity, said(event)))
+
+    def said(self, what: str | Cause, severity: Severity | None = None) -> bool:
+        """Tell whether an event says this."""
+        return any(
+            says(one.text, what) for one in self.events if severity in (None, one.severity)
+        )
+
+
+class Rig:
+    """
+    Drives on one line, and the driver of each.
+
+    A test that has a set-point given again and again, as programs do, calls :meth:`send`.
+
+    :param way: one of :data:`WAYS`.
+    :param drives: how many, at the addresses from 1 on.
+    :param parameters: of the simulated drives, other than factory; their ramps are short.
+    :param options: of the simulated drives, beside those that make it hardest for the driver.
+    :param line: of :class:`Line`, such as ``baud`` or ``response_timeout``.
+    :param own: settings of one drive, by its address.
+    :param settings: of every drive, as the driver has them.
+    :ivar fars: the simulated drives, by address; :ivar far: the first.
+    :ivar drives: the driver's, by address; :ivar drive: the first.
+    :ivar looked: called whenever something may have happened; an ``AssertionError`` of it ends the
+        test, at the next :meth:`pass_time`, for a driver survives everything.
+    :ivar meet: called with each request before it is sent, the parameter and what is written to it
+        (``None``: it is read); what it returns goes wrong: ``refused``, ``busy``, ``unheard``,
+        ``drop`` (carried out, not answered), ``damage``, ``double``, ``delay``, or ``ignored``.
+    :ivar asked: every request, as ``meet`` has it, and its drive.
+    :ivar acknowledged: how often the test itself has a fault acknowledged.
+    """
+
+    def __init__(
+        self,
+        way: str | Way = 'rtu',
+        *,
+        drives: int = 1,
+        parameters: Mapping[str, Any] | None = None,
+        options: Mapping[str, Any] | None = None,
+        line: Mapping[str, Any] | None = None,
+        own: Mapping[int, Mapping[str, Any]] | None = None,
+        **settings: Any,
+    ) -> None:
+        self.way = way = WAYS[way] if isinstance(way, str) else way
+        self.clock = Clock()
+        quick = ramps(way.model, 0.3, 0.3)
+        if way.protocol == 'canopen':
+            settings = {'setpoint_timeout': 0.0, **settings}
+        self.line = Line(
+            way.protocol,
+            way.model,
+            self.clock,
+            range(1, drives + 1),
+            settings={**quick, **(parameters or {})},
+            options={**hardest(way.model), **way.options, **(options or {})},
+            **(line or {}),
+        )
+        self.line.passed = self._passed
+        self.fars = self.line.drives
+        usual = {
+            'model': way.model, 'control_method': way.method, 'reference': way.reference,
+            'poll_rate': 20.0, **way.driver, **settings,
+        }
+        self._settings = {
+            address: DriveSettings(**{**usual, 'address': address, **(own or {}).get(address, {})})
+            for address in self.fars
+        }
+        self.looked: Callable[[], None] = lambda: None
+        self.meet: Callable[[str, bytes | None], str | None] = lambda key, data: None
+        self.asked: list[tuple[int, str, bytes | None]] = []
+        self.acknowledged = 0
+        self._broken: AssertionError | None = None
+        self._sent: Mapping[int, float] = {}
+        self._send_at = 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """Start a driver, as after :meth:`kill`."""
+        self.link = self.line.link()
+        self.notes_of = {address: Notes(self.clock) for address in self.fars}
+        self.bus = Bus(self.link, now=self.clock.monotonic)
+        self.drives = {
+            address: Drive(self.bus, settings, self.notes_of[address])
+            for address, settings in self._settings.items()
+        }
+        self._keys = {address: self._places(drive) for address, drive in self.drives.items()}
+        for name, is_write in (('read', False), ('write', True), ('write_and_read', True)):
+            setattr(self.link, name, self._met(getattr(self.link, name), is_write))
+
+    def kill(self) -> None:
+        """End the driver without a word to the drive, as a power cut of the computer does."""
+        self._sent = {}
+        self.bus.close()
+
+    def close(self) -> None:
+        """End the driver, and judge what was on the line."""
+        self.kill()
+        found = self.violations()
+        acknowledged = [complaint for complaint in found if 'that acknowledges' in complaint]
+        assert len(acknowledged) <= self.acknowledged, acknowledged
+        assert len(found) == len(acknowledged), found
+        # a mistake, be it of a test that replaces a part of the driver, may pass for a lost drive
+        for notes in self.notes_of.values():
+            assert not notes.said(Cause.DRIVER_ERROR), notes.events
+
+    def __enter__(self) -> Rig:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.kill()
+
+    def violations(self) -> list[str]:
+        """Return what breaks the laws of the house in the frames so far."""
+        if self.way.protocol == 'telegram1':
+            return telegram_laws.violations(self.line.frames, self.way.model)
+        return trace_laws.violations(
+            self.line.frames, -math.inf, self.way.model, self.way.protocol
+        )
+
+    # --- the first drive ---
+
+    @property
+    def far(self) -> SimulatedDrive:
+        return self.fars[1]
+
+    @property
+    def drive(self) -> Drive:
+        return self.drives[1]
+
+    @property
+    def notes(self) -> Notes:
+        return self.notes_of[1]
+
+    @property
+    def turns(self) -> bool:
+        """The drive turns the motor, or is about to; it may coast, or ramp to a stop."""
+        return self.far.motor.driven and self.far.motor.demand != 0
+
+    # --- time ---
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for all."""
+        end = self.clock.now + seconds
+        self.judge(self.looked)
+        while self.clock.now < end:
+            if self._sent and self.clock.now >= self._send_at:
+                self._send_at = self.clock.now + _SENDING_PERIOD
+                for address, value in self._sent.items():
+                    self.drives[address].set_setpoint(value)
+            until = min(self.bus.step(), end, self.clock.now + SLICE)
+            self._require_consistent()
+            if self._broken is not None:
+                broken, self._broken = self._broken, None
+                raise broken
+            self.line.go_to(until)
+
+    def wait_until(self, condition: Callable[[], object], patience: float = 60.0) -> None:
+        """Let time pass until a condition holds; fail when it does not in time."""
+        end = self.clock.now + patience
+        while not condition():
+            assert self.clock.now < end, 'it never came true'
+            self.pass_time(SLICE)
+
+    def answer(self, future: Future[Any], patience: float = 60.0) -> Said:
+        """Let time pass until a command is answered; return what it says, done or not."""
+        self.wait_until(future.done, patience)
+        return said(future.exception() or future.result())
+
+    def result(self, future: Future[Any], patience: float = 60.0) -> Any:
+        """Let time pass until a command is answered; return its result, or raise its error."""
+        self.wait_until(future.done, patience)
+        return future.result()
+
+    def send(self, value: float | None, *addresses: int) -> None:
+        """Have a program give a set-point again and again from now on; ``None``: it ends."""
+        chosen = addresses or tuple(self.drives)
+        self._sent = {} if value is None else dict.fromkeys(chosen, value)
+        self._send_at = self.clock.now
+
+    def judge(self, look: Callable[[], None]) -> None:
+        """Keep what a look complains of until it can be raised."""
+        try:
+            look()
+        except AssertionError as complaint:
+            self._broken = self._broken or complaint
+
+    def _passed(self) -> None:
+        self.judge(self.looked)
+
+    def _require_consistent(self) -> None:
+        """See to it that the state of control says what there is of a stop, and who is followed."""
+        for drive in self.drives.values():
+            controller = drive._controller
+            if controller is None:
+                continue
+            state, stopping = controller.state, controller.stopping
+            if state in (ControlState.STOPPING, ControlState.BLOCKED):
+                assert stopping, f'{state.name}, and nothing stops it'
+            elif state not in (ControlState.PROCEDURE, ControlState.ABORTING, ControlState.CLOSED):
+                assert not stopping, f'{state.name}, and a stop is on its way'
+            assert drive.armed == (state is ControlState.ENABLED)
+
+    # --- usual steps ---
+
+    def connect(self, *, parameters: bool = False) -> None:
+        """Connect to all drives and activate them."""
+        for future in [drive.connect(parameters=parameters) for drive in self.drives.values()]:
+            self.result(future)
+        for drive in self.drives.values():
+            drive.activate()
+        self.pass_time(0.2)
+
+    def enable(self, *addresses: int) -> None:
+        """Enable some drives, or all."""
+        for future in [self.drives[one].enable() for one in addresses or self.drives]:
+            answer = self.answer(future)
+            assert 'enabled' in answer, answer
+        # what is asked for in the very moment of enabling does not come after it
+        self.pass_time(SLICE)
+
+    def turn(self, frequency: float = 20.0) -> None:
+        """Connect, enable and turn, with a program that keeps on giving the set-point."""
+        self.connect()
+        self.enable()
+        if self.drive.settings.follows_setpoints:
+            self.send(frequency)
+        for far in self.fars.values():
+            self.wait_until(lambda far=far: abs(far.motor.frequency) > 0.98 * frequency, 5.0)
+        self.pass_time(0.3)
+        for notes in self.notes_of.values():
+            notes.events.clear()
+
+    def assert_only_enable_helps(self, frequency: float = 20.0) -> None:
+        """Nothing turns although set-points keep arriving, until enable is called."""
+        self.send(frequency)
+        self.pass_time(1.5)
+        assert not self.drive.armed
+        assert not self.turns
+        self.enable()
+        self.pass_time(1.5)
+        assert abs(self.far.motor.frequency) > 0.9 * frequency
+
+    # --- requests ---
+
+    def spoil(self, what: str, key: str, times: int = 1, *, written: bool = True) -> None:
+        """Have the next requests that write a parameter, or read it, go wrong; see ``meet``."""
+        left = [times]
+
+        def meet(asked: str, data: bytes | None) -> str | None:
+            if not left[0] or asked != key or (data is not None) != written:
+                return None
+            left[0] -= 1
+            return what
+
+        self.meet = meet
+
+    def written(self, key: str, address: int = 1) -> list[int]:
+        """Return what was written to a parameter, each as one number, in order."""
+        return [
+            int.from_bytes(data, 'big')
+            for unit, asked, data in self.asked
+            if unit == address and asked == key and data is not None
+        ]
+
+    def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
+        registers, keys = drive.registers, {}
+        for key in registers.model:
+            if registers.reaches(key):
+                for part in self.link.parts(registers.address(key)):
+                    keys.setdefault(part[:3], key)
+        return keys
+
+    def _met(self, call: Callable[..., Reply], is_write: bool) -> Callable[..., Reply]:
+        def meet(unit: int, address: Address, *data: Any) -> Reply:
+            key = self._keys.get(unit, {}).get(address[:3], '')
+            written = data[0] if is_write else None
+            self.asked.append((unit, key, written))
+            wrong = self.meet(key, written)
+            if wrong in ('refused', 'busy'):
+                self.line.go_to(self.clock.now + _TURN)
+                raise Refused(Refused.BUSY if wrong == 'busy' else Refused.DEVICE_FAILURE)
+            if wrong == 'ignored':
+                self.line.go_to(self.clock.now + _TURN)
+                return Reply(b'', self.clock.now)
+            if wrong is not None:
+                self.line.spoil(wrong)
+            return call(unit, address, *data)
+
+        return meet
