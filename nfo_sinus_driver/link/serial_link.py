@@ -372,7 +372,8 @@ class SerialLink(ModbusLink):
             # what comes back before the answer to a write may be its answer, and another master may
             # ask the same as we do
             alone = not self._another.is_there(now)
-            if alone and not isinstance(request, Write) and frame in other:
+            came_back = not isinstance(request, Write) and frame in other
+            if alone and came_back:
                 self._echo.present = True
             stray = self._echo.before + other.replace(frame, b'', 1)
             self._stray = bool(stray)
@@ -389,6 +390,9 @@ class SerialLink(ModbusLink):
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         self._late.took(request.unit, arrived - self._sent_at - length)
+        if came_back and not alone:
+            # another master has asked the same, which is answered, too
+            self._late.quarantine(request.unit, (request.answer_head,), arrived)
         if late or (reader.received and not self._doubtful):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.heard_unasked(self._now())
