@@ -472,8 +472,8 @@ LAWS = (
         9,
         'a clean exit leaves the time-out of the drive to strike',
         CONTROLLER,
-        '        await self.method.release()\n',
-        '',
+        '\n        await self.method.release()\n',
+        '\n',
         (WAYS_OUT, '-k', 'leaves_no_fault'),
     ),
     Mutant(
