@@ -23,6 +23,7 @@ import time
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import classic
+from nfo_sinus_driver.link.another_master import DOUBTFUL
 from nfo_sinus_driver.link.classic import INV_ST
 from nfo_sinus_driver.link.classic import MODE
 from nfo_sinus_driver.link.classic import SIO_ERR
@@ -31,6 +32,7 @@ from nfo_sinus_driver.link.classic import Enquiry
 from nfo_sinus_driver.link.classic import Kind
 from nfo_sinus_driver.link.classic import Message
 from nfo_sinus_driver.link.classic import Nak
+from nfo_sinus_driver.link.classic import Reader
 from nfo_sinus_driver.link.classic import Request
 from nfo_sinus_driver.link.classic import Select
 from nfo_sinus_driver.link.classic import Value
@@ -49,6 +51,8 @@ from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.line_protocols import BROADCAST
 from nfo_sinus_driver.link.line_protocols import CLASSIC
+from nfo_sinus_driver.link.other_requests import TRIES
+from nfo_sinus_driver.link.other_requests import OtherRequests
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
 
@@ -59,6 +63,8 @@ _INTER_BYTE_TIMEOUT = 0.03
 #: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
 _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002
+#: How long a write waits at most while another master's request is answered, s.
+_WRITE_WAIT = 0.05
 #: How long drives may be busy with a broadcast, which none of them confirms, s: this at most, else
 #: so many times what the slowest of them took lately for a request of its own, which is forgotten
 #: by and by.
@@ -97,6 +103,9 @@ class ClassicLink:
     An adapter that echoes what is sent is noticed at the first request; from then on an answer
     counts only behind the echo.
 
+    The requests of another master are found (:class:`OtherRequests`). What may answer them, and any
+    answer that may have met another one, is not believed; a read is repeated.
+
     Point to point (unit 0) an answer may carry any address [C86]. Do not mix it with others on
     one line.
 
@@ -121,6 +130,10 @@ class ClassicLink:
         self._late: LateReplies[Request, Kind] = LateReplies(
             settings.response_timeout, classic.kinds
         )
+        self._others: OtherRequests[Request] = OtherRequests(
+            self.remarks, settings.response_timeout, Reader().feed,
+            Request, classic.encode, classic.answers,
+        )
         #: The inverter status that each unit told last, and when.
         self._inv_st: dict[int, tuple[int, float]] = {}
         self._last: _Answer | None = None
@@ -141,6 +154,7 @@ class ClassicLink:
         """Close the port; harmless when it is closed already."""
         self._port.close()
         self._late.clear()
+        self._others.clear()
         self._inv_st.clear()
         self._last = None
         self._echoes = False
@@ -207,14 +221,23 @@ class ClassicLink:
     # --- transactions -------------------------------------------------------------------------
 
     def _enquire(self, unit: int, number: int) -> tuple[int, float]:
-        """Return the value of a parameter, and when it came."""
+        """Return the value of a parameter, and when it came; another master may cost tries."""
+        for tries_left in reversed(range(TRIES)):
+            try:
+                return self._enquire_once(unit, number)
+            except DamagedAnswer:
+                if not tries_left or not self._others.is_there(self._now()):
+                    raise
+        raise AssertionError
+
+    def _enquire_once(self, unit: int, number: int) -> tuple[int, float]:
         if unit == BROADCAST:
             raise ValueError('nobody answers a broadcast')
         request = Enquiry(unit, number)
         self._listen(request)
         certain = self._first_certain(unit, number)
         if certain != number:
-            self._enquire(unit, certain)
+            self._enquire_once(unit, certain)
             self._listen(request)
         answer, arrived, early = self._transact(request)
         if early:
@@ -307,15 +330,27 @@ class ClassicLink:
         if last and last.request.unit == request.unit and last.kind in nameless(request):
             pause = max(_NO_DOUBLE * self._settings.char_time, _NO_DOUBLE_LEAST)
             until = max(until, last.arrived + pause)
+        is_write = isinstance(request, Select)
+        give_up = self._now() + (_WRITE_WAIT if is_write else self._settings.response_timeout)
+        until = max(until, min(self._others.open_until, give_up))
         while True:
-            if self._port.read(until) and last:
-                self._late.expect(last.request, self._now())
-            if self._now() >= until:
-                return
+            data = self._port.read(until)
+            now = self._now()
+            if data:
+                if not self._others.hear(data, now) and last:
+                    self._late.expect(last.request, now)
+                # more may follow, or what another master asked is answered first
+                gap = _NO_DOUBLE * self._settings.char_time
+                until = max(until, min(max(now + gap, self._others.open_until), give_up))
+            if now >= until:
+                break
+        if late := self._others.take_late(now):
+            self._late.expect(late, now)
 
     def _send(self, request: Request) -> float:
         """Hand a request to the port; return when its last byte will have left."""
         frame = classic.encode(request)
+        self._others.sent(request)
         began = self._now()
         self._port.write(frame)
         return began + len(frame) * self._settings.char_time
@@ -357,6 +392,7 @@ class ClassicLink:
         last_chance = deadline + 2 * longest
         reader = classic.Reader()
         echoed = not self._echoes
+        answered = False
         came = 0
         while True:
             data = self._port.read(deadline)
@@ -366,19 +402,35 @@ class ClassicLink:
                     continue
                 break
             came += len(data)
+            self._others.hear(data, now)
             messages = reader.feed(data)
             for number, message in enumerate(messages, start=1):
                 if message == request:
-                    self._echoes = echoed = True
+                    # or another master asks the same
+                    self._echoes |= not self._others.is_there(now)
+                    echoed = True
                     came -= len(classic.encode(request))
                 elif echoed and classic.answers(message, request):
-                    if classic.kind(message) not in quarantined:
+                    kind = classic.kind(message)
+                    stray = came - len(classic.encode(message))
+                    doubtful = self._others.doubts(message, request, now, stray)
+                    if kind not in quarantined and not doubtful:
                         return message, now, bool(messages[number:] or reader.pending)
                     if isinstance(request, Select):
                         raise _Ambiguous(
                             f'unit {request.unit} answered, but perhaps to an earlier request'
                         )
+                    if doubtful:
+                        raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
+                elif self._others.is_there(now) and isinstance(message, Value):
+                    # units answer in order: ours was lost, unless this is a late one to us
+                    answered |= message.unit == request.unit and message.number not in quarantined
+            if answered or self._others.was_answered:
+                raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
             deadline = min(max(deadline, now + longest), last_chance)
+            if self._others.is_there(now):
+                # its next request may be as far away as the time-out
+                deadline = min(deadline, now + longest - _INTER_BYTE_TIMEOUT + 2 * self._slowest)
         if came:
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')

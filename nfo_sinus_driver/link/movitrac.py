@@ -53,6 +53,8 @@ _LENGTHS = {
     _ACK: 2,
     _NACK: 3,
 }
+#: Bytes of LONG_SELECT, the longest frame.
+_LONGEST = max(_LENGTHS.values())
 #: Bytes that may come before or after a frame when a transmitter is switched.
 _GLITCH = 2
 
@@ -109,6 +111,11 @@ def kind(answer: Answer) -> Kind:
 def kinds(request: Request) -> tuple[Kind, Kind]:
     """Return the kinds of answers that a request may have."""
     return request.index if isinstance(request, Enquiry) else Ack, Nack
+
+
+def answers(message: Message, request: Request) -> bool:
+    """Tell whether a message may be the answer to a request."""
+    return not isinstance(message, Request) and kind(message) in kinds(request)
 
 
 def check_sum(body: bytes) -> int:
@@ -206,8 +213,8 @@ class Reader:
         :returns: the answer, ``None`` while there is none; feeding may go on after it.
         """
         self.rest += data
-        for start, end, message in self._messages():
-            if not isinstance(message, Request) and kind(message) in kinds(self._request):
+        for start, end, message in _messages(self.rest):
+            if not isinstance(message, Request) and answers(message, self._request):
                 # an answer found before was not believed
                 self.passed_over += self.frame + self.rest[:start]
                 self.frame = self.rest[start:end]
@@ -215,15 +222,34 @@ class Reader:
                 return message
         return None
 
-    def _messages(self) -> Iterator[tuple[int, int, Message]]:
-        """Yield each message that counts, where its frame begins and where it ends."""
-        start = behind = 0
-        while start < len(self.rest):
-            message = decode(self.rest[start:])
-            junk = self.rest[behind:start]
-            if message is None or (isinstance(message, (Ack, Nack)) and not is_glitch(junk)):
-                start += 1
-                continue
-            end = start + _LENGTHS[self.rest[start]]
-            yield start, end, message
-            start = behind = end
+
+def _messages(data: bytes) -> Iterator[tuple[int, int, Message]]:
+    """Yield each message that counts, where its frame begins and where it ends."""
+    start = behind = 0
+    while start < len(data):
+        message = decode(data[start:])
+        junk = data[behind:start]
+        if message is None or (isinstance(message, (Ack, Nack)) and not is_glitch(junk)):
+            start += 1
+            continue
+        end = start + _LENGTHS[data[start]]
+        yield start, end, message
+        start = behind = end
+
+
+class Overhearing:
+    """Finds all messages, of any master and drive, in the bytes that come in."""
+
+    def __init__(self) -> None:
+        self._rest = b''
+
+    def feed(self, data: bytes) -> list[Message]:
+        """Take bytes that came in; return the messages that became whole, in their order."""
+        self._rest += data
+        found: list[Message] = []
+        behind = 0
+        for _, end, message in _messages(self._rest):
+            found.append(message)
+            behind = end
+        self._rest = self._rest[behind:][1 - _LONGEST :]
+        return found

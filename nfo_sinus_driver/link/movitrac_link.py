@@ -23,6 +23,7 @@ import time
 
 from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import movitrac_refusal
+from nfo_sinus_driver.link.another_master import DOUBTFUL
 from nfo_sinus_driver.link.interface import Address
 from nfo_sinus_driver.link.interface import Clock
 from nfo_sinus_driver.link.interface import DamagedAnswer
@@ -41,9 +42,12 @@ from nfo_sinus_driver.link.movitrac import Data
 from nfo_sinus_driver.link.movitrac import Enquiry
 from nfo_sinus_driver.link.movitrac import Kind
 from nfo_sinus_driver.link.movitrac import Nack
+from nfo_sinus_driver.link.movitrac import Overhearing
 from nfo_sinus_driver.link.movitrac import Reader
 from nfo_sinus_driver.link.movitrac import Request
 from nfo_sinus_driver.link.movitrac import Select
+from nfo_sinus_driver.link.other_requests import TRIES
+from nfo_sinus_driver.link.other_requests import OtherRequests
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.serial_link import Echo
@@ -85,6 +89,9 @@ class MovitracLink:
     listened to for as long as the right answer may take; if anything more comes, nothing is
     believed. So a drive that is dead costs its neighbours no transaction.
 
+    The requests of another master are found (:class:`OtherRequests`). What may answer them, and any
+    answer that may have met another one, is not believed; a read is repeated.
+
     Drives may be set to answer up to 0.2 s late (P843). Nobody has to say so: the first request,
     and each after a failure, is waited for so much longer than ``response_timeout``, any other as
     much longer as the drive has taken of late.
@@ -111,6 +118,10 @@ class MovitracLink:
         self._late: LateReplies[Request, Kind] = LateReplies(
             settings.response_timeout, movitrac.kinds
         )
+        self._others: OtherRequests[Request] = OtherRequests(
+            self.remarks, settings.response_timeout + LONGEST_RESPONSE_TIME, Overhearing().feed,
+            Request, movitrac.encode, movitrac.answers,
+        )
         self._echo = Echo()
         #: The frame of the last answer, if the last request had one.
         self._last = b''
@@ -131,6 +142,7 @@ class MovitracLink:
         """Close the port; harmless when it is closed already."""
         self._port.close()
         self._late.clear()
+        self._others.clear()
         self._echo = Echo()
         self._last = b''
 
@@ -198,6 +210,16 @@ class MovitracLink:
     # --- belief -----------------------------------------------------------------------------------
 
     def _enquire(self, request: Enquiry) -> tuple[Answer, float]:
+        """Return the answer to a question; another master may cost some tries."""
+        for tries_left in reversed(range(TRIES)):
+            try:
+                return self._enquire_once(request)
+            except DamagedAnswer:
+                if not tries_left or not self._others.is_there(self._now()):
+                    raise
+        raise AssertionError
+
+    def _enquire_once(self, request: Enquiry) -> tuple[Answer, float]:
         """
         Return the answer to a question that is not in quarantine, if need be after another one.
 
@@ -258,8 +280,9 @@ class MovitracLink:
     def _listen(self, request: Request, until: float) -> None:
         """Wait as long as the right answer may take, if this was none (DamagedAnswer: it came)."""
         while (now := self._now()) < until:
-            if self._port.read(until):
+            if data := self._port.read(until):
                 self._line_end = max(self._line_end, now)
+                self._others.hear(data, self._now())
                 raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')
 
     def _await_gap(self, *, is_write: bool = False) -> None:
@@ -274,12 +297,24 @@ class MovitracLink:
         gap = _GAP * self._settings.char_time
         longest = movitrac.LONGEST_ANSWER * self._settings.char_time
         wait = max(_WRITE_WAIT, longest) if is_write else self._settings.response_timeout
-        data, self._line_end, silent = await_silence(
-            self._port, self._now, self._line_end, gap, wait
-        )
-        self._heard_unasked(data)
-        if not silent and not is_write:
-            raise NeverSilent(NEVER_SILENT)
+        give_up = self._now() + wait
+        while True:
+            data, self._line_end, silent = await_silence(
+                self._port, self._now, self._line_end, gap, wait
+            )
+            if not self._others.hear(data, self._now()):
+                self._heard_unasked(data)
+            if not silent and not is_write:
+                raise NeverSilent(NEVER_SILENT)
+            until = min(self._others.open_until, give_up)
+            if self._now() >= until:
+                break
+            # what another master asked is answered first
+            if data := self._port.read(until):
+                self._line_end = max(self._line_end, self._now())
+                self._others.hear(data, self._line_end)
+        if late := self._others.take_late(self._now()):
+            self._late.expect(late, self._now())
 
     def _heard_unasked(self, data: bytes) -> None:
         """Take note of bytes that nobody asked for, unless switching a transmitter makes them."""
@@ -295,6 +330,7 @@ class MovitracLink:
         response_time = self._response_time(unit)
         self._late.sent(request)
         self._echo.sent(frame)
+        self._others.sent(request)
         sent = self._now() + len(frame) * char_time
         self._line_end = sent
         self._port.write(frame)
@@ -309,7 +345,8 @@ class MovitracLink:
             self._last = b''
             raise
         finally:
-            if frame in reader.other:
+            # or another master asks the same
+            if frame in reader.other and not self._others.is_there(self._now()):
                 self._echo.present = True
         # units answer in order: whatever was still to come from it has come before this
         self._late.release(unit)
@@ -326,6 +363,7 @@ class MovitracLink:
 
         :param due: when it begins at last, if the drive is as fast as it can be.
         """
+        encoded = movitrac.encode(request)
         quarantined = self._late.quarantined(request.unit, self._now())
         longest = movitrac.LONGEST_ANSWER * self._settings.char_time + _INTER_BYTE_TIMEOUT
         deadline = due + self._settings.response_timeout
@@ -339,21 +377,29 @@ class MovitracLink:
                     continue
                 break
             self._line_end = max(self._line_end, now)
+            self._others.hear(data, now)
             data = self._echo.strip(data)
             while (answer := reader.feed(data)) is not None:
-                if movitrac.kind(answer) not in quarantined:
+                passed = reader.passed_over
+                stray = len(self._echo.before) + (passed != encoded and len(passed))
+                doubtful = self._others.doubts(answer, request, now, stray)
+                if movitrac.kind(answer) not in quarantined and not doubtful:
                     return answer, now
                 if isinstance(request, Select):
                     raise _Ambiguous(
                         f'unit {request.unit} answered, but perhaps to an earlier request'
                     )
                 data = b''
+                if doubtful:
+                    raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
+            if self._others.was_answered:
+                raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
             deadline = min(max(deadline, now + longest), last_chance)
         held = self._echo.give_up()
         if held:
             # an adapter that echoes no more; if it does, the next echo will tell
             self._echo.present = False
         came = len(held) + len(reader.frame + reader.other)
-        if held or reader.frame or reader.other not in (b'', movitrac.encode(request)):
+        if held or reader.frame or reader.other not in (b'', encoded):
             raise DamagedAnswer(f'unit {request.unit}: {came} bytes came that are no answer')
         raise NoAnswer(f'unit {request.unit} did not answer')
