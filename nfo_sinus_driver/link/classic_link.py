@@ -58,8 +58,9 @@ from nfo_sinus_driver.link.port import port_of
 
 #: What a message carries.
 _WORD = struct.Struct('>H')
-#: Pauses within an answer may last this long, s: no manual limits them [C86].
-_INTER_BYTE_TIMEOUT = 0.03
+#: Pauses within an answer may last this long, s: no manual limits them [C86], and an adapter may
+#: hold bytes back.
+_INTER_BYTE_TIMEOUT = 0.07
 #: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
 _NO_DOUBLE = 2
 _NO_DOUBLE_LEAST = 0.002

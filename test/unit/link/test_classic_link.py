@@ -36,6 +36,7 @@ import pytest
 from support.addresses import classic_id
 from support.addresses import packed
 
+from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import BAUD_RATES
 from nfo_sinus_driver.link.interface import DamagedAnswer
@@ -283,3 +284,15 @@ def test_an_adapter_that_echoes_no_more() -> None:
     with pytest.raises(DamagedAnswer):
         bench.read(B)
     assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
+
+
+def test_answer_whose_pieces_an_adapter_holds_back() -> None:
+    bench = Bench(settings=LineSettings(9600, '7E1', response_timeout=0.2))
+    frame = classic.encode(classic.Value(UNIT, A.index, 77))
+
+    def far_end(request: bytes, end: float) -> None:
+        for number, at in enumerate(range(0, len(frame), 3)):
+            bench.wire.arrive(end + 0.06 * number, frame[at : at + 3], lump=True)
+
+    bench.wire.far_end = far_end
+    assert bench.read(A).data == packed(77)

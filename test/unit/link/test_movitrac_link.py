@@ -34,6 +34,7 @@ from movitrac_far_end import Fate
 import pytest
 
 from nfo_sinus_driver.link import Identification
+from nfo_sinus_driver.link import movitrac
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.interface import LineSettings
@@ -332,3 +333,17 @@ def test_a_closed_port() -> None:
     with pytest.raises(PortError, match='does not exist'):
         link.open()
     link.close()
+
+
+def test_answer_whose_pieces_an_adapter_holds_back() -> None:
+    bench = Bench()
+    bench.read(A)
+    frame = movitrac.encode(movitrac.Data(LONG.index, 2 * VALUE))
+
+    def far_end(request: bytes, end: float) -> None:
+        for number in range(4):
+            piece = frame[3 * number : 3 * number + 3]
+            bench.wire.arrive(end + 0.06 * number, piece, lump=True)
+
+    bench.wire.far_end = far_end
+    assert bench.read(LONG).data == 2 * VALUE
