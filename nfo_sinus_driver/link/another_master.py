@@ -51,17 +51,17 @@ def message_lengths(beginning: bytes) -> set[int]:
     """Return how long a message that begins like this is, as a request or as an answer."""
     if len(beginning) < 3 or not beginning[0]:
         return set()
-    function, told = beginning[1], 3 + beginning[2]
+    function, with_data = beginning[1], 3 + beginning[2]
     if function & _EXCEPTION:
         return {REFUSAL_LENGTH}
     if function in _READS:
-        return {6, told}
+        return {6, with_data}
     if function in _SINGLE:
         return {6}
     if function in _MULTIPLE:
         return {6, 7 + beginning[6]} if len(beginning) > 6 else {6}
     if function == _READ_WRITE:
-        return {told, 11 + beginning[10]} if len(beginning) > 10 else {told}
+        return {with_data, 11 + beginning[10]} if len(beginning) > 10 else {with_data}
     return set()
 
 
@@ -117,7 +117,7 @@ class Sightings:
 
 class AnotherMaster:
     """
-    Finds the requests of another master, and the answers to them, among what nobody here asked for.
+    Finds the requests of another master, and the answers to them, in what is no answer to us.
 
     Its request stands until its answer has come, or may be late. While it stands, and in every
     exchange in which anything of it was heard, no answer is certain: one to a read names no
@@ -141,7 +141,7 @@ class AnotherMaster:
         self._standing: dict[int, _Question] = {}
 
     def sent(self, frame: bytes) -> None:
-        """Take note of a request of ours: it may come back, and is nobody else's."""
+        """Take note of a request of ours: it may come back, and is not of another master."""
         self._own.append(frame)
 
     def is_there(self, now: float) -> bool:

@@ -18,8 +18,8 @@ Telegram 1 behind a PLC or gateway: a block of registers, one telegram each way.
 
 The PLC is the controller of the drive on its fieldbus and shows the driver a block of its own
 holding registers, five to be read and three to be written. Every transaction carries all of them
-(function 23, or 16 and 03 where that is refused), so that what is told and what is commanded are of
-one moment, and a life counter each way says who is alive.
+(function 23, or 16 and 03 where that is refused), so that the status and the command are of one
+moment, and a life counter each way says who is alive.
 
 What is written goes out with every transaction from then on: our counter moves while the driver
 lives, and so the PLC knows that the command words are meant still. After so long without it as
@@ -83,7 +83,7 @@ LAYOUT_VERSION = 1
 #: From where on the driver writes.
 WRITTEN_FROM = 8
 
-_TOLD = struct.Struct('>5H')
+_SHOWN = struct.Struct('>5H')
 _COMMANDED = struct.Struct('>3H')
 _VALID = 1 << 0
 _NOTHING_STANDS = (
@@ -95,7 +95,7 @@ Ask = Callable[[Request[_T]], tuple[_T, float]]
 #: What is written, and where.
 _Written = tuple[Address, bytes]
 #: The five registers, and a moment.
-_Told = tuple[tuple[int, ...], float]
+_Shown = tuple[tuple[int, ...], float]
 
 
 class Block:
@@ -125,10 +125,10 @@ class Block:
         #: The PLC's life counter, and how often it has to move until a status is dated anew.
         self._life: int | None = None
         self._moves = 0
-        #: When what the block shows was first seen.
+        #: When the present content of the block first came.
         self._life_at = 0.0
         #: What came with the last status, and when; ``None`` once its actual value was taken.
-        self._beside: tuple[_Told, float] | None = None
+        self._beside: tuple[_Shown, float] | None = None
         #: The layout was looked at.
         self._known = False
         #: Function 23 was refused.
@@ -152,10 +152,10 @@ class Block:
             shared, at = beside
             if self._now() - at <= _SHARED_FOR:
                 return Reply(self._part(shared[0], address), shared[1], requests=0)
-        told, arrived = self._exchange()
-        reply = Reply(self._part(told, address), arrived)
+        shown, arrived = self._exchange()
+        reply = Reply(self._part(shown, address), arrived)
         if address.sub_index == STATUS:
-            self._beside = (told, arrived), self._now()
+            self._beside = (shown, arrived), self._now()
         return reply
 
     def write(self, address: Address, data: bytes) -> Reply:
@@ -165,17 +165,17 @@ class Block:
 
     def write_and_read(self, address: Address, data: bytes, source: Address) -> Reply:
         """Write a part of it and read another; nothing where the PLC has no valid data."""
-        told, arrived = self._exchange((address, data))
+        shown, arrived = self._exchange((address, data))
         try:
-            reply = Reply(self._part(told, source), arrived)
+            reply = Reply(self._part(shown, source), arrived)
         except NoData:
             # it was written all the same
             return Reply(b'', arrived)
-        self._beside = (told, arrived), self._now()
+        self._beside = (shown, arrived), self._now()
         return reply
 
-    def _part(self, told: tuple[int, ...], address: Address) -> bytes:
-        word, actual, _, flags, _ = told
+    def _part(self, shown: tuple[int, ...], address: Address) -> bytes:
+        word, actual, _, flags, _ = shown
         if not flags & _VALID:
             raise NoData(
                 f'the PLC has no valid data from the drive (bit 0 of register {self._start + 3} of '
@@ -184,8 +184,8 @@ class Block:
             )
         return struct.pack('>HH', word, flags) if address.sub_index == STATUS else _word(actual)
 
-    def _exchange(self, write: _Written | None = None) -> _Told:
-        """Carry out a transaction; return the five registers, and since when they were seen."""
+    def _exchange(self, write: _Written | None = None) -> _Shown:
+        """Carry out a transaction; return the five registers, and when they first came."""
         began = self._now()
         self._beside = None
         if self._command is not None and began - self._sent_at > PLC_TIME:
@@ -208,14 +208,14 @@ class Block:
             last = self._sent_at = began
         self._count = self._count % 0xFFFF + 1
         try:
-            told, arrived = self._send(_COMMANDED.pack(*command, self._count))
+            shown, arrived = self._send(_COMMANDED.pack(*command, self._count))
         except (Refused, NoPath):
             if live:
                 # what was refused is not written again with the next transaction
                 self._sent_at, self._live, self._command = before
             raise
         self._sent_at = began
-        taken = self._take(told, arrived)
+        taken = self._take(shown, arrived)
         if command[0] != self._acknowledged:
             self._acknowledged, self._moves = command[0], _MOVES
         if live and arrived - last > PLC_TIME:
@@ -243,15 +243,15 @@ class Block:
         assert part == SETPOINT, part
         return (word, value), self._live
 
-    def _look(self) -> _Told:
+    def _look(self) -> _Shown:
         """Only read."""
         try:
             data, arrived = self._ask(Read(self._unit, self._start, 5))
         except Refused as refusal:
             raise self._of_block(refusal) from None
-        return self._take(_TOLD.unpack(data), arrived)
+        return self._take(_SHOWN.unpack(data), arrived)
 
-    def _send(self, data: bytes) -> _Told:
+    def _send(self, data: bytes) -> _Shown:
         """Write and read."""
         at = self._start + WRITTEN_FROM
         try:
@@ -259,7 +259,7 @@ class Block:
                 request = WriteAndRead(self._unit, at, data, self._start, 5)
                 try:
                     answer, arrived = self._ask(request)
-                    return _TOLD.unpack(answer), arrived
+                    return _SHOWN.unpack(answer), arrived
                 except Refused as refusal:
                     if refusal.code != Refused.ILLEGAL_FUNCTION:
                         raise
@@ -270,12 +270,12 @@ class Block:
             except LinkError as error:
                 error.maybe_done = True
                 raise
-            return _TOLD.unpack(answer), arrived
+            return _SHOWN.unpack(answer), arrived
         except Refused as refusal:
             raise self._of_block(refusal) from None
 
-    def _take(self, told: tuple[int, ...], arrived: float) -> _Told:
-        version = told[4]
+    def _take(self, shown: tuple[int, ...], arrived: float) -> _Shown:
+        version = shown[4]
         self._known = version == LAYOUT_VERSION
         if not self._known:
             raise NoPath(
@@ -283,12 +283,12 @@ class Block:
                 f'{LAYOUT_VERSION}, the version of the layout of the block: check block_address, '
                 'and that the program of the PLC is that of docs/telegram1.md'
             )
-        if told[2] != self._life:
-            self._life = told[2]
+        if shown[2] != self._life:
+            self._life = shown[2]
             self._moves = max(self._moves - 1, 0)
             if not self._moves:
                 self._life_at = arrived
-        return told, self._life_at
+        return shown, self._life_at
 
     def _of_block(self, refusal: Refused) -> LinkError:
         if refusal.code != Refused.ILLEGAL_ADDRESS:
