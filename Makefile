@@ -51,9 +51,10 @@ test: setup ## lint, types, unit, ros, until the first one fails
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
 
-lint: setup ## ruff
-	@echo '== lint: ruff'
+lint: setup ## ruff, and who may import whom
+	@echo '== lint: ruff, import-linter'
 	@.venv/bin/ruff check
+	@.venv/bin/lint-imports --no-logo > .venv/log/imports 2>&1 || { cat .venv/log/imports; exit 1; }
 
 types: setup ## mypy, on all that is not ROS
 	@echo '== types: mypy --strict'
