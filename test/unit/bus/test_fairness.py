@@ -16,6 +16,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
+
+from bus_bench import ask
+from bus_bench import result
 from fake_link import Done
 from fake_link import FakeLink
 from fake_link import wait_until
@@ -29,6 +33,7 @@ from nfo_sinus_driver.bus import Transfer
 
 _SETPOINT = 50
 _POLL = 7
+_STOP = 9
 _ENOUGH = 400
 
 
@@ -58,3 +63,25 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
     polls = sum(done.number == _POLL for done in seen)
     writes = sum(done.number == _SETPOINT for done in seen)
     assert abs(polls - writes) <= 2
+
+
+def test_requests_keep_to_their_number_a_second_but_a_stop_waits_for_none() -> None:
+    link = FakeLink()
+    at: list[tuple[float, int]] = []
+    stop: list[Future[bytes]] = []
+
+    def note(done: Done) -> bytes:
+        at.append((link.now(), done.number))
+        if not stop:
+            stop.append(ask(bus, _STOP, Priority.STOP, packed(1)))
+        return packed(done.number)
+
+    link.answer = note
+    bus = Bus(link, max_requests=10, now=link.now)
+    bus.start()
+    for poll in [ask(bus, _POLL, Priority.POLL) for _ in range(6)]:
+        result(poll)
+    bus.close()
+    assert [number for _, number in at] == [_POLL, _STOP, *5 * [_POLL]]
+    # one period less than there are: the clock is looked at before a request
+    assert at[-1][0] - at[0][0] >= 4 * 0.1
