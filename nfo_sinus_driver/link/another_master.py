@@ -23,6 +23,10 @@ from dataclasses import dataclass
 import math
 
 from nfo_sinus_driver.link.interface import Remarks
+from nfo_sinus_driver.link.modbus_link import ENCAPSULATED_INTERFACE
+from nfo_sinus_driver.link.modbus_link import REPORT_SLAVE_ID
+from nfo_sinus_driver.link.modbus_link import ReadDevice
+from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import REFUSAL_LENGTH
 
 ANOTHER_MASTER = (
@@ -44,12 +48,19 @@ _READS = (1, 2, 3, 4)
 _SINGLE = (5, 6)
 _MULTIPLE = (15, 16)
 _READ_WRITE = 23
+#: How long the requests are that ask a unit what it is.
+_REPORT_LENGTH = 2
+_DEVICE_LENGTH = 5
 _EXCEPTION = 0x80
 
 
 def message_lengths(beginning: bytes) -> set[int]:
     """Return how long a message that begins like this is, as a request or as an answer."""
-    if len(beginning) < 3 or not beginning[0]:
+    if len(beginning) < 2 or not beginning[0]:
+        return set()
+    if beginning[1] == REPORT_SLAVE_ID:
+        return {_REPORT_LENGTH, ReportSlaveId(beginning[0]).measure(beginning)}
+    if len(beginning) < 3:
         return set()
     function, with_data = beginning[1], 3 + beginning[2]
     if function & _EXCEPTION:
@@ -58,6 +69,8 @@ def message_lengths(beginning: bytes) -> set[int]:
         return {6, with_data}
     if function in _SINGLE:
         return {6}
+    if function == ENCAPSULATED_INTERFACE:
+        return {_DEVICE_LENGTH, ReadDevice(beginning[0]).measure(beginning)}
     if function in _MULTIPLE:
         return {6, 7 + beginning[6]} if len(beginning) > 6 else {6}
     if function == _READ_WRITE:
@@ -77,7 +90,8 @@ class _Question:
     def is_answered_by(self, message: bytes) -> bool:
         if message[:2] == bytes((self.unit, self.function | _EXCEPTION)):
             return len(message) == REFUSAL_LENGTH
-        return message.startswith(self.answer_head)
+        # function 17 is asked by the very beginning of its answer
+        return message.startswith(self.answer_head) and len(message) > _REPORT_LENGTH
 
 
 def _answer_head(message: bytes) -> bytes:
@@ -89,6 +103,10 @@ def _answer_head(message: bytes) -> bytes:
         return message[:2] + bytes((size,)) if 0 < size < 251 else b''
     if function in _SINGLE:
         return message
+    if function == REPORT_SLAVE_ID and length == _REPORT_LENGTH:
+        return ReportSlaveId(message[0]).answer_head
+    if function == ENCAPSULATED_INTERFACE and length == _DEVICE_LENGTH:
+        return ReadDevice(message[0], message[3]).answer_head
     if function in _MULTIPLE and length > 7:
         return message[:6]
     if function == _READ_WRITE and length > 11 and 0 < count < 126:
