@@ -138,7 +138,8 @@ def explain_fall(
     away = seen.at - before.at
     if inverter.plc_time:
         # the PLC answers all the while, and a drive that is back may catch a motor that coasts
-        silent, most = away >= _LIFE_STOOD, min(was - _LEAST_FALL, was * _CAUGHT)
+        silent = away >= _LIFE_STOOD + inverter.usually_apart
+        most = min(was - _LEAST_FALL, was * _CAUGHT)
     else:
         silent, most = inverter.was_silent and away >= _SHORTEST_POWER_OFF, was / 2
     # where the frequency is not read with the status, nothing falls
@@ -151,7 +152,8 @@ def explain_fall(
 
 #: No drive is off and on again, and answers, within less, s; a single lost answer takes less.
 _SHORTEST_POWER_OFF = 0.4
-#: A PLC's life counter that stands for so long is a silence of the drive, s [C125].
+#: A PLC's life counter that stands for so much longer than it is looked at is a silence of the
+#: drive, s [C125].
 _LIFE_STOOD = 0.2
 #: A motor that is caught turns at no more than this share of what it did.
 _CAUGHT = 0.95

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from collections.abc import Iterator
 import contextlib
@@ -109,6 +110,8 @@ class DriveState:
         self._unanswered = 0
         self.identity: Identity | None = None
         self.seen: InverterStatus | None = None
+        #: How far apart the last statuses were, s, the newest last.
+        self._apart: deque[float] = deque((0.0,), maxlen=4)
         #: Called when a fault comes that did not stand before.
         self._on_fault: Callable[[], None] = lambda: None
         #: The status that first showed the fault that stands, and whether that was soon.
@@ -294,8 +297,14 @@ class DriveState:
         before = self.seen
         if before is None or seen.at >= before.at:
             self.seen = seen
+            self._apart.append(seen.at - before.at if before else 0.0)
             self._note_fault(before)
         return seen
+
+    @property
+    def usually_apart(self) -> float:
+        """How far apart the statuses before the newest were, s."""
+        return max(list(self._apart)[:-1])
 
     def _note_fault(self, before: InverterStatus | None) -> None:
         seen = self.seen

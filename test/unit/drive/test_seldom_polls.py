@@ -1,0 +1,38 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A drive behind a PLC that is looked at seldom, as one of many at a gateway."""
+
+from __future__ import annotations
+
+import pytest
+from support.rig import WAYS
+from support.rig import Rig
+
+
+@pytest.mark.parametrize('way', [way for way in WAYS if way.startswith('telegram1')])
+def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(way: str) -> None:
+    with Rig(way, poll_rate=4.0) as rig:
+        rig.turn()
+        advance_to = rig.far.advance_to
+
+        def loaded(now: float) -> None:
+            advance_to(now)
+            rig.far.motor.rotor *= 0.93
+            rig.far.motor.ramp *= 0.93
+
+        rig.far.advance_to = loaded  # type: ignore[method-assign]
+        rig.pass_time(3.0)
+        assert min(one.frequency for one in rig.notes.snapshots[-8:]) < 19
+        assert rig.drive.armed, rig.notes.events
