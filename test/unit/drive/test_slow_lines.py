@@ -16,31 +16,21 @@
 
 from __future__ import annotations
 
-from memory_rig import MemoryRig
 import pytest
-from support.said import says
+from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
 
-SLOWEST = [
-    ('modbus_rtu', 'sinus_g2', 1200),
-    ('modbus_ascii', 'sinus_g2', 1200),
-    ('modbus_ascii', 'sinus_optimal', 1200),
-    ('classic', 'sinus_g2', 1200),
-    ('movitrac', 'movitrac31', 9600),
-]
+SLOWEST = {'rtu': 1200, 'ascii': 1200, 'optimal ascii': 1200, 'classic': 1200, 'movitrac': 9600}
 
 
-@pytest.mark.parametrize(('protocol', 'model', 'baud'), SLOWEST)
-def test_a_drive_is_identified_and_turns(protocol: str, model: str, baud: int) -> None:
-    rig = MemoryRig(protocol, baud, model=model)
-    rig.run()
-    identity = rig.drive.identity
-    assert identity is not None
-    if model == 'sinus_g2' and protocol != 'classic':
-        assert identity.serial
-    rig.pass_time(10.0)
-    assert abs(rig.far.motor.frequency - 20) < 0.2
-    assert not any(says(text, Cause.LOST_IN_USE) for _, _, text in rig.notes.events)
-    assert rig.bus.statistics().timeouts == rig.bus.statistics().damaged == 0
-    rig.close()
+@pytest.mark.parametrize('way', SLOWEST)
+def test_a_drive_is_identified_and_turns(way: str) -> None:
+    with Rig(way, line={'baud': SLOWEST[way]}) as rig:
+        rig.turn()
+        assert rig.drive.identity is not None
+        assert rig.drive.identity.serial or way not in ('rtu', 'ascii')
+        rig.pass_time(10.0)
+        assert abs(rig.far.motor.frequency - 20) < 0.2
+        assert not rig.notes.said(Cause.LOST_IN_USE)
+        assert rig.bus.statistics().timeouts == rig.bus.statistics().damaged == 0
