@@ -83,6 +83,7 @@ class Way:
 
 
 _OLD = {'classic_dialect': 'v5.0'}
+_DRIVECONTROL = {'telegram_words': 'drivecontrol'}
 #: A law that is new is tested over all of them, and a way that is new with every law.
 WAYS: Mapping[str, Way] = {
     'rtu': Way('modbus_rtu'),
@@ -100,6 +101,9 @@ WAYS: Mapping[str, Way] = {
     'movitrac': Way('movitrac', 'movitrac31', 'function_bits'),
     'telegram1 g2': Way('telegram1', method='telegram1'),
     'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
+    'telegram1 g2, drivecontrol': Way(
+        'telegram1', method='telegram1', options=_DRIVECONTROL, driver=_DRIVECONTROL
+    ),
     'telegram1 sinus_h': Way('telegram1', 'sinus_h', 'telegram1'),
 }
 
@@ -259,7 +263,8 @@ class Rig:
     def violations(self) -> list[str]:
         """Return what breaks the laws of the house in the frames so far."""
         if self.way.protocol == 'telegram1':
-            return telegram_laws.violations(self.line.frames, self.way.model)
+            words = self.way.options.get('telegram_words', self.way.model)
+            return telegram_laws.violations(self.line.frames, words)
         return trace_laws.violations(
             self.line.frames, -math.inf, self.way.model, self.way.protocol
         )

@@ -27,6 +27,7 @@ from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
 import dataclasses
+from itertools import groupby
 import struct
 from typing import Any
 
@@ -77,6 +78,11 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
                 # a PLC that has just started shows nothing yet
                 if version:
                     zsw1, flags = told, told_flags
+
+
+def words(frames: Iterable[Mapping[str, Any]], unit: int = 1) -> list[int]:
+    """Return the control words that were written to a block, each once in a row."""
+    return [word for word, _ in groupby(one.stw1 for one in exchanges(frames, unit))]
 
 
 class Judge(abc.ABC):
