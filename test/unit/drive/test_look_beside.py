@@ -20,31 +20,22 @@ beside a poll that waits for its turn.
 from __future__ import annotations
 
 from collections.abc import Callable
-from collections.abc import Iterator
 import itertools
-from pathlib import Path
-import time
 
-from drive_rig import PATIENCE
 from neighbour import neighbour
 import pytest
-from support.addresses import Words
-from support.wire import understand
-from telegram_rig import TelegramRig
-from virtual_rig import MakeVirtual
-from virtual_rig import VirtualRig
+from support.rig import Rig
 
 from nfo_sinus_driver.bus import Transfer
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link import Interrupted
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
-SETPOINT, INV_ST, SCMD = 0x3FC, 0x2A5, 0x298
 OVERLOAD, EARTH_FAULT = 5, 1
 NEIGHBOURS = 15
+INV_ST = 'fieldbus.inv_st'
 
 
-def waits_for(rig: VirtualRig | TelegramRig, key: str) -> bool:
+def waits_for(rig: Rig, key: str) -> bool:
     """The poll waits for its turn to read this."""
     task = rig.drive._watch._task
     assert task is not None
@@ -52,155 +43,116 @@ def waits_for(rig: VirtualRig | TelegramRig, key: str) -> bool:
     return isinstance(awaited, Transfer) and awaited.reads(1, rig.drive.registers.address(key))
 
 
-def full_line(make_virtual: MakeVirtual) -> VirtualRig:
-    """A motor that turns on a line that is full, polled as fast as it allows."""
-    rig = make_virtual(
-        variant={'refuses_in_fault': NOTHING}, poll_rate=0.0, telemetry_rate=0.0
-    )
-    rig.ride(20.0)
+def until(rig: Rig, condition: Callable[[], object]) -> None:
+    """Step the bus alone until it is so."""
+    for _ in range(2000):
+        if condition():
+            return
+        rig.bus.step()
+    raise AssertionError('it never came true')
+
+
+def full_line(way: str, key: str) -> Rig:
+    """Return a motor that turns on a line that is full, polled as fast as it allows."""
+    options = {'refuses_in_fault': 'nothing'} if way == 'rtu' else {}
+    rig = Rig(way, options=options, poll_rate=0.0, telemetry_rate=0.0)
+    rig.turn()
     rig.send(None)
     for _ in range(NEIGHBOURS):
-        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address('status.u_rms')))
+        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address(key)))
     for _ in range(100):
         rig.bus.step()
     return rig
 
 
-def poll_waits(make_virtual: MakeVirtual) -> VirtualRig:
-    """The same, while the poll waits to read the frequency."""
-    rig = full_line(make_virtual)
-    while not waits_for(rig, 'status.frq_act'):
-        rig.bus.step()
-    return rig
-
-
-def trip(rig: VirtualRig) -> None:
+def trip(rig: Rig, fault: int = OVERLOAD) -> None:
     """Let the drive have a fault."""
-    rig.far.trip(OVERLOAD)
+    rig.far.trip(fault)
 
 
-def lose_run_input(rig: VirtualRig) -> None:
-    """Take the RUN input away."""
+def lose_run_input(rig: Rig) -> None:
+    """Open the RUN input."""
     rig.far.control_unit.run_input = False
 
 
-def press_stop(rig: VirtualRig) -> None:
+def press_stop(rig: Rig) -> None:
     """Stop it at the keypad."""
     rig.far.control_unit.press('stop')
 
 
 @pytest.mark.parametrize('event', [trip, lose_run_input, press_stop])
-@pytest.mark.parametrize('turns', range(0, 40, 7))
-def test_a_stop_comes_whatever_the_poll_waits_for(
-    make_virtual: MakeVirtual, event: Callable[[VirtualRig], None], turns: int
-) -> None:
-    rig = full_line(make_virtual)
-    for _ in range(turns):
-        rig.bus.step()
-    assert rig.drive.armed
-    event(rig)
-    rig.far.advance(0.01)
-    begun = len(rig.link.frames)
-    rig.drive.set_setpoint(30.0)
-    for _ in range(10):
-        rig.bus.step()
-    sent = [understand(bytes.fromhex(one['hex']), 'modbus_rtu') for one in rig.link.frames[begun:]]
-    asked = [(one.place, one.words) for one in sent if one is not None]
-    told = asked.index((SETPOINT, (300,)))
-    assert asked[told + 1 : told + 3] == [(INV_ST, None), (SCMD, (0,))]
-    assert not rig.drive.armed
+def test_a_stop_comes_whatever_the_poll_waits_for(event: Callable[[Rig], None]) -> None:
+    wrong = {}
+    for turns in range(0, 40, 10):
+        with full_line('rtu', 'status.u_rms') as rig:
+            for _ in range(turns):
+                rig.bus.step()
+            assert rig.drive.armed
+            event(rig)
+            rig.line.go_to(rig.clock.now + 0.01)
+            begun = len(rig.asked)
+            rig.drive.set_setpoint(30.0)
+            for _ in range(10):
+                rig.bus.step()
+            asked = [(key, data) for _, key, data in rig.asked[begun:]]
+            at = asked.index(('status.frq_set', (300).to_bytes(2, 'big')))
+            stop = [(INV_ST, None), ('fieldbus.scmd', bytes(2))]
+            if asked[at + 1 : at + 3] != stop or rig.drive.armed:
+                wrong[turns] = asked
+    assert not wrong
 
 
-def test_an_interruption_that_it_meets_is_the_loss_of_the_drive(make_virtual: MakeVirtual) -> None:
-    rig = poll_waits(make_virtual)
-    met: list[int] = []
+def test_an_interruption_that_it_meets_is_the_loss_of_the_drive() -> None:
+    with full_line('rtu', 'status.u_rms') as rig:
+        until(rig, lambda: waits_for(rig, 'status.frq_act'))
+        met: list[str] = []
 
-    def interrupt(register: int, words: Words | None) -> None:
-        if register == rig.register('fieldbus.inv_st') and not met:
-            met.append(register)
-            raise Interrupted('the PLC was not reached for 1 s')
+        def interrupt(key: str, data: bytes | None) -> None:
+            if key == INV_ST and not met:
+                met.append(key)
+                raise Interrupted('the PLC was not reached for 1 s')
 
-    rig.far.trip(OVERLOAD)
-    rig.far.advance(0.01)
-    rig.drive.set_setpoint(30.0)
-    rig.before = interrupt
-    # told once only, and to whoever asks first
-    while not met:
-        rig.bus.step()
-    assert not rig.drive.armed
-    rig.pass_time(0.5)
-    assert rig.said(Cause.LOST_IN_USE)
-    rig.pass_time(5.0)
-    assert rig.drive.snapshot.connected
-
-
-def test_a_poll_that_pauses_because_the_drive_was_busy_is_not_waited_for(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = poll_waits(make_virtual)
-    rig.be_busy(rig.register('status.frq_act'))
-    task = rig.drive._watch._task
-    assert task is not None
-    while not task.asleep:
-        rig.bus.step()
-    rig.far.trip(OVERLOAD)
-    rig.far.advance(0.01)
-    begun = len(rig.link.frames)
-    rig.drive.set_setpoint(30.0)
-    while rig.drive.armed:
-        rig.bus.step()
-    assert len(rig.link.frames) - begun <= 4
+        trip(rig)
+        rig.line.go_to(rig.clock.now + 0.01)
+        rig.drive.set_setpoint(30.0)
+        rig.meet = interrupt
+        # it is raised once only, and to whatever asks first
+        until(rig, lambda: met)
+        assert not rig.drive.armed
+        rig.pass_time(0.5)
+        assert rig.notes.said(Cause.LOST_IN_USE)
+        rig.wait_until(lambda: rig.drive.snapshot.connected)
 
 
-class Stepped(TelegramRig):
-    """One whose bus has no thread: a test steps it."""
-
-    def start(self) -> None:
-        self._plc_time.start()
-        self.simulator.start()
-
-    def until(self, condition: Callable[[], bool]) -> None:
-        """Step until it is so."""
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            assert time.monotonic() < deadline
-            self.bus.step()
-
-
-@pytest.fixture
-def behind_a_plc(tmp_path: Path) -> Iterator[Stepped]:
-    rig = Stepped(tmp_path / 'trace', 'sinus_h', poll_rate=0.0, telemetry_rate=0.0)
-    rig.start()
-    try:
-        yield rig
-    finally:
-        rig.stop()
+def test_a_poll_that_pauses_because_the_drive_was_busy_is_not_waited_for() -> None:
+    with full_line('rtu', 'status.u_rms') as rig:
+        until(rig, lambda: waits_for(rig, 'status.frq_act'))
+        rig.spoil('busy', 'status.frq_act', written=False)
+        task = rig.drive._watch._task
+        assert task is not None
+        until(rig, lambda: task.asleep)
+        trip(rig)
+        rig.line.go_to(rig.clock.now + 0.01)
+        begun = len(rig.asked)
+        rig.drive.set_setpoint(30.0)
+        until(rig, lambda: not rig.drive.armed)
+        assert len(rig.asked) - begun <= 4
 
 
-def test_a_poll_that_it_has_overtaken_says_nothing_about_an_older_status(
-    behind_a_plc: Stepped,
-) -> None:
-    rig = behind_a_plc
-    rig.until(rig.drive.connect().done)
-    rig.drive.activate()
-    rig.until(lambda: not rig.drive.stop_unconfirmed)
-    rig.until(rig.drive.enable().done)
-    rig.drive.set_setpoint(20.0)
-    rig.until(lambda: abs(rig.far.motor.frequency - 20.0) < 0.5)
-    for _ in range(4 * NEIGHBOURS):
-        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address('telegram.actual')))
-    rig.until(lambda: waits_for(rig, 'telegram.actual'))
-    rig.notes.events.clear()
-    rig.far.trip(EARTH_FAULT)
-    for setpoint in itertools.cycle((25.0, 26.0)):
-        # the PLC takes its time to show the fault, and the neighbours' turns are not to be used up
-        time.sleep(0.02)
-        rig.drive.set_setpoint(setpoint)
-        rig.bus.step()
-        if not rig.drive.armed:
-            break
-    assert waits_for(rig, 'telegram.actual'), 'an older status is on its way: so this is a test'
-    for _ in range(4):
-        before = rig.drive.snapshot
-        rig.until(lambda before=before: rig.drive.snapshot is not before)
-    assert len(rig.notes.events) == 1, rig.notes.events
+def test_a_poll_that_it_has_overtaken_says_nothing_about_an_older_status() -> None:
+    with full_line('telegram1 sinus_h', 'telegram.actual') as rig:
+        until(rig, lambda: waits_for(rig, 'telegram.actual'))
+        rig.notes.events.clear()
+        trip(rig, EARTH_FAULT)
+        for setpoint in itertools.cycle((25.0, 26.0)):
+            # the PLC takes its time to show the fault
+            rig.line.go_to(rig.clock.now + 0.02)
+            rig.drive.set_setpoint(setpoint)
+            rig.bus.step()
+            if not rig.drive.armed:
+                break
+        assert waits_for(rig, 'telegram.actual'), 'an older status is on its way: so this is a test'
+        for _ in range(4):
+            before = rig.drive.snapshot
+            until(rig, lambda before=before: rig.drive.snapshot is not before)
+        assert len(rig.notes.events) == 1, rig.notes.events
