@@ -25,8 +25,8 @@ from support.wire import understand
 
 #: Remote set-point, function bits and P841 [M4 §4].
 _SIZE, _BITS, _CONTROL_MODE = 223, 281, 205
-#: P841 as Remote control.
-_REMOTE_CONTROL = (0x0000, 0x0200)
+#: P841 as Remote control, and as Remote setpoint.
+_REMOTE_CONTROL, _REMOTE_SETPOINT = (0x0000, 0x0200), (0x0000, 0x0100)
 #: The factory setting, and an action of IPOS: never without a person.
 _NEVER = frozenset((203, 704))
 #: Of the function bits: CW and CCW, and reset.
@@ -42,6 +42,8 @@ class MovitracJudge:
         #: Of each unit: the set-point that was written last, and the function bits; none before.
         self._sizes: dict[int, int] = {}
         self._bits: dict[int, int] = {}
+        #: Those on their way to Remote control by Remote setpoint, where the bits do not count.
+        self._between: set[int] = set()
 
     def complaints(self, data: bytes) -> Iterator[str]:
         """Take a request; yield what is wrong with it."""
@@ -62,8 +64,14 @@ class MovitracJudge:
     def _judge_write(self, request: Request, words: tuple[int, ...]) -> Iterator[str]:
         if request.place in _NEVER:
             yield f'index {request.place} is written, which starts what nobody asked for'
-        if request.place == _CONTROL_MODE and words != _REMOTE_CONTROL:
-            yield 'another P841 than Remote control can start the motor'
+        if request.place == _CONTROL_MODE:
+            self._between.discard(request.unit)
+            if words == _REMOTE_SETPOINT:
+                self._between.add(request.unit)
+            elif words != _REMOTE_CONTROL:
+                yield 'another P841 than Remote control can start the motor'
+        elif request.unit in self._between and any(words):
+            yield 'while P841 is Remote setpoint nothing but 0 is written'
         if request.place == _SIZE:
             yield from self._judge_size(request.unit, words)
         if request.place == _BITS:

@@ -59,6 +59,7 @@ def test_a_good_ride_has_nothing_to_complain_of() -> None:
         ([_ZERO, 'a9 01 0119 00000044'], 'a reset beside other bits'),
         (['a9 01 0119 01000000'], 'bits that have no meaning'),
         (['a9 01 00cd 00000000'], 'another P841'),
+        (['a9 01 00cd 00000100', _ZERO, _TWENTY], 'while P841 is Remote setpoint'),
         (['a9 01 00cb 00000100'], 'index 203 is written'),
         (['a9 01 02c0 00000100'], 'index 704 is written'),
         (['a9 01 00df 00040001'], 'the set-point 00040001 is none'),
