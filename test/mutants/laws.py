@@ -506,7 +506,7 @@ LAWS = (
         'nfo_sinus_driver/drive/drive_state.py',
         'holder is Holder.BUS and not await self._operated_locally(priority, once)',
         'holder is Holder.BUS',
-        (MOVITRAC_LAWS, '-k', 'keypad_that_takes and status'),
+        (MOVITRAC_LAWS, '-k', 'after_trouble and keypad and status'),
     ),
     Mutant(
         2,

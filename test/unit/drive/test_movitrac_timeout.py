@@ -69,7 +69,7 @@ def test_a_pc_time_out_that_is_found_is_acknowledged_by_command_alone() -> None:
 
 
 @pytest.mark.parametrize('found', [0.0, 5.0])
-@pytest.mark.parametrize('end', [['disconnect'], ['exit', 'disconnect']], ids=['disconnect', 'exit'])
+@pytest.mark.parametrize('end', [['disconnect'], ['exit', 'disconnect']])
 def test_a_clean_end_leaves_the_pc_time_out_as_it_was_found(found: float, end: list[str]) -> None:
     with make(parameters={KEY: found}, drive_timeout=1.5) as rig:
         rig.turn()
