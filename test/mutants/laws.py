@@ -40,7 +40,7 @@ from mutant import WAYS_OUT
 from mutant import WRITER
 from mutant import Mutant
 
-#: The laws one by one over a MOVITRAC.
+#: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
 
 LAWS = (
