@@ -120,7 +120,7 @@ def test_a_wrong_answer_of_a_gateway_is_named(
 ) -> None:
     with Rig('tcp') as rig:
         send = rig.line.send
-        rig.line.send = lambda data: send(changed(data))  # type: ignore[method-assign]
+        rig.line.send = lambda data: send(changed(data))
         text = rig.answer(rig.drive.connect())
         assert said in text and unsaid not in text
         assert 'number' not in said or 'update or replace the gateway' in text

@@ -114,7 +114,7 @@ def test_a_drive_that_tells_nothing_nominal_has_its_own_limit(way: str) -> None:
 def test_each_word_stands_until_the_drive_has_had_it(way: str) -> None:
     with plc(way, exchange=0.1) as rig:
         rig.connect()
-        channel = rig.line.plc.channels[1]  # type: ignore[union-attr]
+        channel = rig.line.plc.channels[1]
         given: set[int] = set()
         exchange = channel.exchange
 
@@ -122,7 +122,7 @@ def test_each_word_stands_until_the_drive_has_had_it(way: str) -> None:
             given.add(channel.program.stw1)
             exchange(now)
 
-        channel.exchange = noted  # type: ignore[method-assign]
+        channel.exchange = noted
         for _ in range(3):
             rig.enable()
             rig.send(20.0)
@@ -161,11 +161,11 @@ def test_what_a_plc_goes_on_showing_confirms_no_stop(way: str, command: str) -> 
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
         # its registers are answered, and show a drive that stands
-        rig.line.plc.stopped_until = math.inf  # type: ignore[union-attr]
+        rig.line.plc.stopped_until = math.inf
         rig.pass_time(0.2)
         assert 'NOT confirmed' in rig.answer(getattr(rig.drive, command)())
         assert rig.drive.stop_unconfirmed
-        rig.line.plc.stopped_until = rig.clock.now  # type: ignore[union-attr]
+        rig.line.plc.stopped_until = rig.clock.now
         rig.pass_time(1.0)
         assert not rig.drive.stop_unconfirmed
 
@@ -207,7 +207,7 @@ def test_a_plc_that_is_slow_or_has_no_function_23_is_used(setting: dict[str, Any
 
 def test_without_the_release_of_the_plc_nothing_turns() -> None:
     with plc(SINUS_H, released=False) as rig:
-        channel = rig.line.plc.channels[1]  # type: ignore[union-attr]
+        channel = rig.line.plc.channels[1]
         rig.connect()
         assert 'has not released the drive to ROS' in rig.answer(rig.drive.enable())
         channel.released = True
@@ -257,4 +257,4 @@ def test_each_drive_has_its_own_block() -> None:
 def test_a_line_that_has_no_plc_is_refused() -> None:
     link = open_link('modbus_rtu', '/dev/x', LineSettings())
     with pytest.raises(ValueError, match='goes through a PLC: set protocol to modbus_tcp'):
-        Drive(Bus(link), DriveSettings(model='sinus_h'), None)  # type: ignore[arg-type]
+        Drive(Bus(link), DriveSettings(model='sinus_h'), None)
