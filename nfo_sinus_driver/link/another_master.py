@@ -90,8 +90,7 @@ class _Question:
     def is_answered_by(self, message: bytes) -> bool:
         if message[:2] == bytes((self.unit, self.function | _EXCEPTION)):
             return len(message) == REFUSAL_LENGTH
-        # function 17 is asked by the very beginning of its answer
-        return message.startswith(self.answer_head) and len(message) > _REPORT_LENGTH
+        return _has_head(message, self.answer_head)
 
 
 def _answer_head(message: bytes) -> bytes:
@@ -112,6 +111,11 @@ def _answer_head(message: bytes) -> bytes:
     if function == _READ_WRITE and length > 11 and 0 < count < 126:
         return message[:2] + bytes((2 * count,))
     return b''
+
+
+def _has_head(message: bytes, answer_head: bytes) -> bool:
+    """Tell whether an answer begins like this; a request of function 17 does, too."""
+    return message.startswith(answer_head) and len(message) > _REPORT_LENGTH
 
 
 class Sightings:
@@ -191,7 +195,7 @@ class AnotherMaster:
         """Tell whether another master's request and the answer to it are in some bytes."""
         head = b''
         for start, end, message in self._messages(data):
-            if head and message.startswith(head):
+            if head and _has_head(message, head):
                 return True
             if not self._is_own(data[start:end], message):
                 head = _answer_head(message) or head
