@@ -12,271 +12,553 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A parameter is written if it differs, read back, and left alone where it must be."""
+"""Settings are changed all or none, read back, and left alone where they must be."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Future
 import struct
-import threading
+from typing import Any
 
-from drive_rig import PATIENCE
-from drive_rig import Rig
-from drive_rig import wait_until
-from parameters_rig import ACCEL
-from parameters_rig import Store
-from parameters_rig import at_keypad
-from parameters_rig import bound_magn_by_limt
-from parameters_rig import connect
-from parameters_rig import far
-from parameters_rig import news
-from parameters_rig import on_write
-from parameters_rig import watch_only
-from parameters_rig import written
 import pytest
+from support.rig import WAYS
+from support.rig import Rig
+from support.said import Said
+from support.said import raises
 from support.said import said
+from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.link import Refused
+
+ACCEL, RETARD, FIX = 'control.accel', 'control.retard', 'freque.f_fix1'
+MAGN, LIMT = 'motor.i_magn', 'motor.i_limt'
+#: What is written together, in this order, and what was there before.
+THREE: dict[str, Value] = {ACCEL: 7.0, RETARD: 7.0, FIX: 7.0}
+BEFORE = [0.3, 0.3, 10.0]
+OVERLOAD = 5
+WITH_SETTINGS = ('rtu', 'ascii', 'tcp', 'canopen', 'classic', 'classic v5.0', 'movitrac')
 
 
-def register(rig: Rig, key: str) -> int:
-    return rig.drive.parameters._registers.address(key).index
+@pytest.fixture
+def rig() -> Any:
+    with Rig() as rig:
+        rig.connect(parameters=True)
+        yield rig
+
+
+@pytest.fixture
+def parameters(rig: Rig) -> Parameters:
+    return rig.drive.parameters
+
+
+def far(rig: Rig, *keys: str) -> list[Value]:
+    """Return what the drive has."""
+    return [rig.far.peek(key) for key in keys]
+
+
+def on_write(rig: Rig, work: Callable[[str, Value], str | None]) -> None:
+    """Have ``work`` say what goes wrong with a write to a setting, as ``Rig.meet`` does."""
+
+    def meet(key: str, data: bytes | None) -> str | None:
+        if data is None or key not in rig.far.settings:
+            return None
+        return work(key, rig.drive.registers.value(key, data))
+
+    rig.meet = meet
+
+
+def refuse(key: str, value: Value) -> str | None:
+    """Refuse to have the third written."""
+    return 'refused' if key == FIX else None
+
+
+def fails(rig: Rig, future: Future[Any], *left: str) -> Said:
+    """Return why a change failed; these alone may not be as they were."""
+    with pytest.raises(ParameterError) as error:
+        rig.result(future)
+    assert error.value.left == left
+    return said(error.value)
+
+
+def change_with_another(rig: Rig) -> Callable[[str, Value], Any]:
+    """Return what changes a parameter together with another one."""
+    return lambda key, value: rig.result(rig.drive.parameters.change({RETARD: 9, key: value}))
 
 
 # --- what is written ------------------------------------------------------------------------------
 
 
-def test_change_is_written_once_and_read_back(rig: Rig) -> None:
-    parameters = connect(rig)
-    before = len(rig.trace())
-    (change,) = parameters.change({'control.accel': 7.5}).result(PATIENCE)
-    assert str(change) == f'control.accel: {ACCEL} -> 7.5 s'
-    assert written(rig) == {'control.accel': 1}
-    assert far(rig, 'control.accel') == [7.5]
-    assert parameters.values['control.accel'] == 7.5
-    assert rig.notes.news[-1] == 'control.accel'
-    rig.notes.wait_for('control.accel: 0.2 -> 7.5 s', Severity.INFO)
-    assert not news(rig)
-    own = f'{register(rig, "control.accel"):04x}'
-    frames = [frame['hex'].lower() for frame in rig.trace()[before:]]
-    requests = [frame[2:4] for frame in frames if frame[4:8] == own]
-    # read, write and its answer, read
-    assert [code for code in requests if code == '03'] == ['03', '03']
-    assert requests[0] == requests[-1] == '03'
+@pytest.mark.parametrize('way', WITH_SETTINGS)
+def test_a_change_is_written_once_and_read_back_and_what_is_the_same_is_not(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect(parameters=True)
+        parameters = rig.drive.parameters
+        up, down = ramps(WAYS[way].model, 0.0, 0.0)
+        rig.pass_time(0.3)
+        rig.asked.clear()
+        (change,) = rig.result(parameters.change({up: 7.5, down: 0.3}))
+        assert str(change) == f'{up}: 0.3 -> 7.5 s'
+        assert rig.far.writes == {up: 1}
+        assert far(rig, up) == [7.5] == [parameters.values[up]]
+        assert rig.notes.parameters[-1] == up
+        assert rig.notes.said(f'{up}: 0.3 -> 7.5 s', Severity.INFO)
+        assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
+        written = [data is not None for _, key, data in rig.asked if key == up]
+        assert written[-2:] == [True, False] and written.count(True) == 1
+        for wanted in ({up: 7.5, down: 0.3}, {}):
+            assert rig.result(parameters.change(wanted)) == ()
+        assert rig.far.writes == {up: 1}
 
 
-def test_what_is_the_same_is_not_written(rig: Rig) -> None:
-    parameters = connect(rig)
-    same = {'control.accel': ACCEL, 'motor.i_magn': 1.8, 'control.st_mode': 'Brake'}
-    assert parameters.change(same).result(PATIENCE) == ()
-    (change,) = parameters.change({**same, 'control.retard': 7}).result(PATIENCE)
-    assert change.key == 'control.retard'
-    assert written(rig) == {'control.retard': 1}
-    assert parameters.change({}).result(PATIENCE) == ()
+def test_only_what_the_drive_has_counts_and_not_what_is_remembered(
+    rig: Rig, parameters: Parameters
+) -> None:
+    rig.far.set_from_keypad(ACCEL, 7)
+    assert rig.result(parameters.change({ACCEL: 7})) == ()
+    assert parameters.values[ACCEL] == 7
+    rig.far.set_from_keypad(ACCEL, 9)
+    (change,) = rig.result(parameters.change({ACCEL: 7}))
+    assert str(change) == f'{ACCEL}: 9 -> 7 s'
+    assert rig.far.writes == {ACCEL: 1}
 
 
-def test_what_the_keypad_did_already_is_not_written_but_known(rig: Rig) -> None:
-    parameters = connect(rig)
-    rig.drive.parameters._keys = ()
-    at_keypad(rig, 'control.accel', 7)
-    assert parameters.change({'control.accel': 7}).result(PATIENCE) == ()
-    assert written(rig) == {}
-    assert parameters.values['control.accel'] == 7
+def test_an_old_value_that_means_nothing_is_replaced(rig: Rig, parameters: Parameters) -> None:
+    for key, raw, new, says in (
+        ('control.st_mode', 9, 'Release', '9 -> Release'),
+        ('control.energy_save', 2, True, '0002h -> true'),
+    ):
+        rig.far.memory.put(key, raw)
+        (change,) = rig.result(parameters.change({key: new}))
+        assert str(change) == f'{key}: {says}'
+        assert far(rig, key) == [new] == [parameters.values[key]]
 
 
-def test_what_the_keypad_undid_is_written(rig: Rig) -> None:
-    # only what the drive has counts, not what is remembered
-    parameters = connect(rig)
-    rig.drive.parameters._keys = ()
-    parameters.change({'control.accel': 7}).result(PATIENCE)
-    at_keypad(rig, 'control.accel', 9)
-    (change,) = parameters.change({'control.accel': 7}).result(PATIENCE)
-    assert str(change) == 'control.accel: 9 -> 7 s'
-    assert far(rig, 'control.accel') == [7]
-
-
-def test_old_value_that_means_nothing(rig: Rig) -> None:
-    parameters = connect(rig)
-    with rig.simulator.lock:
-        rig.far.memory.put('control.st_mode', 9)
-    (change,) = parameters.change({'control.st_mode': 'Release'}).result(PATIENCE)
-    assert str(change) == 'control.st_mode: 9 -> Release'
-
-
-@pytest.mark.parametrize('value', [0.7, 7.7, 123.4, 499.9])
-def test_float32_renderings_are_taken(rig: Rig, value: float) -> None:
-    rendered = struct.unpack('<f', struct.pack('<f', value))[0]
-    assert rendered != value
-    parameters = connect(rig)
-    parameters.change({'control.accel': rendered}).result(PATIENCE)
-    assert parameters.values['control.accel'] == value
-    assert far(rig, 'control.accel') == [value]
-    assert parameters.change({'control.accel': value}).result(PATIENCE) == ()
-
-
-@pytest.mark.parametrize('value', [7, 7.0])
-def test_whole_numbers_are_taken_for_any_other(rig: Rig, value: float) -> None:
-    parameters = connect(rig)
-    parameters.change({'control.accel': value, 'motor.u_nom': 100 * value}).result(PATIENCE)
-    assert far(rig, 'control.accel', 'motor.u_nom') == [7, 700]
-    assert type(parameters.values['control.accel']) is float
-    assert type(parameters.values['motor.u_nom']) is int
-
-
-def test_switches_labels_and_signs(rig: Rig) -> None:
-    parameters = connect(rig)
-    wanted: dict[str, Value] = {
-        'control.energy_save': True,
-        'control.mode': 'Speed',
-        'pi_reg.reg_amp': 1,
-    }
-    parameters.change(wanted).result(PATIENCE)
-    assert far(rig, *wanted) == list(wanted.values())
-    parameters.change({'pi_reg.reg_amp': -1}).result(PATIENCE)
-    assert far(rig, 'pi_reg.reg_amp') == [-1]
+def test_every_form_of_a_value_is_taken(rig: Rig, parameters: Parameters) -> None:
+    for value in (0.7, 7.7, 123.4, 499.9):
+        rendered = struct.unpack('<f', struct.pack('<f', value))[0]
+        assert rendered != value
+        rig.result(parameters.change({ACCEL: rendered}))
+        assert far(rig, ACCEL) == [value] == [parameters.values[ACCEL]]
+        assert rig.result(parameters.change({ACCEL: value})) == ()
+    for number in (7, 8.0):
+        rig.result(parameters.change({ACCEL: number, 'motor.u_nom': 100 * number}))
+        assert far(rig, ACCEL, 'motor.u_nom') == [number, 100 * number]
+        assert type(parameters.values[ACCEL]) is float
+        assert type(parameters.values['motor.u_nom']) is int
+    for sign in (-1, 1):
+        wanted: dict[str, Value] = {
+            'control.energy_save': True, 'control.mode': 'Speed', 'pi_reg.reg_amp': sign
+        }
+        rig.result(parameters.change(wanted))
+        assert far(rig, *wanted) == list(wanted.values())
 
 
 # --- what is refused without asking the drive -----------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ('key', 'value', 'says'),
-    [
-        (
-            'control.accel', 7.123456,
-            'control.accel: 7.123456 lies between two steps of the drive, 7.123 and 7.124',
-        ),
-        ('control.accel', 0.19, 'control.accel: 0.19 is out of range, 0.2 to 500 s'),
-        ('control.accel', 500.01, 'control.accel: 500.01 is out of range, 0.2 to 500 s'),
-        ('control.accel', -7, 'control.accel: -7 is out of range, 0.2 to 500 s'),
-        ('control.accel', 10**400, 'control.accel: inf is not finite'),
-        ('control.accel', float('nan'), 'control.accel: nan is not finite'),
-        ('control.accel', float('-inf'), 'control.accel: -inf is not finite'),
-        ('control.accel', True, 'control.accel: True is not a number'),
-        ('control.accel', '7', "control.accel: '7' is not a number"),
-        ('control.accel', None, 'control.accel: None is not a number'),
-        ('control.accel', [7], 'control.accel: [7] is not a number'),
-        (
-            'motor.u_nom', 400.5,
-            'motor.u_nom: 400.5 lies between two steps of the drive, 400 and 401',
-        ),
-        ('control.st_mode', 'brake', "control.st_mode: 'brake' is none of Release, Brake"),
-        ('control.st_mode', '', "control.st_mode: '' is none of Release, Brake"),
-        ('control.st_mode', 1, 'control.st_mode: 1 is none of Release, Brake'),
-        ('control.st_mode', True, 'control.st_mode: True is none of Release, Brake'),
-        ('control.energy_save', 1, 'control.energy_save: 1 is none of OFF, ON'),
-        ('pi_reg.reg_amp', 0, 'pi_reg.reg_amp: 0 is none of '),
-        ('pi_reg.reg_amp', False, 'pi_reg.reg_amp: False is none of '),
-        ('pi_reg.reg_amp', [1], 'pi_reg.reg_amp: [1] is none of '),
-        ('pi_reg.reg_amp', 10**400, 'pi_reg.reg_amp: 1000'),
-    ],
-)
-def test_values_that_no_drive_can_have(rig: Rig, key: str, value: Value, says: str) -> None:
-    parameters = connect(rig)
-    for method in (
-        lambda: parameters.exact(key, value),
-        lambda: parameters.admit(key, value),
-        lambda: parameters.change({'control.retard': 9, key: value}).result(PATIENCE),
+def test_values_that_no_drive_can_have_are_refused(rig: Rig, parameters: Parameters) -> None:
+    # what else the catalog refuses is tested there
+    refused: dict[str, list[tuple[Any, str]]] = {
+        ACCEL: [
+            (7.123456, '7.123456 lies between two steps of the drive, 7.123 and 7.124'),
+            (-7, '-7 is out of range, 0.2 to 500 s'),
+            (10**400, 'inf is not finite'),
+            (float('nan'), 'nan is not finite'),
+            (True, 'True is not a number'),
+            ('7', "'7' is not a number"),
+            (None, 'None is not a number'),
+            ([7], '[7] is not a number'),
+        ],
+        'control.st_mode': [
+            ('brake', "'brake' is none of Release, Brake"), (1, '1 is none of Release, Brake')
+        ],
+        'control.energy_save': [(1, '1 is none of OFF, ON')],
+        'pi_reg.reg_amp': [
+            (0, '0 is none of '), (False, 'False is none of '), ([1], '[1] is none of '),
+            (10**400, '1000'),
+        ],
+    }  # fmt: skip
+    wrong = []
+    for key, value, says in ((key, *row) for key, rows in refused.items() for row in rows):
+        for take in (parameters.exact, parameters.admit, change_with_another(rig)):
+            with pytest.raises(ParameterError) as error:
+                take(key, value)
+            if not said(error.value).startswith(f'{key}: {says}'):
+                wrong.append(said(error.value))
+    assert not wrong
+    assert not rig.far.writes
+
+
+def test_what_is_no_setting_cannot_be_changed() -> None:
+    with Rig(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        rig.asked.clear()
+        for key in (
+            'fieldbus.scmd', 'fieldbus.drive_control', 'fieldbus.inv_st_with_ack',
+            'fieldbus.spd_scl_numerator', 'status.frq_set', 'control.any_bus', 'made.up', '',
+        ):  # fmt: skip
+            answer = rig.answer(rig.drive.parameters.change({ACCEL: 7, key: 1}))
+            assert answer == f'{key} is no parameter that can be changed here'
+        assert not [key for _, key, data in rig.asked if data is not None]
+
+
+# --- settings of the line -------------------------------------------------------------------------
+
+
+def test_settings_of_the_line_are_guarded(rig: Rig, parameters: Parameters) -> None:
+    for key, value in (
+        ('serial.address', 9), ('serial.si_baud', '9600bps'), ('serial.bus_type', 'NFO'),
+        ('serial.si_prot', '8b Op 1s'), ('serial.sio_tot', 9), ('serial.auto_reset', True),
+    ):  # fmt: skip
+        answer = rig.answer(parameters.change({ACCEL: 7, key: value}))
+        assert answer.startswith(f'{key}: communication settings are not changed unless allow_')
+        with raises(Cause.COMMUNICATION_PROTECTED):
+            parameters.admit(key, value)
+        assert not rig.far.writes
+    # a saved state of the same drive loads all the same
+    serial = {key: value for key, value in parameters.values.items() if key.startswith('serial.')}
+    rig.result(parameters.change({**serial, ACCEL: 7}))
+    assert rig.far.writes == {ACCEL: 1}
+    # it is let through because the drive had it when it was read; nothing is written
+    rig.far.set_from_keypad('serial.sio_tot', 9)
+    assert rig.result(parameters.change({'serial.sio_tot': serial['serial.sio_tot']})) == ()
+    assert far(rig, 'serial.sio_tot') == [9]
+
+
+def test_settings_of_the_line_are_changed_last_and_followed() -> None:
+    with Rig(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        parameters = rig.drive.parameters
+        on_write(rig, lambda key, value: 'ignored' if key == ACCEL else None)
+        answer = fails(rig, parameters.change({'serial.address': 9, ACCEL: 7}))
+        assert 'start this driver' not in answer
+        assert not rig.far.writes
+        rig.meet = lambda key, data: None
+        wanted: dict[str, Value] = {
+            'serial.address': 9, 'serial.si_prot': '8b Op 1s', 'serial.si_baud': '9600bps', ACCEL: 7
+        }
+        changes = rig.result(parameters.change(wanted))
+        assert changes[0].key == ACCEL
+        assert far(rig, *wanted) == list(wanted.values())
+        hint = 'then start this driver with the address (9) and char_format (8b Op 1s) and baud_'
+        assert rig.notes.said(hint, Severity.WARNING)
+
+
+def test_a_new_address_that_counts_at_once() -> None:
+    with Rig(parameters={'serial.auto_reset': True}, allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        future = rig.drive.parameters.change({'serial.address': 9, ACCEL: 7})
+        answer = fails(rig, future, 'serial.address', ACCEL)
+        assert answer.startswith('serial.address: ')
+        assert 'whether the drive took 9 is not known' in answer
+        assert 'serial.address is NOT put back to 1' in answer
+        assert f'{ACCEL} is NOT put back to 0.3 s' in answer
+        assert 'then start this driver with the address (9) that it has' in answer
+
+
+def test_format_codes_of_older_firmware_are_uncertain() -> None:
+    for firmware, known in ((4.27, False), (4.28, True)):
+        settings = {'fieldbus.sw_ver': firmware}
+        with Rig(parameters=settings, allow_communication_changes=True) as rig:
+            rig.connect(parameters=True)
+            wanted = {'serial.si_prot': '8b Op 1s', 'serial.sio_tot': 9}
+            answer = rig.answer(rig.drive.parameters.change(wanted))
+            assert ('change it at the keypad' not in answer) == known
+            assert len(rig.far.writes) == (2 if known else 0)
+
+
+# --- a motor that turns ---------------------------------------------------------------------------
+
+
+def test_what_needs_a_standing_motor_waits_for_it() -> None:
+    with Rig() as rig:
+        rig.turn()
+        parameters = rig.drive.parameters
+        rig.result(parameters.read())
+        rig.asked.clear()
+        answer = rig.answer(parameters.change({RETARD: 7, MAGN: 2.0}))
+        assert answer.startswith(f'{MAGN}: only while the motor is stopped, but it is not (')
+        # a drive that is lax about it is not trusted
+        assert not rig.written(MAGN) + rig.written(RETARD)
+        # what is the same needs no stop
+        rig.result(parameters.change({RETARD: 7, MAGN: 1.8}))
+        assert rig.far.writes == {RETARD: 1}
+        assert rig.turns
+        rig.send(None)
+        rig.result(rig.drive.stop())
+        rig.pass_time(4.0)
+        rig.result(parameters.change({MAGN: 2.0}))
+        assert far(rig, MAGN) == [2.0]
+
+
+def test_a_refusal_by_a_motor_that_starts_meanwhile_says_so(
+    rig: Rig, parameters: Parameters
+) -> None:
+
+    def start(key: str, data: bytes | None) -> None:
+        if key == MAGN:
+            rig.far.control_unit.press('ext')
+            rig.far.set_run_input(True)
+
+    rig.meet = start
+    assert rig.answer(parameters.change({MAGN: 2.0})) == (
+        f'{MAGN}: the drive cannot do this in its present state (exception 4): '
+        'the motor must be stopped for this, and it runs'
+    )
+    rig.far.control_unit.press('stop')
+
+
+# --- refusals, and a drive that does something else -----------------------------------------------
+
+
+@pytest.mark.parametrize('faulted', [False, True])
+def test_a_refusal_changes_nothing_and_is_explained(
+    rig: Rig, parameters: Parameters, faulted: bool
+) -> None:
+    for code, says in (
+        (Refused.ILLEGAL_ADDRESS, 'the drive has no such parameter (exception 2)'),
+        (Refused.ILLEGAL_VALUE, 'the drive does not accept 7 s (exception 3)'),
+        (Refused.DEVICE_FAILURE, 'the drive cannot do this in its present state (exception 4)'),
     ):
-        with pytest.raises(ParameterError) as error:
-            method()
-        assert said(error.value).startswith(says)
-    assert written(rig) == {}
+
+        def work(key: str, value: Value, code: int = code) -> None:
+            if faulted:
+                # just now, so that no poll has seen it
+                rig.far.trip(OVERLOAD)
+            raise Refused(code)
+
+        on_write(rig, work)
+        answer = fails(rig, parameters.change({ACCEL: 7}))
+        assert answer.startswith(f'{ACCEL}: {says}' + f'; fault {OVERLOAD} ' * faulted)
+        assert answer.endswith('is active: call ~/fault_ack first') is faulted
+        assert parameters.values[ACCEL] == 0.3
+        assert not rig.far.writes
+
+
+@pytest.mark.parametrize(
+    ('low', 'high', 'left'), [(0.2, 5.0, False), (0.3, 0.3, False), (4.0, 4.0, True)]
+)
+def test_a_drive_that_keeps_another_value_is_put_right(
+    rig: Rig, parameters: Parameters, low: float, high: float, left: bool
+) -> None:
+
+    def clamp(key: str, value: Any) -> str:
+        rig.far.set_from_keypad(key, min(max(value, low), high))
+        return 'ignored'
+
+    on_write(rig, clamp)
+    answer = fails(rig, parameters.change({ACCEL: 7}), *[ACCEL] * left)
+    stays = f'{ACCEL} is NOT put back to 0.3 s: the drive keeps 4 s'
+    assert answer == (
+        f'{ACCEL}: the drive keeps {high:g} s where 7 s was written; '
+        + (stays if left else 'it is 0.3 s as before')
+    )
+    assert far(rig, ACCEL) == [high if left else 0.3]
 
 
 # --- several --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('reverse', [False, True])
-@pytest.mark.parametrize(('magn', 'limt'), [(6.0, 9.0), (0.5, 1.0)])
 @pytest.mark.parametrize('how', ['change', 'apply'])
 def test_values_that_bound_each_other_come_in_any_order(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, magn: float, limt: float, reverse: bool, how: str
+    rig: Rig, parameters: Parameters, how: str
 ) -> None:
-    # from 1.8 and 5.1 A
-    parameters = connect(rig)
-    bound_magn_by_limt(rig, monkeypatch)
-    wanted = {'motor.i_magn': magn, 'motor.i_limt': limt}
-    if reverse:
-        wanted = dict(reversed(wanted.items()))
-    if how == 'change':
-        assert len(parameters.change(wanted).result(PATIENCE)) == 2
-    else:
-        parameters.apply(wanted, write=True).result(PATIENCE)
-        assert not rig.notes.told(Cause.WANTED_BUT_REFUSED)
-    assert far(rig, *wanted) == list(wanted.values())
-    assert written(rig) == {'motor.i_magn': 1, 'motor.i_limt': 1}
+
+    def bound(key: str, value: Value) -> None:
+        # I-magn is at most I-limt [C34]
+        has = {**dict(zip((MAGN, LIMT), far(rig, MAGN, LIMT), strict=True)), key: value}
+        if has[MAGN] > has[LIMT]:
+            raise Refused(Refused.ILLEGAL_VALUE)
+
+    on_write(rig, bound)
+    for magn, limt in ((6.0, 9.0), (0.5, 1.0)):
+        for keys in ((MAGN, LIMT), (LIMT, MAGN)):
+            rig.far.set_from_keypad(MAGN, 1.8)
+            rig.far.set_from_keypad(LIMT, 5.1)
+            rig.result(parameters.refresh())
+            rig.far.writes.clear()
+            wanted = {key: magn if key == MAGN else limt for key in keys}
+            if how == 'change':
+                assert len(rig.result(parameters.change(wanted))) == 2
+            else:
+                rig.result(parameters.apply(wanted, write=True))
+                assert not rig.notes.said(Cause.WANTED_BUT_REFUSED)
+            assert far(rig, *wanted) == list(wanted.values())
+            assert rig.far.writes == {MAGN: 1, LIMT: 1}
+    answer = fails(rig, parameters.change({MAGN: 3.0, ACCEL: 7, LIMT: 2.0}))
+    assert 'the drive does not accept 3 A (exception 3)' in answer
+    assert f'put back: {LIMT}, {ACCEL}' in answer
+    assert far(rig, MAGN, ACCEL, LIMT) == [0.5, 0.3, 1.0]
 
 
-def test_two_that_contradict_each_other(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    parameters = connect(rig)
-    bound_magn_by_limt(rig, monkeypatch)
-    wanted = {'motor.i_magn': 3.0, 'control.accel': 7, 'motor.i_limt': 2.0}
-    message = rig.refused(parameters.change(wanted))
-    assert 'the drive does not accept 2 A (exception 3)' in message
-    assert 'put back: motor.i_magn, control.accel' in message
-    assert far(rig, *wanted) == [1.8, ACCEL, 5.1]
+def test_what_was_written_is_put_back_in_reverse_order(rig: Rig, parameters: Parameters) -> None:
+    on_write(rig, refuse)
+    rig.asked.clear()
+    answer = fails(rig, parameters.change(THREE))
+    assert answer.startswith(f'{FIX}: the drive cannot do this')
+    assert answer.endswith(f'; put back: {ACCEL}, {RETARD}')
+    written = [key for _, key, data in rig.asked if key in THREE and data is not None]
+    assert written == [ACCEL, RETARD, FIX, RETARD, ACCEL]
+    assert far(rig, *THREE) == BEFORE == [parameters.values[key] for key in THREE]
 
 
-# --- at once --------------------------------------------------------------------------------------
+def test_what_cannot_be_put_back_is_named(rig: Rig, parameters: Parameters) -> None:
+    tries: list[str] = []
+
+    def work(key: str, value: Value) -> str | None:
+        if key == ACCEL and value == 0.3:
+            tries.append(key)
+            return 'refused'
+        return refuse(key, value)
+
+    on_write(rig, work)
+    answer = fails(rig, parameters.change(THREE), ACCEL)
+    assert f'put back: {RETARD};' in answer
+    assert f'{ACCEL} is NOT put back to 0.3 s: the drive cannot do this' in answer
+    assert far(rig, *THREE) == [7, 0.3, 10]
+    assert len(tries) == 3
 
 
-def test_two_changes_at_once(rig: Rig) -> None:
-    parameters = connect(rig)
-    start = threading.Barrier(2)
-    failures: list[BaseException] = []
-
-    def change(first: float) -> None:
-        try:
-            for count in range(15):
-                start.wait()
-                value = first + count
-                wanted = {'control.accel': value, 'control.retard': value, 'freque.f_fix1': value}
-                parameters.change(wanted).result(PATIENCE)
-        except BaseException as error:
-            failures.append(error)
-            start.abort()
-
-    threads = [threading.Thread(target=change, args=(first,)) for first in (1, 50)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not failures
-    accel, retard, fix = far(rig, 'control.accel', 'control.retard', 'freque.f_fix1')
-    assert accel == retard == fix
-    assert accel in (15, 64)
-    assert parameters.values['control.accel'] == accel
+def test_changes_at_once_come_one_after_the_other(rig: Rig, parameters: Parameters) -> None:
+    for count in range(1, 6):
+        futures = [
+            parameters.change(dict.fromkeys(THREE, first + count)) for first in (10.0, 50.0)
+        ]
+        for future in futures:
+            rig.result(future)
+        assert far(rig, *THREE) == [50.0 + count] * 3
+    # what is put back undoes no other change
+    on_write(rig, refuse)
+    first, second = parameters.change(THREE), parameters.change({ACCEL: 9})
+    fails(rig, first)
+    (change,) = rig.result(second)
+    assert change.new == 9
+    assert far(rig, ACCEL) == [9] == [parameters.values[ACCEL]]
 
 
-def test_watch_does_not_take_a_change_for_somebody_elses(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
+def test_what_is_read_meanwhile_is_no_change_at_the_drive(
+    rig: Rig, parameters: Parameters
 ) -> None:
-    parameters = connect(rig)
-    watch_only(rig, monkeypatch, 'control.accel')
+    parameters._keys = (ACCEL,)
 
-    def keep_another(write: Store, key: str, raw: int) -> None:
-        write(key, raw + 1 if key == 'control.retard' and raw > 1000 else raw)
+    def reading(future: Future[Any]) -> None:
+        while not future.done():
+            rig.result(parameters.refresh())
 
-    on_write(rig, monkeypatch, keep_another)
-    for count in range(40):
+    for count in range(20):
         value = 1.0 + count
-        parameters.change({'control.accel': value, 'freque.f_fix1': value}).result(PATIENCE)
-        assert parameters.values['control.accel'] == value
+        rig.meet = lambda key, data: None
+        reading(parameters.change({ACCEL: value, FIX: value}))
+        assert parameters.values[ACCEL] == value
         # and this one is put back
-        rig.refused(parameters.change({'control.accel': 99, 'control.retard': 99}))
-        assert parameters.values['control.accel'] == value
-    wait_until(lambda: len(rig.notes.snapshots) > 20)
-    assert parameters.values['control.accel'] == value
-    assert news(rig) == []
+        on_write(rig, refuse)
+        reading(parameters.change({ACCEL: 99.0, FIX: 99.0}))
+        assert parameters.values[ACCEL] == value
+    assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
 
 
-def test_long_changes_leave_the_polls_their_turns(rig: Rig) -> None:
-    parameters = connect(rig)
-    keys = [f'freque.f_fix{number}' for number in range(1, 8)] + ['control.accel', 'control.retard']
-    for value in (7, 9, 11):
-        before = len(rig.notes.snapshots)
-        parameters.change(dict.fromkeys(keys, value)).result(PATIENCE)
-        assert len(rig.notes.snapshots) - before >= 2
+def test_long_changes_leave_the_polls_their_turns() -> None:
+    with Rig(line={'baud': 9600}) as rig:
+        rig.connect(parameters=True)
+        keys = [f'freque.f_fix{number}' for number in range(1, 8)] + [ACCEL, RETARD]
+        for value in (7, 9, 11):
+            before = len(rig.notes.snapshots)
+            rig.result(rig.drive.parameters.change(dict.fromkeys(keys, value)))
+            assert len(rig.notes.snapshots) - before >= 3
+
+
+# --- no answer, and ends half-way -----------------------------------------------------------------
+
+
+def test_a_write_without_an_answer_is_sent_again(rig: Rig, parameters: Parameters) -> None:
+    rig.spoil('drop', ACCEL)
+    (change,) = rig.result(parameters.change({ACCEL: 7}))
+    assert change.new == 7
+    assert far(rig, ACCEL) == [7] == [parameters.values[ACCEL]]
+    assert rig.far.writes == {ACCEL: 2}
+    # the second one may be refused
+    def take_and_refuse(key: str, value: Value) -> str:
+        rig.far.set_from_keypad(key, value)
+        return 'refused'
+
+    on_write(rig, take_and_refuse)
+    assert len(rig.result(parameters.change({ACCEL: 8}))) == 1
+    rig.spoil('unheard', FIX, times=1 + rig.drive.settings.retries)
+    answer = fails(rig, parameters.change(THREE))
+    assert answer.startswith(f'{FIX}: unit 1 did not answer')
+    assert f'; it is 10 Hz as before; put back: {ACCEL}, {RETARD}' in answer
+    assert far(rig, *THREE) == [8, *BEFORE[1:]]
+
+
+@pytest.mark.parametrize('done', [False, True])
+@pytest.mark.parametrize('state', ['silent', 'gone'])
+def test_a_loss_in_the_middle_names_what_is_not_known(
+    rig: Rig, parameters: Parameters, state: str, done: bool
+) -> None:
+
+    def vanish(key: str, value: Value) -> None:
+        if key == FIX:
+            if done:
+                rig.far.set_from_keypad(FIX, value)
+            rig.line.state = state
+
+    on_write(rig, vanish)
+    rig.asked.clear()
+    answer = fails(rig, parameters.change(THREE), FIX, RETARD, ACCEL)
+    assert answer.startswith(f'{FIX}: unit 1 did not answer' if state == 'silent' else f'{FIX}: ')
+    assert 'whether the drive took 7 Hz is not known' in answer
+    assert f'{FIX} is NOT put back to 10 Hz' in answer
+    assert f'{RETARD} is NOT put back to 0.3 s' in answer
+    assert f'{ACCEL} is NOT put back to 0.3 s: not tried any more' in answer
+    # not two time-outs for each of a hundred
+    assert len(rig.asked) < 40
+    rig.line.mend()
+    rig.meet = lambda key, data: None
+    rig.wait_until(lambda: rig.drive.snapshot.connected)
+    # what it has is seen, and it can be put right
+    rig.result(parameters.change(dict(zip(THREE, BEFORE, strict=True))))
+    assert far(rig, *THREE) == BEFORE == [parameters.values[key] for key in THREE]
+
+
+def test_a_line_that_is_silent_from_the_beginning_changes_nothing(
+    rig: Rig, parameters: Parameters
+) -> None:
+    rig.line.state = 'silent'
+    for key, value in ((ACCEL, 7), (MAGN, 2)):
+        answer = fails(rig, parameters.change({key: value}))
+        assert answer.startswith(f'{key}: unit 1 did not answer')
+    rig.result(parameters.apply({MAGN: 2, ACCEL: 7}, write=True))
+    told = [one for one in rig.notes.events if one.text.startswith('not applied from')]
+    assert len(told) == 2
+    assert len(parameters.drift) == 2
+
+
+def test_the_end_of_the_driver_in_the_middle_says_what_is_changed(
+    rig: Rig, parameters: Parameters
+) -> None:
+    first, second = parameters.change(THREE), parameters.change({ACCEL: 9})
+    rig.wait_until(lambda: rig.far.writes[RETARD])
+    rig.kill()
+    assert said(first.exception()) == said(second.exception()) == 'this driver is ending'
+    text = f'ended half-way, NOT put back: {ACCEL}: 0.3 -> 7 s'
+    assert rig.notes.said(text, Severity.WARNING)
+    assert far(rig, *THREE) == [7, 7, 10]
+
+
+def test_changes_go_on_when_those_before_are_cancelled(rig: Rig, parameters: Parameters) -> None:
+    first = rig.bus.spawn(parameters.change_now(THREE))
+    second = parameters.change({ACCEL: 9})
+    third = rig.bus.spawn(parameters.change_now({ACCEL: 11}))
+    fourth = parameters.change({'freque.f_fix2': 9})
+    rig.bus.cancel(third)
+    rig.wait_until(lambda: rig.far.writes[RETARD])
+    rig.bus.cancel(first)
+    for future in (second, fourth):
+        rig.result(future)
+    assert far(rig, ACCEL, FIX, 'freque.f_fix2') == [9, 10, 9]

@@ -12,326 +12,391 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameters are read and watched, and nothing of that writes."""
+"""Settings are read, watched and compared with the wanted ones, and nothing of that writes."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import Counter
 from typing import Any
 
-from drive_rig import PATIENCE
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
-from parameters_rig import SILENCE
-from parameters_rig import at_keypad
-from parameters_rig import connect
-from parameters_rig import far
-from parameters_rig import news
-from parameters_rig import on_read
-from parameters_rig import only_read
-from parameters_rig import put_raw
-from parameters_rig import watch_only
-from parameters_rig import written
 import pytest
+from support.rig import WAYS
+from support.rig import Rig
+from support.rig import Way
 from support.said import raises
-from support.said import said
+from support.variants import ramps
 
+from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import parameters as parameters_module
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.link import Refused
+
+#: A change at the keypad is seen within a round, s.
+ROUND = 10.0
+READ = {
+    'rtu': 119, 'ascii': 119, 'tcp': 119, 'canopen': 119, 'classic': 120, 'classic v5.0': 116,
+    # without option cards
+    'movitrac': 149,
+}  # fmt: skip
+ACCEL, RETARD, SWITCH = 'control.accel', 'control.retard', 'control.energy_save'
 
 
 @pytest.fixture
-def busy_watch(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a round of reading take no longer than it must."""
-    monkeypatch.setattr(parameters_module, '_ROUND', 0.0)
-    monkeypatch.setattr(parameters_module, '_WAIT', 0.01)
+def rig() -> Any:
+    with Rig(poll_rate=2.0) as rig:
+        yield rig
+
+
+def far(rig: Rig, *keys: str) -> list[Value]:
+    """Return what the drive has."""
+    return [rig.far.peek(key) for key in keys]
+
+
+def texts(rig: Rig, cause: Cause) -> list[str]:
+    """Return what was reported for a cause."""
+    return [one.text for one in rig.notes.events if cause in one.text.causes]
+
+
+def refuse(rig: Rig, key: str, code: int = Refused.ILLEGAL_ADDRESS) -> list[str]:
+    """Have the reading of a parameter refused; return how often it was, one entry each time."""
+    refused: list[str] = []
+
+    def meet(asked: str, data: bytes | None) -> None:
+        if asked == key and data is None:
+            refused.append(asked)
+            raise Refused(code)
+
+    rig.meet = meet
+    return refused
 
 
 # --- the first reading ----------------------------------------------------------------------------
 
 
-def test_all_are_read_and_nothing_is_written(rig: Rig) -> None:
-    parameters = rig.drive.parameters
-    assert parameters.progress == 'not read'
-    connect(rig)
-    # any_bus of the manual's 120 has no register
-    assert len(parameters.values) == 119
-    assert 'control.any_bus' not in parameters.values
-    assert list(parameters.values.values()) == far(rig, *parameters.values)
-    assert parameters.progress == '119 read'
-    assert set(rig.notes.news) == set(parameters.values)
-    rig.notes.wait_for('parameters: 119 read in ', Severity.INFO)
-    assert not news(rig)
-    parameters.refresh().result(PATIENCE)
-    rig.next_snapshots()
-    assert written(rig) == {}
-    assert only_read(rig)
+@pytest.mark.parametrize('way', READ)
+def test_all_are_read_and_watched_and_nothing_is_written(way: str) -> None:
+    with Rig(way, poll_rate=2.0) as rig:
+        parameters = rig.drive.parameters
+        assert parameters.progress == 'not read'
+        rig.connect(parameters=True)
+        assert len(parameters.values) == READ[way]
+        assert parameters.progress == f'{READ[way]} read'
+        assert list(parameters.values.values()) == far(rig, *parameters.values)
+        assert set(rig.notes.parameters) == set(parameters.values)
+        assert rig.notes.said(f'parameters: {READ[way]} read in ', Severity.INFO)
+        rig.asked.clear()
+        answer = rig.answer(parameters.refresh())
+        assert answer == f'{READ[way]} parameters read, changed: none'
+        rig.notes.parameters.clear()
+        up, down = ramps(WAYS[way].model, 0.0, 0.0)
+        rig.far.set_from_keypad(up, 9.0)
+        rig.pass_time(ROUND + 1.0)
+        assert texts(rig, Cause.CHANGED_AT_DRIVE) == [f'changed at the drive: {up}: 0.3 -> 9 s']
+        assert rig.notes.parameters == [up]
+        rig.far.set_from_keypad(up, 8.0)
+        rig.far.set_from_keypad(down, 8.0)
+        answer = rig.answer(parameters.refresh())
+        assert answer == f'{READ[way]} parameters read, changed: {up}, {down}'
+        assert parameters.values[down] == 8.0
+        assert not [key for _, key, data in rig.asked if data is not None]
+        assert not rig.far.writes
 
 
-def test_progress(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parameters_module, '_PROGRESS', 0.0)
-    seen: list[str] = []
-    on_read(rig, monkeypatch, lambda key: seen.append(rig.drive.parameters.progress))
-    connect(rig)
-    assert '60 of 119 read' in seen
-    rig.notes.wait_for('parameters: 60 of 119 read', Severity.INFO)
+def test_progress_is_reported_after_pauses_that_grow() -> None:
+    # 20 s for all
+    with Rig(line={'baud': 1200}, lost_after=5.0) as rig:
+        rig.connect(parameters=True)
+        reported = [one.at for one in rig.notes.events if 'of 119 read' in one.text]
+        assert len(reported) == 2
+        assert reported[1] - reported[0] == pytest.approx(10.0, abs=0.5)
 
 
-def test_older_firmware_lacks_what_came_later(make_rig: MakeRig) -> None:
+def test_older_firmware_lacks_what_came_later() -> None:
     newest = 'error.short_c_err_cnt'
-    rig = make_rig(parameters={'fieldbus.sw_ver': 4.31})
-    assert newest not in connect(rig).values
-    assert len(rig.drive.parameters.values) == 118
+    for firmware, has in ((4.31, False), (4.32, True)):
+        with Rig(parameters={'fieldbus.sw_ver': firmware}) as rig:
+            rig.connect(parameters=True)
+            assert (newest in rig.drive.parameters.values) == has
 
 
-def test_firmware_that_has_it_since_just_then(make_rig: MakeRig) -> None:
-    rig = make_rig(parameters={'fieldbus.sw_ver': 4.32})
-    assert 'error.short_c_err_cnt' in connect(rig).values
-
-
-def test_one_that_the_drive_does_not_show_is_not_there(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
-) -> None:
-    asked: list[str] = []
-
-    def refuse(key: str) -> None:
-        if key == 'freque.f_fix1':
-            asked.append(key)
-            raise Refused(Reason.ADDRESS, 'no such thing')
-
-    on_read(rig, monkeypatch, refuse)
-    parameters = connect(rig)
+def test_one_that_the_drive_does_not_show_is_not_there(rig: Rig) -> None:
+    refused = refuse(rig, 'freque.f_fix1')
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
     assert len(parameters.values) == 118
-    assert 'freque.f_fix1' not in parameters.values
-    told = [text for _, text in rig.notes.events if text.startswith('freque.f_fix1 cannot be read')]
-    assert len(told) == 1
-    assert 'the drive has no such parameter' in told[0]
-    before = len(asked)
-    at_keypad(rig, 'control.accel', 9)
-    wait_until(lambda: parameters.values['control.accel'] == 9)
-    assert len(asked) == before
-    message = rig.refused(parameters.change({'freque.f_fix1': 7}))
-    assert message == 'freque.f_fix1: the drive has no such parameter (exception 2)'
+    (text,) = texts(rig, Cause.SETTING_UNREADABLE)
+    assert 'freque.f_fix1 cannot be read: the drive has no such parameter' in text
+    before = len(refused)
+    rig.pass_time(ROUND)
+    assert len(refused) == before
+    answer = rig.answer(parameters.change({'freque.f_fix1': 7}))
+    assert answer == 'freque.f_fix1: the drive has no such parameter (exception 2)'
 
 
-def test_what_needs_option_cards_is_told_in_one(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    cards = {'freque.f_fix1': 'X1', 'freque.f_fix2': 'X1', 'control.accel': 'Y or Z'}
-    model = rig.drive.inverter.model
-    for key, card in cards.items():
-        monkeypatch.setitem(model.parameters, key, replace(model[key], option=card))  # type: ignore[arg-type]
-
-    def refuse(key: str) -> None:
-        if key in cards:
-            raise Refused(Reason.ADDRESS, 'no such thing')
-
-    on_read(rig, monkeypatch, refuse)
-    assert len(connect(rig).values) == 116
-    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
-    rig.notes.wait_for(
-        'parameters: 3 are left out, for the drive has none of the option cards that they need '
-        '(Y or Z, X1)',
-        Severity.INFO,
-    )
+def test_what_needs_option_cards_is_reported_as_one() -> None:
+    with Rig('movitrac') as rig:
+        rig.connect(parameters=True)
+        assert not texts(rig, Cause.SETTING_UNREADABLE)
+        (text,) = texts(rig, Cause.OPTIONS_MISSING)
+        every = len(rig.drive.parameters.available())
+        assert text.startswith(f'parameters: {every - READ["movitrac"]} are left out')
 
 
-@pytest.mark.parametrize('reason', [Reason.ADDRESS, Reason.VALUE, Reason.STATE])
-def test_drive_that_refuses_every_third_request(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, reason: Reason
-) -> None:
+@pytest.mark.parametrize('code', [Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_VALUE, Refused.BUSY])
+def test_a_drive_that_refuses_every_third_request_is_read(rig: Rig, code: int) -> None:
     count = iter(range(10**9))
 
-    def refuse(key: str) -> None:
-        if rig.drive.parameters._unread and next(count) % 3 == 2:
-            raise Refused(reason, 'every third')
+    def meet(key: str, data: bytes | None) -> None:
+        if key in rig.far.settings and rig.drive.parameters._unread and next(count) % 3 == 2:
+            raise Refused(code)
 
-    on_read(rig, monkeypatch, refuse)
-    parameters = connect(rig)
+    rig.meet = meet
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
     assert list(parameters.values.values()) == far(rig, *parameters.values)
     assert parameters.progress == '119 read'
-    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
+    assert not texts(rig, Cause.SETTING_UNREADABLE)
 
 
-def test_switch_that_is_neither_on_nor_off(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
-) -> None:
-    put_raw(rig, 'serial.auto_stop', 2)
-    parameters = connect(rig)
-    assert 'serial.auto_stop' not in parameters.values
-    rig.notes.wait_for('serial.auto_stop: the drive has code 2', Severity.WARNING)
-    at_keypad(rig, 'serial.auto_stop', True)
-    wait_until(lambda: parameters.values.get('serial.auto_stop') is True)
-    wait_until(lambda: rig.drive.inverter.timeout.stops_motor)
-    # nobody relies on a value that is gone
-    put_raw(rig, 'serial.auto_stop', 2)
-    wait_until(lambda: 'serial.auto_stop' not in parameters.values)
-    wait_until(lambda: not rig.drive.inverter.timeout.stops_motor)
-    told = [text for _, text in rig.notes.events if 'has code 2' in text]
-    assert len(told) == 2
+def test_a_switch_that_is_neither_on_nor_off_has_no_value(rig: Rig) -> None:
+    rig.far.memory.put('serial.auto_stop', 2)
+    rig.connect(parameters=True)
+    values, timeout = rig.drive.parameters, rig.drive.inverter
+    assert 'serial.auto_stop' not in values.values
+    rig.far.set_from_keypad('serial.auto_stop', True)
+    rig.pass_time(ROUND)
+    assert values.values['serial.auto_stop'] is True
+    assert timeout.timeout.stops_motor
+    # a value that is gone is not relied on
+    rig.far.memory.put('serial.auto_stop', 2)
+    rig.pass_time(ROUND)
+    assert 'serial.auto_stop' not in values.values
+    assert not timeout.timeout.stops_motor
+    reported = texts(rig, Cause.BAD_VALUE)
+    assert len(reported) == 2
+    assert all('serial.auto_stop: the drive has code 2' in text for text in reported)
 
 
-def test_switch_that_is_neither_can_be_set(rig: Rig) -> None:
-    put_raw(rig, 'control.energy_save', 2)
-    parameters = connect(rig)
-    (change,) = parameters.change({'control.energy_save': True}).result(PATIENCE)
-    assert str(change) == 'control.energy_save: 0002h -> true'
-    assert parameters.values['control.energy_save'] is True
-    assert far(rig, 'control.energy_save') == [True]
+def test_a_drive_that_is_lost_while_it_is_read_is_not_known(rig: Rig) -> None:
+    count = iter(range(10**9))
 
+    def meet(key: str, data: bytes | None) -> None:
+        if next(count) == 60:
+            rig.line.state = 'silent'
 
-def test_drive_that_disappears_while_it_is_read(
-    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rig = make_rig(retries=1)
-    asked: list[str] = []
-
-    def vanish(key: str) -> None:
-        asked.append(key)
-        if len(asked) == 60:
-            rig.far.silence(SILENCE)
-
-    on_read(rig, monkeypatch, vanish)
+    rig.meet = meet
     parameters = rig.drive.parameters
-    assert 'did not answer' in rig.refused(rig.drive.connect(parameters=True))
+    assert 'did not answer' in rig.answer(rig.drive.connect(parameters=True))
     assert parameters.values == {}
     assert parameters.progress == 'not read'
-    with rig.simulator.lock:
-        rig.far.silence(0)
-    connect(rig)
-    assert parameters.progress == '119 read'
+    rig.line.mend()
+    rig.connect(parameters=True)
     assert list(parameters.values.values()) == far(rig, *parameters.values)
-    assert not news(rig)
-    assert written(rig) == {}
+    assert not texts(rig, Cause.CHANGED_AT_DRIVE)
 
 
-def test_reading_anew_does_not_end_the_watch(rig: Rig, busy_watch: None) -> None:
-    parameters = connect(rig)
-    for _ in range(3):
-        parameters.read().result(PATIENCE)
-    at_keypad(rig, 'control.accel', 9)
-    wait_until(lambda: parameters.values.get('control.accel') == 9)
+@pytest.mark.parametrize('error', [DriveError(Cause.NOT_ACTIVE), RuntimeError('a mistake')])
+def test_a_first_reading_that_fails_leaves_nothing_connected(rig: Rig, error: Exception) -> None:
+    async def fail() -> None:
+        raise error
+
+    rig.drive.parameters.read_now = fail
+    with pytest.raises(type(error)):
+        rig.result(rig.drive.connect(parameters=True))
+    with raises(Cause.NOT_CONNECTED):
+        rig.result(rig.drive.acknowledge())
+    del rig.drive.parameters.read_now
+    rig.connect(parameters=True)
+    assert rig.drive.parameters.values
 
 
 # --- the watch ------------------------------------------------------------------------------------
 
 
-def test_change_at_the_keypad_shows_within_a_round_and_is_told_once(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, busy_watch: None
+def test_the_watch_goes_on_after_reading_anew_and_after_a_loss(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
+    for _ in range(3):
+        rig.answer(parameters.read())
+    rig.far.set_from_keypad(ACCEL, 9)
+    rig.pass_time(ROUND)
+    assert parameters.values[ACCEL] == 9
+    rig.line.state = 'silent'
+    rig.pass_time(5.0)
+    assert not rig.drive.snapshot.connected
+    rig.line.mend()
+    rig.far.set_from_keypad(RETARD, 9)
+    rig.pass_time(ROUND + 6.0)
+    assert parameters.values[RETARD] == 9
+    assert len(texts(rig, Cause.CHANGED_AT_DRIVE)) == 2
+
+
+def test_a_round_reads_each_once(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    rig.pass_time(2.0)
+    rig.asked.clear()
+    rig.pass_time(ROUND - 0.2)
+    read = Counter(key for _, key, _ in rig.asked if key in rig.drive.parameters.values)
+    # the polls read the control mode too; what the line depends on takes turns
+    assert [key for key, times in read.items() if times > 1] == ['control.mode']
+    assert len(read) > 113
+
+
+def test_refresh_passes_over_what_is_refused(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    for key in (ACCEL, RETARD):
+        rig.far.set_from_keypad(key, 9)
+    refuse(rig, ACCEL, Refused.DEVICE_FAILURE)
+    answer = rig.answer(rig.drive.parameters.refresh())
+    assert answer == f'119 parameters read, changed: {RETARD}'
+    assert not texts(rig, Cause.SETTING_UNREADABLE)
+
+
+def test_a_listener_that_fails_does_not_end_the_watch(
+    rig: Rig, caplog: pytest.LogCaptureFixture
 ) -> None:
-    parameters = connect(rig)
-    rounds: list[str] = []
-    on_read(rig, monkeypatch, rounds.append)
-    at_keypad(rig, 'freque.f_fix1', 12.5)
-    before = len(rounds)
-    wait_until(lambda: parameters.values['freque.f_fix1'] == 12.5)
-    # those of the poll count too, but that reads only the control mode
-    assert len([key for key in rounds[before:] if key != 'control.mode']) <= 119 + 2
-    after = len(rounds)
-    wait_until(lambda: len(rounds) >= after + 2 * 119)
-    assert news(rig) == ['changed at the drive: freque.f_fix1: 10 -> 12.5 Hz']
-    assert rig.notes.news.count('freque.f_fix1') == 2
-    assert written(rig) == {}
-
-
-def test_refresh_says_what_has_changed(rig: Rig) -> None:
-    parameters = connect(rig)
-    rig.drive.parameters._keys = tuple(parameters.values)
-    answer = said(parameters.refresh().result(PATIENCE))
-    assert answer == '119 parameters read, changed: none'
-    at_keypad(rig, 'control.accel', 9)
-    at_keypad(rig, 'control.st_mode', 'Release')
-    answer = said(parameters.refresh().result(PATIENCE))
-    assert answer == '119 parameters read, changed: control.accel, control.st_mode'
-    assert parameters.values['control.st_mode'] == 'Release'
-
-
-def test_refresh_of_a_drive_that_refuses_one(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    parameters = connect(rig)
-
-    def refuse(key: str) -> None:
-        if key == 'control.accel':
-            raise Refused(Reason.STATE, 'not now')
-
-    on_read(rig, monkeypatch, refuse)
-    at_keypad(rig, 'control.accel', 9)
-    at_keypad(rig, 'control.retard', 9)
-    answer = said(parameters.refresh().result(PATIENCE))
-    assert answer == '119 parameters read, changed: control.retard'
-    assert not rig.notes.told(Cause.SETTING_UNREADABLE)
-
-
-def test_watch_goes_on_when_the_drive_is_back(
-    make_rig: MakeRig, busy_watch: None, hasty: None
-) -> None:
-    rig = make_rig(retries=1)
-    parameters = connect(rig)
-    with rig.simulator.lock:
-        rig.far.silence(SILENCE)
-    rig.notes.wait_for('lost: ', Severity.ERROR)
-    with rig.simulator.lock:
-        rig.far.silence(0)
-    at_keypad(rig, 'control.accel', 9)
-    wait_until(lambda: parameters.values['control.accel'] == 9)
-    assert len(news(rig)) == 1
-
-
-def test_listener_that_fails_does_not_end_the_watch(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    parameters = connect(rig)
-    watch_only(rig, monkeypatch, 'control.accel', 'control.retard')
+    rig.connect(parameters=True)
 
     def fail(keys: Any) -> None:
-        raise RuntimeError('a mistake of who listens')
+        raise RuntimeError('a mistake of a listener')
 
-    monkeypatch.setattr(rig.notes, 'on_parameters', fail)
-    at_keypad(rig, 'control.accel', 9)
-    wait_until(lambda: parameters.values['control.accel'] == 9)
-    at_keypad(rig, 'control.retard', 9)
-    wait_until(lambda: parameters.values['control.retard'] == 9)
-    assert 'a mistake of who listens' in caplog.text
-
-
-@pytest.mark.parametrize('auto', [True, False])
-def test_time_out_of_the_drive_reaches_the_keeping_alive(
-    rig: Rig, busy_watch: None, auto: bool
-) -> None:
-    parameters = connect(rig)
-    inverter = rig.drive.inverter
-    at_keypad(rig, 'serial.sio_tot', 5)
-    at_keypad(rig, 'serial.auto_stop', auto)
-    wait_until(lambda: inverter.timeout.seconds == 5 and inverter.timeout.stops_motor is auto)
-    rig.drive.set_drive_timeout(7).result(PATIENCE)
-    assert inverter.timeout.seconds == 7
-    assert inverter.timeout.stops_motor
-    assert parameters.values['serial.sio_tot'] == 7
-    assert far(rig, 'serial.sio_tot', 'serial.auto_stop') == [7, True]
+    rig.notes.on_parameters = fail
+    for key in (ACCEL, RETARD):
+        rig.far.set_from_keypad(key, 9)
+        rig.pass_time(ROUND)
+        assert rig.drive.parameters.values[key] == 9
+    assert 'a mistake of a listener' in caplog.text
 
 
-def test_time_out_set_as_a_parameter_reaches_the_keeping_alive(make_rig: MakeRig) -> None:
-    rig = make_rig(allow_communication_changes=True)
-    connect(rig).change({'serial.sio_tot': 3, 'serial.auto_stop': True}).result(PATIENCE)
-    assert rig.drive.inverter.timeout.seconds == 3
-    assert rig.drive.inverter.timeout.stops_motor
+def test_the_drives_time_out_reaches_the_keeping_alive() -> None:
+    with Rig(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        parameters, inverter = rig.drive.parameters, rig.drive.inverter
+
+        def known() -> tuple[float, bool]:
+            return inverter.timeout.seconds, inverter.timeout.stops_motor
+
+        for auto in (True, False):
+            rig.far.set_from_keypad('serial.sio_tot', 5 + auto)
+            rig.far.set_from_keypad('serial.auto_stop', auto)
+            rig.pass_time(ROUND)
+            assert known() == (5 + auto, auto)
+        rig.result(rig.drive.set_drive_timeout(7))
+        assert known() == (7, True)
+        assert parameters.values['serial.sio_tot'] == 7
+        assert far(rig, 'serial.sio_tot', 'serial.auto_stop') == [7, True]
+        rig.result(parameters.change({'serial.sio_tot': 3, 'serial.auto_stop': False}))
+        assert known() == (3, False)
 
 
-@pytest.mark.parametrize(
-    'error', [DriveError(Cause.NOT_ACTIVE), RuntimeError('a mistake')]
-)
-def test_a_first_reading_that_fails_leaves_nothing_connected(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    async def fail() -> None:
-        raise error
+# --- what is wanted -------------------------------------------------------------------------------
 
-    monkeypatch.setattr(rig.drive.parameters, 'read_now', fail)
-    with pytest.raises(type(error)):
-        rig.drive.connect(parameters=True).result(PATIENCE)
-    with raises(Cause.NOT_CONNECTED):
-        rig.drive.acknowledge().result(PATIENCE)
-    monkeypatch.undo()
-    assert connect(rig).values
+
+def test_a_wanted_state_is_written_where_it_differs(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
+    rig.far.memory.put(SWITCH, 2)
+    rig.pass_time(ROUND)
+    wanted = {ACCEL: 7, RETARD: 0.3, 'control.st_mode': 'Release', SWITCH: False}
+    for _ in range(2):
+        rig.result(parameters.apply(wanted, write=True))
+        assert rig.far.writes == {ACCEL: 1, 'control.st_mode': 1, SWITCH: 1}
+        assert far(rig, *wanted) == list(wanted.values())
+        assert parameters.drift == ()
+    assert rig.notes.said(f'{ACCEL}: 0.3 -> 7 s, as the parameter file says', Severity.INFO)
+    assert not rig.notes.said(RETARD)
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'monitor'])
+def test_a_wanted_state_is_only_reported(method: str) -> None:
+    with Rig(Way('modbus_rtu', method=method)) as rig:
+        rig.connect(parameters=True)
+        parameters = rig.drive.parameters
+        rig.result(parameters.apply({ACCEL: 7}, write=False))
+        assert [str(drift) for drift in parameters.drift] == [f'{ACCEL}: 7 -> 0.3 s']
+        assert texts(rig, Cause.NOT_AS_WANTED) == [
+            f'{ACCEL} is 0.3 s in the drive, but 7 was asked for: it is left so'
+        ]
+        assert not rig.far.writes
+
+
+def test_a_monitor_writes_nothing() -> None:
+    way = Way('modbus_rtu', method='monitor', driver={'allow_communication_changes': True})
+    with Rig(way) as rig:
+        rig.connect(parameters=True)
+        parameters = rig.drive.parameters
+        for key, value in ((ACCEL, 7), ('serial.sio_tot', 7)):
+            assert 'this driver only reads' in rig.answer(parameters.change({key: value}))
+        rig.result(parameters.apply({ACCEL: 7}, write=True))
+        assert rig.notes.said(f'not applied from the parameter file: {ACCEL}', Severity.ERROR)
+        assert parameters.drift
+        # what it has already is no change
+        assert rig.result(parameters.change({ACCEL: 0.3})) == ()
+        rig.result(parameters.refresh())
+        rig.far.set_from_keypad(ACCEL, 7)
+        rig.pass_time(ROUND)
+        assert not parameters.drift
+        assert not [key for _, key, data in rig.asked if data is not None]
+
+
+def test_a_drift_is_reported_once_and_not_undone(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
+    rig.result(parameters.apply({ACCEL: 7}, write=True))
+    rig.far.set_from_keypad(ACCEL, 9)
+    rig.far.set_from_keypad(RETARD, 9)
+    rig.pass_time(2 * ROUND)
+    assert texts(rig, Cause.NOT_AS_WANTED) == [
+        f'{ACCEL} is 9 s in the drive, but 7 was asked for: it is left so'
+    ]
+    assert [str(drift) for drift in parameters.drift] == [f'{ACCEL}: 7 -> 9 s']
+    assert far(rig, ACCEL) == [9]
+    assert len(texts(rig, Cause.CHANGED_AT_DRIVE)) == 1
+    # what is set through the driver is wanted from then on
+    rig.result(parameters.change({ACCEL: 8}))
+    assert parameters.drift == ()
+    rig.far.set_from_keypad(ACCEL, 9)
+    rig.pass_time(ROUND)
+    assert len(texts(rig, Cause.NOT_AS_WANTED)) == 2
+    rig.far.set_from_keypad(ACCEL, 8)
+    rig.pass_time(ROUND)
+    assert not parameters.drift
+    assert rig.far.writes == {ACCEL: 2}
+
+
+def test_a_drift_to_what_means_nothing_is_shown(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    parameters = rig.drive.parameters
+    rig.result(parameters.apply({SWITCH: True}, write=True))
+    rig.far.memory.put(SWITCH, 2)
+    rig.pass_time(ROUND)
+    assert [str(drift) for drift in parameters.drift] == [f'{SWITCH}: true -> 0002h']
+
+
+def test_a_wanted_state_without_what_this_drive_lacks() -> None:
+    with Rig(parameters={'fieldbus.sw_ver': 4.31}) as rig:
+        rig.connect(parameters=True)
+        wanted = {'error.short_c_err_cnt': 1, 'control.any_bus': 1, ACCEL: 7}
+        rig.result(rig.drive.parameters.apply(wanted, write=True))
+        text = 'this drive has no error.short_c_err_cnt, control.any_bus: not applied'
+        assert rig.notes.said(text, Severity.WARNING)
+        assert rig.far.writes == {ACCEL: 1}
+
+
+def test_a_wanted_state_that_no_drive_can_have_changes_nothing(rig: Rig) -> None:
+    rig.connect(parameters=True)
+    answer = rig.answer(rig.drive.parameters.apply({ACCEL: 7, RETARD: -1}, write=True))
+    assert answer.startswith(f'{RETARD}: -1 is out of range')
+    assert not rig.far.writes
+
+
+def test_a_wanted_state_that_a_turning_drive_refuses_in_part(rig: Rig) -> None:
+    rig.turn()
+    rig.result(rig.drive.parameters.read())
+    parameters = rig.drive.parameters
+    rig.result(parameters.apply({'motor.i_magn': 2.0, RETARD: 7}, write=True))
+    assert rig.far.writes == {RETARD: 1}
+    assert [drift.key for drift in parameters.drift] == ['motor.i_magn']
+    (text,) = texts(rig, Cause.WANTED_BUT_REFUSED)
+    assert 'motor.i_magn: only while the motor is stopped' in text
