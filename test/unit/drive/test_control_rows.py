@@ -23,7 +23,7 @@ import contextlib
 from any_order_machine import AnyOrder
 from any_order_machines import G2ModeScmd
 import pytest
-from test_older_settings import Rig as OlderRig
+from support.rig import Rig
 
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.drive import control_state
@@ -126,9 +126,9 @@ def test_every_row_is_visited(visited: Visited) -> None:
             if 'shut' in end:
                 state.shut_down(wait=1.0)
             state.let(15.0)
-    with contextlib.ExitStack() as stack:
+    with Rig('classic v5.0', drive_timeout=4.0) as rig:
         # firmware that has to be under control to take a setting, while it is connected to
-        OlderRig(stack, '5.0').connect(drive_timeout=4.0)
+        rig.connect()
     table = set(visited)
     unvisited = sorted(f'{event.name} in {state.name}' for state, event in table - visited.rows)
     assert unvisited == []

@@ -15,76 +15,50 @@
 """
 Firmware of the v5.0 dialect takes settings under bus control alone, and faults on unknown ids.
 
-[C100], [C21]: a SELECT of anything but MODE is answered by NAK before MODE = Sio; who asks for what
-this firmware does not know while the bus has control stops the motor by a serial fault.
+[C100], [C21]: a SELECT of anything but MODE is answered by NAK before MODE = Sio; a question for
+what this firmware does not know, while the bus has control, stops the motor by a serial fault.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import contextlib
+from dataclasses import replace
 from typing import Any
 
-from drive_rig import PATIENCE
-from drive_rig import Notes
-from drive_rig import patient
-from drive_rig import wait_until
 import pytest
+from support.rig import Rig
+from support.rig import Way
 from support.said import raises
 from support.said import said
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
 from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.simulator import Simulator
 
 STOP, EXT, BUS = 1, 2, 3
-SIO_FAIL = 14
-QUICK = {'control.accel': 0.3, 'control.retard': 0.3}
+SIO_FAIL, OFF, STANDBY = 14, 24, 37
+TIMEOUT = ('serial.sio_tot', 'serial.auto_stop')
 
 
-class Rig:
+class Older(Rig):
     """
-    A drive of this firmware, and drivers of it, one after the other.
+    A drive of this firmware.
 
-    :ivar modes: what was written to MODE.
     :ivar flags: what went wrong on the line, as the drive notes it.
     :ivar energised: the motor was, at any time.
     """
 
-    def __init__(self, stack: contextlib.ExitStack, dialect: str, **options: Any) -> None:
-        self._stack = stack
-        options = {'settings': QUICK, **options}
-        self.simulator = Simulator(protocol='classic', dialect=dialect, boot_time=0.2, **options)
-        self.far: SimulatedDrive = self.simulator.drives[1]
-        self.modes: list[int] = []
+    def __init__(self, way: str | Way = 'classic v5.0', **settings: Any) -> None:
+        super().__init__(way, setpoint_timeout=0.0, **settings)
         self.flags = LineError(0)
         self.energised = False
-        self._listen()
-        stack.enter_context(self.simulator)
-        self.drive: Drive
-        self.notes = Notes()
-        self.bus: Bus
-
-    def _listen(self) -> None:
-        far = self.far
-        write, fail, energise = far.write_raw, far.control_unit.serial_error, far.motor.energise
-
-        def note_write(key: str, raw: int) -> None:
-            write(key, raw)
-            if key == 'fieldbus.mode':
-                self.modes.append(raw)
+        unit, motor = self.far.control_unit, self.far.motor
+        fail, energise = unit.serial_error, motor.energise
 
         def note_error(what: LineError) -> None:
             self.flags |= what
@@ -94,189 +68,137 @@ class Rig:
             self.energised = True
             energise()
 
-        far.write_raw = note_write  # type: ignore[method-assign]
-        far.control_unit.serial_error = note_error  # type: ignore[method-assign]
-        far.motor.energise = note_energy  # type: ignore[method-assign]
+        unit.serial_error, motor.energise = note_error, note_energy
 
-    def driver(self, **settings: Any) -> Drive:
-        """Begin a driver."""
-        lost_after = patient(settings.get('drive_timeout', 0.0))
-        usual = {'classic_dialect': 'v5.0', 'setpoint_timeout': 0.0, 'lost_after': lost_after}
-        settings = {**usual, **settings}
-        line = line_settings('classic', response_timeout=2.0)
-        self.bus = Bus(open_link('classic', self.simulator.port, line))
-        self.drive = Drive(self.bus, DriveSettings(**settings), self.notes)
-        self.bus.start()
-        self._stack.callback(self.bus.close)
-        return self.drive
+    @property
+    def modes(self) -> list[int]:
+        """What was written to MODE."""
+        return self.written('fieldbus.mode')
 
-    def connect(self, **settings: Any) -> Drive:
-        """Begin a driver, connect and activate."""
-        drive = self.driver(**settings)
-        drive.connect().result(PATIENCE)
-        drive.activate()
-        wait_until(lambda: drive.snapshot.status)
-        return drive
+    @property
+    def mode(self) -> int:
+        return self.far.control_unit.mode
 
-    def turn(self) -> None:
-        """Enable and turn."""
-        self.drive.enable().result(PATIENCE)
-        self.drive.set_setpoint(20.0)
-        wait_until(lambda: self.far.motor.frequency > 19.0)
+    @property
+    def code(self) -> int:
+        return self.far.control_unit.status_code
+
+    def has(self, *names: str) -> list[Any]:
+        """Return what the drive has in the group Control."""
+        return [self.far.peek(f'control.{name}') for name in names]
 
     def change(self, **values: Any) -> None:
         """Change parameters of the group Control."""
         wanted = {f'control.{name}': value for name, value in values.items()}
-        self.drive.parameters.change(wanted).result(PATIENCE)
+        self.result(self.drive.parameters.change(wanted))
 
-    def why_not(self, **values: Any) -> str:
+    def why_not(self) -> str:
         """Return why parameters are not changed; nothing may have been written."""
-        before = (dict(self.far.writes), list(self.modes), self.far.motor.driven)
+        before = (dict(self.far.writes), self.modes, self.far.motor.driven)
         with pytest.raises(DriveError) as error:
-            self.change(**values)
+            self.change(accel=6.0)
         assert (dict(self.far.writes), self.modes, self.far.motor.driven) == before
         return said(error.value)
 
 
 @pytest.fixture
-def stack(unhurried: None) -> Iterator[contextlib.ExitStack]:
-    with contextlib.ExitStack() as stack:
-        yield stack
-
-
-@pytest.fixture
-def rig(stack: contextlib.ExitStack) -> Rig:
-    return Rig(stack, '5.0')
+def rig() -> Any:
+    with Older() as rig:
+        rig.connect()
+        yield rig
 
 
 # --- settings -------------------------------------------------------------------------------------
 
 
-def test_settings_are_written_under_control_that_is_given_back(rig: Rig) -> None:
-    rig.connect()
+def test_settings_are_written_under_control_that_is_given_back(rig: Older) -> None:
+    # no control is taken for what the drive has already
+    rig.change(accel=0.3)
+    assert rig.modes == []
     rig.change(accel=6.0, retard=7.0)
-    assert (rig.far.peek('control.accel'), rig.far.peek('control.retard')) == (6.0, 7.0)
+    assert rig.has('accel', 'retard') == [6.0, 7.0]
     assert rig.modes == [BUS, STOP]
-    assert not rig.energised
-    assert not rig.flags
-    assert rig.far.control_unit.status_code == 24
+    assert not rig.energised and not rig.flags
+    assert rig.code == OFF
     assert rig.far.command_writes.get('status.frq_set'), 'no old set-point may stand'
 
 
-def test_no_control_is_taken_for_what_the_drive_has_already(rig: Rig) -> None:
-    rig.connect()
-    rig.change(accel=0.3)
-    assert rig.modes == []
-
-
 @pytest.mark.parametrize('turning', [False, True])
-def test_under_bus_control_settings_are_just_written(rig: Rig, turning: bool) -> None:
-    rig.connect()
+def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) -> None:
     rig.turn()
     if not turning:
-        rig.drive.stop().result(PATIENCE)
-        wait_until(lambda: not rig.far.motor.driven)
-    rig.drive.set_setpoint(20.0)
-    modes = list(rig.modes)
+        rig.result(rig.drive.stop())
+        rig.pass_time(1.0)
     rig.change(accel=6.0)
-    assert rig.far.peek('control.accel') == 6.0
-    assert rig.modes == modes == [BUS]
-    assert rig.far.motor.driven == turning
-    assert rig.drive.armed == turning
+    assert rig.has('accel') == [6.0]
+    assert rig.modes == [BUS]
+    assert rig.turns == rig.drive.armed == turning
     assert not rig.flags
 
 
-def test_what_else_has_control_keeps_it(rig: Rig) -> None:
-    rig.connect()
-    with rig.simulator.lock:
-        rig.far.set_run_input(False)
-        rig.far.control_unit.press('ext')
-    assert 'giving it back to them could start the motor: press STOP' in rig.why_not(accel=6.0)
-    with rig.simulator.lock:
-        rig.far.set_run_input(True)
-    wait_until(lambda: rig.far.motor.driven)
-    assert 'the motor runs' in rig.why_not(accel=6.0)
-    with rig.simulator.lock:
-        rig.far.control_unit.press('stop')
-    wait_until(lambda: not rig.far.motor.driven)
+def test_what_else_has_control_keeps_it(rig: Older) -> None:
+    rig.far.set_run_input(False)
+    rig.far.control_unit.press('ext')
+    assert 'giving it back to them could start the motor: press STOP' in rig.why_not()
+    rig.far.set_run_input(True)
+    rig.pass_time(0.2)
+    assert 'the motor runs' in rig.why_not()
+    rig.far.control_unit.press('stop')
+    rig.pass_time(1.0)
     rig.change(accel=6.0)
-    assert rig.far.peek('control.accel') == 6.0
+    assert rig.has('accel') == [6.0]
 
 
-def test_not_while_a_fault_is_active(rig: Rig) -> None:
-    rig.connect()
-    rig.simulator.inject('fault', 5)
-    wait_until(lambda: rig.drive.snapshot.status.faulted)
-    why = rig.why_not(accel=6.0)
-    assert '5 Overload' in why
-    assert '~/fault_ack' in why
-    rig.drive.acknowledge().result(PATIENCE)
-    rig.change(accel=6.0)
-
-
-def test_not_while_it_is_tuned_by_others(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    rig.connect()
-    monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
-    assert 'MODE is Inhibit' in rig.why_not(accel=6.0)
-
-
-def test_a_write_that_fails_half_way_gives_control_back(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
+def test_not_while_a_fault_is_active_or_others_tune_it(
+    rig: Older, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig.connect()
-    store = rig.far._store
-    monkeypatch.setattr(
-        rig.far, '_store', lambda key, raw: key == 'control.retard' or store(key, raw)
-    )
-    with raises(Cause.DRIVE_KEEPS_OTHER) as error:
-        rig.change(accel=6.0, retard=7.0)
-    assert 'put back: control.accel' in said(error.value)
-    assert rig.far.peek('control.accel') == pytest.approx(0.3)
-    assert rig.modes == [BUS, STOP]
-    assert not rig.energised
+    rig.far.trip(5)
+    rig.pass_time(0.2)
+    why = rig.why_not()
+    assert '5 Overload' in why and '~/fault_ack' in why
+    rig.acknowledged += 1
+    rig.result(rig.drive.acknowledge())
+    rig.change(accel=5.0)
+    monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
+    assert 'MODE is Inhibit' in rig.why_not()
 
 
-def test_a_value_that_is_refused_puts_all_back(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    # a refusal under bus control is a serial fault: MODE is Stop after it
-    rig.connect()
+@pytest.mark.parametrize('refused', [False, True])
+def test_a_write_that_fails_half_way_puts_all_back(rig: Older, refused: bool) -> None:
     write = rig.far.write_raw
 
-    def refuse(key: str, raw: int) -> None:
-        if key == 'control.retard':
+    def fail(key: str, raw: int) -> None:
+        # a refusal under bus control is a serial fault: MODE is Stop after it
+        if key != 'control.retard':
+            write(key, raw)
+        elif refused:
             raise Refused(Reason.VALUE, 'not this one')
-        write(key, raw)
 
-    monkeypatch.setattr(rig.far, 'write_raw', refuse)
-    with pytest.raises(DriveError) as error:
+    rig.far.write_raw = fail
+    # the link clears the serial fault that its own write has caused, of each of two
+    rig.acknowledged += 2 * refused
+    with raises(Cause.VALUE_NOT_ACCEPTED if refused else Cause.DRIVE_KEEPS_OTHER) as error:
         rig.change(accel=6.0, retard=7.0)
     assert 'put back: control.accel' in said(error.value)
-    assert rig.far.peek('control.accel') == pytest.approx(0.3)
-    wait_until(lambda: rig.far.control_unit.mode == STOP)
+    assert rig.has('accel') == [0.3]
+    assert rig.mode == STOP
+    assert refused or rig.modes == [BUS, STOP]
     assert not rig.energised
 
 
-def test_an_enable_waits_until_settings_are_written(rig: Rig) -> None:
-    rig.connect()
-    write, enables = rig.far.write_raw, []
-
-    def enable_meanwhile(key: str, raw: int) -> None:
-        write(key, raw)
-        if key == 'control.accel':
-            enables.append(rig.drive.enable())
-
-    rig.far.write_raw = enable_meanwhile  # type: ignore[method-assign]
-    rig.drive.parameters.change({'control.accel': 6.0, 'control.retard': 7.0})
-    wait_until(lambda: enables)
+def test_an_enable_waits_until_settings_are_written(rig: Older) -> None:
+    change = rig.drive.parameters.change({'control.accel': 6.0, 'control.retard': 7.0})
+    rig.wait_until(lambda: rig.far.writes['control.accel'])
     with raises(Cause.PROCEDURE_GOES_ON):
-        enables[0].result(PATIENCE)
-    wait_until(lambda: rig.modes == [BUS, STOP])
+        rig.result(rig.drive.enable())
+    rig.result(change)
+    assert rig.modes == [BUS, STOP]
     assert not rig.energised
-    rig.turn()
+    rig.enable()
 
 
-def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Rig) -> None:
+def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Older) -> None:
     # no manual says that MODE = Stop ends it
-    rig.connect()
     take = rig.far.control_unit.take
 
     def keeps(source: Any) -> None:
@@ -284,158 +206,136 @@ def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Rig) -> None:
         if source.value == 'scmd':
             rig.far.control_unit.scmd = Scmd.FIELDBUS
 
-    rig.far.control_unit.take = keeps  # type: ignore[method-assign]
-    with rig.simulator.lock:
-        rig.far.memory.set('status.frq_set', 20.0)
+    rig.far.control_unit.take = keeps
+    rig.far.memory.set('status.frq_set', 20.0)
     rig.change(accel=6.0)
-    assert rig.far.peek('control.accel') == 6.0
+    assert rig.has('accel') == [6.0]
     assert not rig.far.motor.turning
     assert rig.modes == [BUS, STOP]
 
 
-# --- the drive's own time-out ---------------------------------------------------------------------
+def test_the_drives_time_out_is_set() -> None:
+    with Older(drive_timeout=4.0) as rig:
+        rig.connect()
+        assert [rig.far.peek(key) for key in TIMEOUT] == [4.0, True]
+        assert rig.modes == [BUS, STOP]
+        rig.result(rig.drive.set_drive_timeout(5.0))
+        assert rig.far.peek('serial.sio_tot') == 5.0
+        assert rig.modes == [BUS, STOP] * 2
+        assert not rig.flags
 
 
-def test_the_drives_time_out_is_set(rig: Rig) -> None:
-    rig.connect(drive_timeout=4.0)
-    assert (rig.far.peek('serial.sio_tot'), rig.far.peek('serial.auto_stop')) == (4.0, True)
-    assert rig.modes == [BUS, STOP]
-    rig.drive.set_drive_timeout(5.0).result(PATIENCE)
-    assert rig.far.peek('serial.sio_tot') == 5.0
-    assert rig.modes == [BUS, STOP] * 2
-    assert not rig.flags
-
-
-def test_the_drives_time_out_is_set_when_the_bus_gets_control(rig: Rig) -> None:
-    with rig.simulator.lock:
+def test_the_drives_time_out_is_set_when_the_bus_gets_control() -> None:
+    with Older(drive_timeout=4.0) as rig:
         rig.far.control_unit.press('ext')
-    rig.connect(drive_timeout=4.0)
-    rig.notes.wait_for(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
-    assert rig.far.peek('serial.sio_tot') == 0
-    assert rig.far.control_unit.mode == EXT
-    with rig.simulator.lock:
+        rig.connect()
+        assert rig.notes.said(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
+        assert rig.far.peek('serial.sio_tot') == 0
+        assert rig.mode == EXT
         rig.far.control_unit.press('stop')
-    wait_until(lambda: not rig.far.motor.turning)
-    rig.turn()
-    assert (rig.far.peek('serial.sio_tot'), rig.far.peek('serial.auto_stop')) == (4.0, True)
-    assert rig.modes == [BUS]
-    assert not rig.flags
+        rig.pass_time(1.0)
+        rig.enable()
+        assert [rig.far.peek(key) for key in TIMEOUT] == [4.0, True]
+        assert rig.modes == [BUS]
+        assert not rig.flags
 
 
 # --- nothing is asked that it does not know -------------------------------------------------------
 
 
-def test_two_lost_answers_do_not_trip_it(rig: Rig) -> None:
-    rig.connect(setpoint_timeout=0.0, retries=4, lost_after=30.0)
+def test_two_lost_answers_do_not_trip_it(rig: Older) -> None:
     rig.turn()
-    read, lost = rig.far.read_raw, [2]
-
-    def lose(key: str) -> int:
+    for key in ('fieldbus.inv_st', 'fieldbus.mode'):
         # the status, and what is read to find out whether its answer is only late
-        if key in ('fieldbus.inv_st', 'fieldbus.mode') and lost[0]:
-            lost[0] -= 1
-            rig.simulator.line.faults.add('drop', 1, None, 0.0)
-        return read(key)
-
-    rig.far.read_raw = lose  # type: ignore[method-assign]
-    wait_until(lambda: not lost[0])
-    polls = len(rig.notes.snapshots)
-    wait_until(lambda: len(rig.notes.snapshots) > polls + 3)
-    assert rig.flags == 0
-    assert rig.far.motor.driven
+        rig.spoil('drop', key, 2, written=False)
+        rig.pass_time(2.0)
+        assert rig.flags == 0
+        assert rig.turns
 
 
-@pytest.mark.parametrize('control_method', ['mode_scmd', 'monitor'])
-def test_a_driver_that_is_begun_while_the_motor_turns(rig: Rig, control_method: str) -> None:
-    rig.connect(setpoint_timeout=0.0)
+@pytest.mark.parametrize('method', ['mode_scmd', 'monitor'])
+def test_a_driver_that_is_begun_while_the_motor_turns(rig: Older, method: str) -> None:
     rig.turn()
-    rig.bus.close()
-    rig.connect(classic_dialect='', control_method=control_method)
+    rig.kill()
+    rig._settings[1] = replace(rig._settings[1], classic_dialect='', control_method=method)
+    rig.begin()
+    rig.connect()
     assert rig.flags == 0
-    assert rig.far.control_unit.status_code != SIO_FAIL
-    rig.notes.wait_for('the bus has control', Severity.WARNING)
-    if control_method == 'mode_scmd':
-        wait_until(lambda: not rig.far.motor.driven)
-        wait_until(lambda: rig.far.control_unit.status_code == 37)
-    else:
-        assert rig.far.motor.driven
+    assert rig.code != SIO_FAIL
+    assert rig.notes.said('the bus has control', Severity.WARNING)
+    rig.pass_time(2.0)
+    assert rig.turns == (method == 'monitor')
+    assert (rig.code == STANDBY) == (method != 'monitor')
 
 
 @pytest.mark.parametrize(('dialect', 'firmware'), [('2.03', '4.38'), ('5.0', '')])
 def test_the_firmware_is_asked_for_while_the_bus_has_no_control(
-    stack: contextlib.ExitStack, dialect: str, firmware: str
+    dialect: str, firmware: str
 ) -> None:
-    rig = Rig(stack, dialect)
-    drive = rig.connect(classic_dialect='')
-    assert drive.identity is not None
-    assert firmware in str(drive.identity)
-    assert bool(firmware) == (drive.snapshot.status.word is not None)
-    assert rig.flags == (LineError(0) if firmware else LineError.UNKNOWN)
-    assert rig.far.control_unit.status_code == 24
+    with Older(Way('classic', options={'dialect': dialect})) as rig:
+        rig.connect()
+        assert rig.drive.identity is not None and rig.drive.snapshot.status is not None
+        assert firmware in str(rig.drive.identity)
+        assert bool(firmware) == (rig.drive.snapshot.status.word is not None)
+        assert rig.flags == (LineError(0) if firmware else LineError.UNKNOWN)
+        assert rig.code == OFF
+        if not firmware:
+            return
+        # a drive that was asked once is known when it comes back under control
+        rig.turn()
+        rig.line.state = 'deaf'
+        rig.pass_time(3.0)
+        assert not rig.drive.snapshot.connected
+        rig.line.mend()
+        rig.pass_time(6.0)
+        assert rig.drive.snapshot.connected
+        assert firmware in str(rig.drive.identity)
+        assert not rig.notes.said('the bus has control')
 
 
-def test_a_drive_that_was_asked_once_is_known_when_it_comes_back_under_control(
-    stack: contextlib.ExitStack,
-) -> None:
-    rig = Rig(stack, '2.03')
-    drive = rig.connect(classic_dialect='')
-    rig.turn()
-    rig.simulator.inject('line-dead', 3600.0)
-    rig.notes.wait_for('lost')
-    told = len([1 for _, text in rig.notes.events if text.startswith('connected')])
-    rig.simulator.inject('heal')
-    wait_until(
-        lambda: len([1 for _, text in rig.notes.events if text.startswith('connected')]) > told
-    )
-    assert '4.38' in str(drive.identity)
-    assert not rig.notes.told('the bus has control')
-
-
-def test_no_control_word_is_asked_of_it(stack: contextlib.ExitStack) -> None:
+def test_no_control_word_is_asked_of_it() -> None:
     with pytest.raises(ValueError, match=r'classic_dialect v5\.0 has no control word'):
         DriveSettings(classic_dialect='v5.0', control_method='drive_control')
 
 
-def test_nothing_at_all_is_asked_that_it_does_not_know(rig: Rig) -> None:
+def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
     # answers are lost for longer than a drive would wait by default
-    drive = rig.driver(telemetry_rate=50.0, drive_timeout=16.0)
-    drive.connect(parameters=True).result(PATIENCE)
-    drive.activate()
-    wait_until(lambda: drive.snapshot.status)
-    assert drive.parameters.values
+    with Older(telemetry_rate=10.0, drive_timeout=16.0, lost_after=5.0) as rig:
+        rig.connect(parameters=True)
+        drive = rig.drive
+        assert drive.parameters.values
 
-    def beside() -> None:
-        """What goes on while nobody commands."""
-        measured, polls = len(rig.notes.telemetry), len(rig.notes.snapshots)
-        wait_until(lambda: len(rig.notes.telemetry) > measured + 8)
-        wait_until(lambda: len(rig.notes.snapshots) > polls + 3)
-        for what in ('drop', 'damage', 'noise', 'double', 'delay'):
-            rig.simulator.inject(what, 3)
-            polls = len(rig.notes.snapshots)
-            wait_until(lambda seen=polls: len(rig.notes.snapshots) > seen + 3)
+        def beside() -> None:
+            """Let all go on that goes on without a command, on a line that is whole and not."""
+            rig.pass_time(1.0)
+            for what in ('drop', 'damage', 'double', 'delay'):
+                for _ in range(3):
+                    rig.line.spoil(what)
+                rig.pass_time(1.5)
 
-    beside()
-    rig.change(accel=0.4)
-    drive.error_log(40).result(PATIENCE)
-    drive.erase_error_log().result(PATIENCE)
-    with pytest.raises(DriveError):
-        drive.reset_energy().result(PATIENCE)
-    rig.simulator.inject('heal')
-    wait_until(lambda: not rig.far.faults and drive.snapshot.status)
-    assert drive.tune(Procedure.CALCULATE).result(PATIENCE).success
-    rig.turn()
-    drive.parameters.refresh().result(PATIENCE)
-    rig.change(accel=0.5)
-    drive.set_drive_timeout(20.0).result(PATIENCE)
-    drive.error_log(40).result(PATIENCE)
-    assert LineError.UNKNOWN not in rig.flags
-    drive.stop().result(PATIENCE)
-    beside()
-    assert not rig.flags, rig.flags
-    rig.simulator.inject('heal')
-    rig.simulator.inject('fault', 5)
-    wait_until(lambda: drive.snapshot.status and drive.snapshot.status.faulted)
-    drive.acknowledge().result(PATIENCE)
-    drive.disconnect(5.0).result(PATIENCE)
-    unasked = LineError.UNKNOWN | LineError.PREFIX | LineError.UNREADABLE | LineError.UNWRITABLE
-    assert not rig.flags & unasked
+        beside()
+        rig.change(accel=0.4)
+        rig.result(drive.error_log(40))
+        rig.result(drive.erase_error_log())
+        with pytest.raises(DriveError):
+            rig.result(drive.reset_energy())
+        assert rig.result(drive.tune(Procedure.CALCULATE)).success
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(1.0)
+        rig.result(drive.parameters.refresh())
+        rig.change(accel=0.5)
+        rig.result(drive.set_drive_timeout(20.0))
+        rig.result(drive.error_log(40))
+        assert LineError.UNKNOWN not in rig.flags
+        rig.send(None)
+        rig.result(drive.stop())
+        beside()
+        assert not rig.flags, rig.flags
+        rig.far.trip(5)
+        rig.pass_time(0.5)
+        rig.acknowledged += 1
+        rig.result(drive.acknowledge())
+        rig.result(drive.disconnect(5.0))
+        unasked = LineError.UNKNOWN | LineError.PREFIX | LineError.UNREADABLE | LineError.UNWRITABLE
+        assert not rig.flags & unasked
