@@ -57,14 +57,15 @@ REFUSALS = {
 FATES = ['obey', *REFUSALS, 'lie', 'ignored', 'keep', 'unheard', 'drop', 'damage', 'double']
 #: Mostly it obeys, so that something is done before it does not; two times it does not.
 TWO = st.lists(
-    st.tuples(st.integers(0, 9), st.sampled_from(FATES)).map(
+    st.tuples(st.integers(0, 9), st.sampled_from(FATES[1:])).map(
         lambda pair: ['obey'] * pair[0] + [pair[1]]
     ),
+    min_size=1,
     max_size=2,
 ).map(lambda lists: list(itertools.chain.from_iterable(lists)))
 #: Sooner or later it hardly ever obeys any more.
 MANY = st.tuples(
-    st.integers(0, 12), st.lists(st.sampled_from([*FATES, *REFUSALS]), min_size=2, max_size=30)
+    st.integers(0, 12), st.lists(st.sampled_from([*FATES, *3 * [*REFUSALS]]), min_size=9, max_size=30)
 ).map(lambda pair: ['obey'] * pair[0] + pair[1])
 
 
@@ -146,7 +147,7 @@ def test_all_new_or_all_old_or_named(way: str, moods: st.SearchStrategy[list[str
         chosen = st.dictionaries(st.sampled_from(keys), st.booleans(), min_size=1)
 
         @settings(max_examples=examples(60))
-        @given(st.lists(st.tuples(chosen, moods), min_size=1, max_size=3))
+        @given(st.lists(st.tuples(chosen, moods), min_size=2, max_size=3))
         def run(sequence: list[tuple[dict[str, bool], list[str]]]) -> None:
             moody.reset()
             for new, fates in sequence:
