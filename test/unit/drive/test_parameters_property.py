@@ -65,7 +65,7 @@ TWO = st.lists(
 ).map(lambda lists: list(itertools.chain.from_iterable(lists)))
 #: Sooner or later it hardly ever obeys any more.
 MANY = st.tuples(
-    st.integers(0, 12), st.lists(st.sampled_from([*FATES, *3 * [*REFUSALS]]), min_size=9, max_size=30)
+    st.integers(0, 12), st.lists(st.sampled_from(FATES + 3 * [*REFUSALS]), min_size=9, max_size=30)
 ).map(lambda pair: ['obey'] * pair[0] + pair[1])
 
 
