@@ -197,6 +197,20 @@ def test_an_enable_waits_until_settings_are_written(rig: Older) -> None:
     rig.enable()
 
 
+def test_control_that_was_stopped_meanwhile_is_not_taken_again(rig: Older) -> None:
+    change = rig.drive.parameters.change({'control.accel': 6.0, 'control.retard': 7.0})
+    rig.wait_until(lambda: rig.far.writes['control.accel'])
+    rig.drive.stop()
+    rig.far.control_unit.press('stop')
+    assert rig.answer(change) == (
+        'control.retard: changing settings was stopped; '
+        'control.accel is NOT put back to 0.3 s: changing settings was stopped'
+    )
+    assert rig.has('accel', 'retard') == [6.0, 0.3]
+    assert rig.modes == [BUS]
+    assert not rig.energised
+
+
 def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Older) -> None:
     # no manual says that MODE = Stop ends it
     take = rig.far.control_unit.take
