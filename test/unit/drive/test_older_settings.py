@@ -314,7 +314,7 @@ def test_no_control_word_is_asked_of_it() -> None:
 
 def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
     # answers are lost for longer than a drive would wait by default
-    with Older(telemetry_rate=10.0, drive_timeout=16.0, lost_after=5.0) as rig:
+    with Older(poll_rate=10.0, drive_timeout=16.0, lost_after=5.0) as rig:
         rig.connect(parameters=True)
         drive = rig.drive
         assert drive.parameters.values
@@ -325,7 +325,7 @@ def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
             for what in ('drop', 'damage', 'double', 'delay'):
                 for _ in range(3):
                     rig.line.spoil(what)
-                rig.pass_time(1.5)
+                rig.pass_time(1.0)
 
         beside()
         rig.change(accel=0.4)
