@@ -12,24 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a set-point is in each control mode, and what happens when the mode changes."""
+"""Set-points: what one is in each control mode, its limits, and the drive's own time-out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import replace
 import math
 
-from drive_rig import PATIENCE
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
 import pytest
+from support.rig import WAYS
+from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import poller as watch_module
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,8 @@ class Quantity:
     :ivar key: where its set-point goes; on the Optimal where it has another place.
     :ivar steps: of the drive in one unit.
     :ivar most: its limit [M2 table 2].
-    :ivar nominal: what the simulated motor is made for; 0: nothing says it.
     :ivar value: a set-point that is soon reached.
+    :ivar nominal: what the simulated motor is made for; 0: nothing says it.
     """
 
     unit: str
@@ -55,57 +53,37 @@ class Quantity:
 
 MODES = {
     'Freque': Quantity(
-        'Hz',
-        'status.frq_set',
-        'fieldbus.input_freq_setpoint',
-        steps=10,
-        most=150,
-        value=20,
-        nominal=50,
+        'Hz', 'status.frq_set', 'fieldbus.input_freq_setpoint', 10, 150, 20, nominal=50,
     ),
     'Speed': Quantity(
-        'rpm',
-        'status.spd_set',
-        'fieldbus.input_speed_setpoint',
-        steps=1,
-        most=9000,
-        value=600,
-        nominal=1440,
+        'rpm', 'status.spd_set', 'fieldbus.input_speed_setpoint', 1, 9000, 600, nominal=1440,
     ),
-    'Torque': Quantity('%', 'status.trq_set', '', steps=1, most=200, value=10, nominal=100),
-    'PI-Reg': Quantity('bar', 'status.reg_set', '', steps=10, most=150, value=40),
+    'Torque': Quantity('%', 'status.trq_set', '', 1, 200, 10, nominal=100),
+    'PI-Reg': Quantity('bar', 'status.reg_set', '', 10, 150, 40),
 }
-WAYS = [
-    *(('sinus_g2', method, mode) for method in ('mode_scmd', 'drive_control') for mode in MODES),
-    ('sinus_optimal', 'mode_scmd', 'Freque'),
-    ('sinus_optimal', 'mode_scmd', 'Speed'),
-]
-every_way = pytest.mark.parametrize(('model', 'method', 'mode'), WAYS, ids=map('-'.join, WAYS))
-
-pytestmark = pytest.mark.usefixtures('hasty')
+BOTH = ['rtu', 'rtu, control word']
+both_methods = pytest.mark.parametrize('way', BOTH)
+every_mode = pytest.mark.parametrize(
+    ('way', 'mode'),
+    [*((way, mode) for way in BOTH for mode in MODES), ('optimal', 'Freque'), ('optimal', 'Speed')],
+)
 
 
-def enabled(make_rig: MakeRig, model: str, method: str, mode: str, **settings: float) -> Rig:
-    """An enabled drive in a control mode; the Optimal is only told which."""
-    optimal = model == 'sinus_optimal'
-    rig = make_rig(
-        model=model,
-        control_method=method,
-        expected_control_mode=mode,
-        parameters={'control.mode': mode, **({} if optimal else {'pi_reg.unit': 'bar'})},
-        **settings,
-    )
+def enabled(way: str, mode: str, **settings: float) -> Rig:
+    """An enabled drive in a control mode; of an Optimal the driver has to be given it."""
+    unit = {} if way == 'optimal' else {'pi_reg.unit': 'bar'}
+    parameters = {'control.mode': mode, **unit}
+    rig = Rig(way, expected_control_mode=mode, parameters=parameters, **settings)
     rig.connect()
-    assert rig.enable().startswith('enabled')
+    rig.enable()
     return rig
 
 
-def written(rig: Rig, mode: str) -> float:
+def in_drive(rig: Rig, mode: str) -> float:
     """What stands in the drive, in the unit of the mode."""
     quantity = MODES[mode]
-    optimal = rig.drive.settings.model == 'sinus_optimal'
-    raw = rig.far.memory.raw(quantity.optimal_key if optimal else quantity.key)
-    return raw / quantity.steps
+    optimal = rig.far.model.name == 'sinus_optimal'
+    return rig.far.memory.raw(quantity.optimal_key if optimal else quantity.key) / quantity.steps
 
 
 def facts(rig: Rig) -> Fact:
@@ -113,183 +91,308 @@ def facts(rig: Rig) -> Fact:
     return Fact(0) if status is None else status.facts
 
 
-@every_way
-def test_unit_sign_and_reached(make_rig: MakeRig, model: str, method: str, mode: str) -> None:
-    rig = enabled(make_rig, model, method, mode)
-    for value in (MODES[mode].value, -MODES[mode].value):
-        follow(rig, mode, value)
+@every_mode
+def test_unit_sign_and_reached(way: str, mode: str) -> None:
+    with enabled(way, mode) as rig:
+        for value in (MODES[mode].value, -MODES[mode].value):
+            # so slow that it is seen on its way
+            rig.far.memory.set('control.accel', 20.0)
+            rig.send(value)
+            rig.pass_time(0.4)
+            assert in_drive(rig, mode) == rig.drive.snapshot.setpoint == value
+            # a torque is there at once, a speed needs its ramp
+            assert (Fact.SETPOINT_REACHED in facts(rig)) == (mode == 'Torque')
+            rig.far.memory.set('control.accel', 0.2)
+            rig.pass_time(2.0)
+            assert Fact.SETPOINT_REACHED in facts(rig)
+            turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
+            assert turns * value > 0
+            # the actual value has the unit of the set-point; the simulated process has no sign
+            actual = abs(value) if mode == 'PI-Reg' else value
+            told = rig.drive.snapshot
+            assert told.actual == pytest.approx(actual, rel=0.07, abs=1.0)
+            assert (told.control_mode, told.unit) == (mode, MODES[mode].unit)
+            assert not told.setpoint_clamped
 
 
-def follow(rig: Rig, mode: str, value: float) -> None:
-    with rig.simulator.lock:
-        # so slow that it is seen on its way
-        rig.far.memory.set('control.accel', 20.0)
-    rig.publish(value)
-    wait_until(lambda: written(rig, mode) == value)
-    wait_until(lambda: rig.drive.snapshot.setpoint == value)
-    rig.next_snapshots(2)
-    if mode != 'Torque':
-        # a torque is there at once, a speed needs its ramp
-        assert Fact.SETPOINT_REACHED not in facts(rig)
-    with rig.simulator.lock:
-        rig.far.memory.set('control.accel', 0.2)
-    wait_until(lambda: Fact.SETPOINT_REACHED in facts(rig))
-    turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
-    assert turns * value > 0
-    # the actual value has the unit of the set-point; the simulated process has no sign
-    actual = abs(value) if mode == 'PI-Reg' else value
-    wait_until(lambda: rig.drive.snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0))
-    told = rig.drive.snapshot
-    assert (told.control_mode, told.unit) == (mode, MODES[mode].unit)
-    assert not told.setpoint_clamped
+def test_a_set_point_is_rounded_to_a_step_of_the_drive() -> None:
+    for mode, value, raw in (('Freque', 12.34, 123), ('Speed', -600.4, -600)):
+        with enabled('rtu', mode) as rig:
+            rig.send(value)
+            rig.pass_time(0.3)
+            assert rig.far.memory.raw(MODES[mode].key) == raw
+            # what is shown is what the drive was given
+            assert rig.drive.snapshot.setpoint == pytest.approx(raw / MODES[mode].steps)
 
 
 @pytest.mark.parametrize('ends', [(0.0, 1000.0), (1000.0, 0.0), (-50.0, 400.0), (0.0, 0.0)])
-def test_a_process_set_point_lies_between_setmin_and_setmax(make_rig: MakeRig, ends) -> None:
+def test_a_process_set_point_lies_between_setmin_and_setmax(ends: tuple[float, float]) -> None:
     # in the unit of the process, such as 400 kPa [C113]
     setmin, setmax = ends
-    rig = make_rig(
-        parameters={
-            'control.mode': 'PI-Reg',
-            'pi_reg.unit': 'kPa',
-            'pi_reg.setmin': setmin,
-            'pi_reg.setmax': setmax,
-        }
-    )
-    rig.connect()
-    rig.enable()
-    low, high = sorted(ends) if setmin != setmax else (-2000.0, 2000.0)
-    for value in (400.0, high + 100.0, low - 100.0):
-        rig.drive.set_setpoint(value)
-        limited = max(low, min(high, value))
-        wait_until(lambda limited=limited: rig.far.memory.number('status.reg_set') == limited)
-        wait_until(
-            lambda value=value, limited=limited: rig.drive.snapshot.setpoint == limited
-            and rig.drive.snapshot.setpoint_clamped == (value != limited)
-        )
+    process = {
+        'control.mode': 'PI-Reg', 'pi_reg.unit': 'kPa',
+        'pi_reg.setmin': setmin, 'pi_reg.setmax': setmax,
+    }
+    with Rig(parameters=process, setpoint_timeout=0.0) as rig:
+        rig.connect()
+        rig.enable()
+        low, high = sorted(ends) if setmin != setmax else (-2000.0, 2000.0)
+        for value in (400.0, high + 100.0, low - 100.0):
+            rig.drive.set_setpoint(value)
+            rig.pass_time(0.3)
+            limited = max(low, min(high, value))
+            assert rig.far.memory.number('status.reg_set') == limited
+            assert rig.drive.snapshot.setpoint == limited
+            assert rig.drive.snapshot.setpoint_clamped == (value != limited)
 
 
-def test_setpoint_max_is_kept_where_it_is_less_than_the_drive_takes(make_rig: MakeRig) -> None:
-    rig = make_rig(
-        parameters={'control.mode': 'PI-Reg', 'pi_reg.setmin': 100.0, 'pi_reg.setmax': 400.0},
-        setpoint_max=50.0,
-    )
-    rig.connect()
-    rig.enable()
-    rig.drive.set_setpoint(80.0)
-    wait_until(lambda: rig.drive.snapshot.setpoint_clamped)
-    assert rig.drive.snapshot.setpoint == 50.0
-
-
-@every_way
-@pytest.mark.parametrize('most', ['nominal', 'less', 'the_drive'])
-def test_limits(make_rig: MakeRig, model: str, method: str, mode: str, most: str) -> None:
-    quantity = MODES[mode]
-    # an Optimal tells no nominal value, and no process has any
-    nominal = quantity.nominal if model == 'sinus_g2' and quantity.nominal else quantity.most
-    limits = {'nominal': nominal, 'less': quantity.value / 2, 'the_drive': quantity.most}
-    limit = limits[most]
-    given = {'nominal': 0.0, 'less': limit, 'the_drive': 2 * limit}[most]
-    rig = enabled(make_rig, model, method, mode, setpoint_max=given)
-    for sign in (1.0, -1.0):
-        rig.publish(sign * 1e6)
-        wait_until(lambda given=sign * limit: rig.drive.snapshot.setpoint == given)
+def test_setpoint_max_is_kept_where_it_is_less_than_the_drive_takes() -> None:
+    process = {'control.mode': 'PI-Reg', 'pi_reg.setmin': 100.0, 'pi_reg.setmax': 400.0}
+    with Rig(parameters=process, setpoint_max=50.0) as rig:
+        rig.connect()
+        rig.enable()
+        rig.send(80.0)
+        rig.pass_time(0.3)
         assert rig.drive.snapshot.setpoint_clamped
-        assert written(rig, mode) == sign * limit
-    rig.publish(limit)
-    wait_until(lambda: rig.drive.snapshot.setpoint == limit)
-    assert not rig.drive.snapshot.setpoint_clamped
-    texts = [text for _, text in rig.notes.events if 'is limited to' in text]
-    assert len(texts) == 1, texts
+        assert rig.drive.snapshot.setpoint == 50.0
+
+
+@every_mode
+def test_limits(way: str, mode: str) -> None:
+    quantity = MODES[mode]
+    # an Optimal tells no nominal value, and no process has any; 400 Hz may have been meant as rpm
+    nominal = quantity.nominal if way != 'optimal' and quantity.nominal else quantity.most
+    less = quantity.value / 2
+    for most, limit in ((0.0, nominal), (less, less), (2 * quantity.most, quantity.most)):
+        with enabled(way, mode, setpoint_max=most) as rig:
+            for wanted in (1e6, -1e30):
+                rig.send(wanted)
+                rig.pass_time(0.4)
+                assert rig.drive.snapshot.setpoint == math.copysign(limit, wanted)
+                assert rig.drive.snapshot.setpoint_clamped
+                assert in_drive(rig, mode) == math.copysign(limit, wanted)
+            rig.send(limit)
+            rig.pass_time(0.3)
+            assert rig.drive.snapshot.setpoint == limit
+            assert not rig.drive.snapshot.setpoint_clamped
+            # said once, not with every message
+            texts = [one.text for one in rig.notes.events if 'is limited to' in one.text]
+            assert len(texts) == 1, texts
+            assert texts[0].startswith(f'set-point 1e+06 is limited to {limit:g}')
+
+
+def test_the_newest_set_point_counts_and_what_is_no_number_is_none() -> None:
+    with enabled('rtu', 'Freque') as rig:
+        for value in (10.0, 30.0, 20.0):
+            rig.drive.set_setpoint(value)
+        for value in (math.nan, math.inf, -math.inf):
+            with pytest.raises(ValueError, match='is no number'):
+                rig.drive.set_setpoint(value)
+        rig.pass_time(0.4)
+        assert rig.drive.snapshot.setpoint == 20.0
+        assert not rig.notes.said(Cause.SETPOINT_LIMITED, Severity.WARNING)
+
+
+def test_neither_a_set_point_from_before_nor_one_in_the_drive_counts() -> None:
+    with Rig(parameters={'status.frq_set': 50.0}) as rig:
+        rig.connect()
+        rig.drive.set_setpoint(30.0)
+        rig.enable()
+        rig.pass_time(0.5)
+        assert rig.far.memory.raw('status.frq_set') == 0 == rig.far.motor.frequency
+        assert rig.drive.snapshot.setpoint == 0.0
+        assert math.isnan(rig.drive.snapshot.setpoint_age)
+
+
+def test_unchanged_set_point_is_written_every_five_seconds() -> None:
+    with Rig() as rig:
+        rig.turn(10.0)
+        before = len(rig.written('status.frq_set'))
+        rig.pass_time(10.0)
+        # it is written all the same, for the drive may have lost it
+        assert len(rig.written('status.frq_set')) - before in (2, 3)
+
+
+def test_set_points_that_stop_coming_are_no_stop() -> None:
+    with Rig(setpoint_timeout=0.3) as rig:
+        rig.turn(10.0)
+        rig.send(None)
+        rig.pass_time(1.5)
+        assert rig.far.motor.frequency == rig.drive.snapshot.setpoint == 0.0
+        text = 'no set-point for 0.3 s: the motor ramps to a stop'
+        assert rig.notes.said(text, Severity.WARNING)
+        # the next one is followed
+        assert rig.drive.armed and rig.far.motor.driven
+        rig.send(8.0)
+        rig.pass_time(1.0)
+        assert rig.far.motor.frequency == pytest.approx(8.0, abs=0.2)
+        assert rig.notes.said(Cause.SETPOINTS_AGAIN, Severity.INFO)
+        # with 0 one is enough, for as long as that is so
+        rig.drive.settings = replace(rig.drive.settings, setpoint_timeout=0.0)
+        rig.send(None)
+        rig.pass_time(8.0)
+        assert rig.far.motor.frequency == pytest.approx(8.0, abs=0.2)
+        rig.drive.settings = replace(rig.drive.settings, setpoint_timeout=0.1)
+        rig.pass_time(1.5)
+        assert rig.far.motor.frequency == 0.0 and rig.drive.armed
 
 
 # --- the control mode changes ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
+@both_methods
 @pytest.mark.parametrize(
     ('before', 'after'),
     [('Freque', 'Speed'), ('Speed', 'Torque'), ('Torque', 'PI-Reg'), ('PI-Reg', 'Freque')],
     ids='-'.join,
 )
-def test_mode_that_is_changed_at_the_keypad_disarms(
-    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch, method: str, before: str, after: str
-) -> None:
-    monkeypatch.setattr(watch_module, '_MODE_PERIOD', 0.02)
-    rig = enabled(make_rig, 'sinus_g2', method, before)
-    rig.publish(MODES[before].value)
-    wait_until(lambda: rig.drive.snapshot.setpoint == MODES[before].value)
-    with rig.simulator.lock:
+def test_mode_that_is_changed_at_the_keypad_disarms(way: str, before: str, after: str) -> None:
+    with enabled(way, before) as rig:
+        rig.send(MODES[before].value)
+        rig.pass_time(1.0)
         rig.far.set_from_keypad('control.mode', after)
         first = len(rig.notes.snapshots)
-    wait_until(lambda: rig.drive.snapshot.control_mode == after)
-    rig.wait_until_still()
-    told = [one for one in rig.notes.snapshots[first:] if one.control_mode == after]
-    # everywhere at once: no set-point of the one mode ever has the unit of the other
-    assert {one.unit for one in told} == {MODES[after].unit}
-    assert not any(one.enabled for one in told)
-    assert all(math.isnan(one.setpoint) for one in told)
-    texts = [text for _, text in rig.notes.events if 'control mode' in text]
-    assert len(texts) == 1
-    assert f'the control mode was changed to {after} at the drive' in texts[0]
-    assert f'set-points are in {MODES[after].unit} now: check what sends them' in texts[0]
-    assert texts[0].endswith('call ~/enable to go on')
-    # what it was enabled for does not hold any more
-    message = rig.refused(rig.drive.enable())
-    assert message.startswith(f'the drive is in control mode {after}, expected is {before}')
+        rig.pass_time(8.0)
+        assert not rig.far.motor.driven
+        told = [one for one in rig.notes.snapshots[first:] if one.control_mode == after]
+        # everywhere at once: no set-point of the one mode ever has the unit of the other
+        assert {one.unit for one in told} == {MODES[after].unit}
+        assert not any(one.enabled for one in told)
+        assert all(math.isnan(one.setpoint) for one in told)
+        (text,) = [one.text for one in rig.notes.events if 'control mode' in one.text]
+        assert f'the control mode was changed to {after} at the drive' in text
+        assert f'set-points are in {MODES[after].unit} now: check what sends them' in text
+        assert text.endswith('call ~/enable to go on')
+        # what it was enabled for does not hold any more
+        message = rig.answer(rig.drive.enable())
+        assert message.startswith(f'the drive is in control mode {after}, expected is {before}')
 
 
-@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
-def test_mode_that_we_change_has_its_unit_at_once(
-    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch, method: str
+@both_methods
+def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        # a motor that is enabled is driven, and a drive changes its mode at standstill only
+        change = {'control.mode': 'Speed'}
+        assert 'control.mode' in rig.answer(rig.drive.parameters.change(change))
+        assert rig.drive.armed
+        rig.answer(rig.drive.stop())
+        rig.pass_time(1.0)
+        frequencies = rig.written('status.frq_set')
+        rig.result(rig.drive.parameters.change(change))
+        rig.pass_time(0.1)
+        assert rig.drive.snapshot.unit == 'rpm'
+        rig.enable()
+        rig.send(300.0)
+        rig.pass_time(0.3)
+        assert in_drive(rig, 'Speed') == 300.0
+        assert rig.written('status.frq_set') == frequencies
+
+
+@both_methods
+def test_mode_that_was_changed_at_a_standstill_is_found_by_enable(way: str) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        rig.answer(rig.drive.stop())
+        rig.send(None)
+        rig.pass_time(1.0)
+        rig.far.memory.set('control.mode', 'Speed')
+        frequencies = rig.written('status.frq_set')
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(0.3)
+        assert rig.far.memory.raw('status.spd_set') == 20
+        assert rig.written('status.frq_set') == frequencies
+
+
+@both_methods
+def test_expected_control_mode_guards_enable(way: str) -> None:
+    # of an Optimal nothing tells it [C58]
+    for mode in MODES:
+        with enabled(way, mode) as rig:
+            rig.answer(rig.drive.stop())
+            other = 'Speed' if mode == 'Freque' else 'Freque'
+            rig.drive.settings = replace(rig.drive.settings, expected_control_mode=other)
+            assert f'expected is {other}' in rig.answer(rig.drive.enable())
+            assert not rig.drive.armed
+
+
+# --- the drive's own time-out ---------------------------------------------------------------------
+
+TOT, STOP = 'serial.sio_tot', 'serial.auto_stop'
+
+
+def timeouts(rig: Rig) -> tuple[int, int]:
+    """SioTot (tenths of a second) and AutoStop in the drive."""
+    return rig.far.memory.raw(TOT), rig.far.memory.raw(STOP)
+
+
+def test_drive_timeout_is_set() -> None:
+    with Rig(drive_timeout=2.5) as rig:
+        rig.connect()
+        assert timeouts(rig) == (25, 1)
+        assert rig.far.writes == {TOT: 1, STOP: 1}
+        assert rig.notes.said('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
+        assert rig.notes.said('serial.auto_stop: false -> true (drive_timeout)')
+        assert not rig.notes.said(Cause.OWN_TIMEOUT_OFF)
+        # parameters live in EEPROM: what is right is not written again
+        assert rig.result(rig.drive.set_drive_timeout(2.5)) == ()
+        (change,) = rig.result(rig.drive.set_drive_timeout(3.0))
+        assert str(change) == 'serial.sio_tot: 2.5 -> 3 s'
+        assert rig.far.writes == {TOT: 2, STOP: 1}
+
+
+def test_drive_timeout_may_be_left_as_it_is() -> None:
+    with Rig(parameters={TOT: 7.0}) as rig:
+        rig.connect()
+        assert rig.result(rig.drive.set_drive_timeout(0.0)) == ()
+        assert timeouts(rig) == (70, 0) and not rig.far.writes
+
+
+def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> None:
+    with Rig(parameters={TOT: 1.2, STOP: True}) as rig:
+        rig.connect()
+        assert rig.notes.said('SioTot 1.2 s) is less than lost_after + 0.5 s', Severity.WARNING)
+        assert rig.notes.said('set drive_timeout, at least 1.5 s', Severity.WARNING)
+
+
+def test_a_drive_timeout_that_is_not_taken_leaves_what_was_there(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(watch_module, '_MODE_PERIOD', 3600.0)
-    rig = make_rig(control_method=method)
-    rig.drive.connect(parameters=True).result(PATIENCE)
-    rig.drive.activate()
-    rig.enable()
-    # a motor that is enabled is driven, and a drive changes its mode at standstill only
-    refusal = rig.refused(rig.drive.parameters.change({'control.mode': 'Speed'}))
-    assert 'control.mode' in refusal
-    assert rig.drive.armed
-    rig.drive.stop().result(PATIENCE)
-    wait_until(lambda: not rig.far.motor.voltage_on)
-    rig.next_snapshots(2)
-    rig.drive.parameters.change({'control.mode': 'Speed'}).result(PATIENCE)
-    before = len(rig.notes.snapshots)
-    wait_until(lambda: rig.drive.snapshot.unit == 'rpm')
-    assert len(rig.notes.snapshots) - before <= 2
-    rig.enable()
-    rig.publish(300.0)
-    wait_until(lambda: written(rig, 'Speed') == 300.0)
-    assert rig.far.memory.raw('status.frq_set') == 0
+    with Rig(parameters={TOT: 7.0}) as rig:
+        rig.connect()
+        rig.spoil('refused', STOP)
+        assert 'exception 4' in rig.answer(rig.drive.set_drive_timeout(2.0))
+        assert timeouts(rig) == (70, 0)
+        store = rig.far._store
+        monkeypatch.setattr(
+            rig.far, '_store', lambda key, raw: store(key, max(raw, 50) if key == TOT else raw)
+        )
+        assert rig.answer(rig.drive.set_drive_timeout(2.0)) == (
+            'serial.sio_tot: the drive keeps 5 s where 2 s was written; it is 7 s as before'
+        )
+        assert timeouts(rig) == (70, 0)
 
 
-@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
-@pytest.mark.parametrize('mode', MODES)
-def test_expected_control_mode_guards_enable(
-    make_rig: MakeRig, method: str, mode: str
-) -> None:
-    # nothing tells that of an Optimal [C58]
-    rig = make_rig(
-        control_method=method, expected_control_mode=mode, parameters={'control.mode': mode}
-    )
-    rig.connect()
-    assert rig.enable().startswith('enabled')
-    rig.drive.stop().result(PATIENCE)
-    other = 'Speed' if mode == 'Freque' else 'Freque'
-    rig.drive.settings = DriveSettings(control_method=method, expected_control_mode=other)
-    assert f'expected is {other}' in rig.refused(rig.drive.enable())
-    assert not rig.drive.armed
+def test_drive_timeout_that_no_manual_allows() -> None:
+    # the register holds up to 6553.5 s; the driver must cope with what it reads
+    with Rig(drive_timeout=2.0) as rig:
+        rig.far.memory.put(TOT, 300)
+        rig.connect()
+        assert timeouts(rig) == (20, 1)
 
 
-def test_newest_set_point_counts(make_rig: MakeRig) -> None:
-    # whoever sends it; which ones are valid the node decides
-    rig = enabled(make_rig, 'sinus_g2', 'mode_scmd', 'Freque')
-    for value in (10.0, 30.0, 20.0):
-        rig.drive.set_setpoint(value)
-    with pytest.raises(ValueError, match='is no number'):
-        rig.drive.set_setpoint(math.nan)
-    rig.wait_for_frequency(20.0)
-    wait_until(lambda: rig.drive.snapshot.setpoint == 20.0)
-    assert not rig.notes.told(Cause.SETPOINT_LIMITED, Severity.WARNING)
+@pytest.mark.parametrize('way', [way for way, one in WAYS.items() if one.model == 'sinus_g2'])
+def test_bus_is_never_silent_for_long(way: str) -> None:
+    if WAYS[way].protocol in ('canopen', 'telegram1'):
+        pytest.skip('its time-out is another')
+    # polls are wanted less often than the drive must hear of us
+    rare = {'poll_rate': 0.1, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
+    with Rig(way, drive_timeout=2.5, **rare) as rig:
+        rig.connect()
+        rig.enable()
+        rig.answer(rig.drive.stop())
+        rig.pass_time(30.0)
+        assert rig.far.control_unit.mode is Mode.BUS
+        assert rig.far.faults.codes == []
