@@ -277,7 +277,8 @@ class ErrorLog:
             latest = self._inverter.bus.now() - max(0.0, age - TICK) * _HOUR
         if not math.isnan(sighted_at):
             at = sighted_at
-        return LogEntry(code, self._inverter.text_of(code), round(then, 1), age, at, latest)
+        text, now_of_bus = self._inverter.text_of(code), self._inverter.bus.now
+        return LogEntry(code, text, round(then, 1), age, at, latest, now=now_of_bus)
 
 
 class ErrorLogMonitor:

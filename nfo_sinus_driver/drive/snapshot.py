@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from dataclasses import field
 from datetime import datetime
 import math
-import time
 from typing import NamedTuple
 from typing import Protocol
 
@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog import InverterStatus
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.events import Event
+from nfo_sinus_driver.link import Clock
 
 NAN = math.nan
 
@@ -125,6 +126,7 @@ class LogEntry:
         to come, or the drive is known to have had power ever since; else NaN.
     :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
     :ivar latest: it cannot have been later, s of the clock of the bus; NaN if there is no age.
+    :ivar now: the clock of the bus.
     """
 
     code: int
@@ -134,13 +136,14 @@ class LogEntry:
     at: float = math.nan
     latest: float = math.nan
     readings: tuple[str, ...] = ()
+    now: Clock = field(default=lambda: NAN, repr=False, compare=False)
 
     @property
     def wall_time(self) -> str:
         """The local time, such as ``2026-11-21 17:02``, or that time ``or before``."""
         if not math.isnan(self.at):
-            return _local(self.at)
-        latest = '' if math.isnan(self.latest) else _local(self.latest)
+            return self._local(self.at)
+        latest = '' if math.isnan(self.latest) else self._local(self.latest)
         return f'{latest} or before' if latest else ''
 
     @property
@@ -157,11 +160,11 @@ class LogEntry:
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
         return f'{self.code} {self.text} at {self.operating_time:.1f} h{age}{wall_time}'
 
-
-def _local(at: float) -> str:
-    try:
-        moment = datetime.fromtimestamp(time.time() - time.monotonic() + at)
-    except (ValueError, OverflowError, OSError):
-        # no calendar goes back so far: the drive tells nonsense
-        return ''
-    return moment.isoformat(' ', 'minutes')
+    def _local(self, at: float) -> str:
+        try:
+            # as the computer has it now: its time may have been set since
+            moment = datetime.fromtimestamp(datetime.now().timestamp() - self.now() + at)
+        except (ValueError, OverflowError, OSError):
+            # no calendar goes back so far: the drive tells nonsense
+            return ''
+        return moment.isoformat(' ', 'minutes')
