@@ -407,9 +407,11 @@ class Rig:
         self.meet = meet
 
     def written(self, key: str, address: int = 1) -> list[int]:
-        """Return what was written to a parameter, each as one number, in order."""
+        """Return what was written to a parameter, each as one number of the drive, in order."""
+        registers = self.drives[address].registers
+        codec = registers.model[key].at(registers.protocol).codec
         return [
-            int.from_bytes(data, 'big')
+            codec.decode(data)
             for unit, asked, data in self.asked
             if unit == address and asked == key and data is not None
         ]
