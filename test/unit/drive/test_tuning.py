@@ -12,379 +12,405 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Tuning through the driver, against the simulated drive's own state."""
+"""Tuning, against the simulated drive's own state."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from concurrent.futures import Future
+import itertools
+from typing import Any
 
-from drive_rig import MODE
-from drive_rig import PATIENCE
-from drive_rig import SCMD
-from drive_rig import MakeRig
-from drive_rig import Notes
-from drive_rig import Rig
-from drive_rig import wait_until
 import pytest
+from support.rig import WAYS
+from support.rig import Rig
 from support.said import said
 
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.simulator.faults import LogEntry
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.simulator import Simulator
 
+MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
+TUNING = 28
 COMMANDS = {
-    Procedure.FULL: (Scmd.FULL_TUNING, '45 TuningOK'),
-    Procedure.BASIC: (Scmd.BASIC_TUNING, '45 TuningOK'),
-    Procedure.STATOR_RESISTANCE: (Scmd.RS_MEASURE, '46 RsMeasOK'),
-    Procedure.CALCULATE: (Scmd.PAR_CALC, '47 ParClcOK'),
+    Procedure.FULL: (Scmd.FULL_TUNING, 45, 'TuningOK'),
+    Procedure.BASIC: (Scmd.BASIC_TUNING, 45, 'TuningOK'),
+    Procedure.STATOR_RESISTANCE: (Scmd.RS_MEASURE, 46, 'RsMeasOK'),
+    Procedure.CALCULATE: (Scmd.PAR_CALC, 47, 'ParClcOK'),
 }
+every_way = pytest.mark.parametrize(
+    'way',
+    [name for name, way in WAYS.items() if (way.model, way.method) == ('sinus_g2', 'mode_scmd')],
+)
 
 
-def begin(rig: Rig, procedure: Procedure = Procedure.FULL):
-    """Have the drive tune, and wait until it does; however slow the machine, it goes on."""
+def begin(rig: Rig, procedure: Procedure = Procedure.FULL) -> Future[Tuned]:
+    """Have the drive tune, and wait until it does."""
     future = rig.drive.tune(procedure)
-    wait_until(lambda: rig.far.control_unit.status_code == 28)
-    lasts(rig, 3600.0)
+    rig.wait_until(lambda: rig.far.control_unit.status_code == TUNING)
     return future
 
 
-def lasts(rig: Rig, seconds: float) -> None:
-    """Have a procedure that goes on be over after so long from now."""
-    with rig.simulator.lock:
-        if rig.far.control_unit.tuning is not None:
-            rig.far.control_unit.tuning.left = seconds
+def mode_at_rest(rig: Rig) -> Mode:
+    """Where control is when the bus has none: a CANopen module holds it."""
+    return Mode.BUS if rig.way.protocol == 'canopen' else Mode.STOP
 
 
-def finish(rig: Rig, future) -> Tuned:
-    """Let the time of a procedure go by, and return how it ended."""
-    lasts(rig, 0.0)
-    return future.result(PATIENCE)
-
-
-def mode(rig: Rig) -> int:
-    with rig.simulator.lock:
-        return rig.far.control_unit.mode
-
-
-@pytest.mark.parametrize('procedure', COMMANDS)
-def test_each_procedure_is_done_and_what_it_changed_is_told(rig: Rig, procedure) -> None:
-    rig.connect()
-    before = {key: rig.far.peek(key) for key in rig.far.settings}
-    result = finish(rig, begin(rig, procedure))
-    command, shown = COMMANDS[procedure]
-    assert result.success
-    assert shown in said(result.how)
-    assert int(command) in rig.writes(SCMD)
-    after = {key: rig.far.peek(key) for key in rig.far.settings}
-    changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
-    assert changed
-    assert {change.key: (change.old, change.new) for change in result.changes} == changed
-    assert str(result.changes[0]) in said(result)
-
-
-def use_variant(rig: Rig, **fields: str) -> None:
-    with rig.simulator.lock:
-        rig.far.control_unit.variant = replace(rig.far.control_unit.variant, **fields)
+@every_way
+def test_each_procedure_is_done_and_what_it_changed_is_reported(way: str) -> None:
+    # the long ones once
+    for procedure in COMMANDS if way == 'rtu' else list(COMMANDS)[2:]:
+        command, code, text = COMMANDS[procedure]
+        with Rig(way, poll_rate=5.0) as rig:
+            rig.connect()
+            news: list[tuple[Snapshot, float]] = []
+            before = {key: rig.far.peek(key) for key in rig.far.settings}
+            future = rig.drive.tune(procedure, lambda *told, news=news: news.append(told))
+            result = rig.result(future)
+            assert result.success and f'{code} {text}' in said(result.how)
+            written = rig.written(SCMD)
+            assert written[written.index(command) - 1] == Scmd.STOP
+            after = {key: rig.far.peek(key) for key in rig.far.settings}
+            changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
+            assert changed
+            assert {one.key: (one.old, one.new) for one in result.changes} == changed
+            assert str(result.changes[0]) in said(result)
+            # every stage, as the drive says
+            codes = list(dict.fromkeys(told.status.code for told, _ in news if told.status))
+            assert codes[-1] == code and news[-1][0].text == text
+            assert TUNING in codes or procedure is Procedure.CALCULATE
+            times = [elapsed for _, elapsed in news]
+            assert times == sorted(times)
+            assert rig.far.control_unit.mode == mode_at_rest(rig)
+            assert not rig.far.faults
 
 
 @pytest.mark.parametrize('procedure', COMMANDS)
 def test_standby_after_a_tuning_is_success_where_something_was_measured(
-    rig: Rig, procedure
+    procedure: Procedure,
 ) -> None:
-    use_variant(rig, tuning_ends_in='standby')
-    rig.connect()
-    result = finish(rig, begin(rig, procedure))
-    assert result.success and '37' in said(result.how)
-    assert result.changes
-    # the same again changes nothing, and standby may have come by a lost RUN input
-    shown: list[int] = []
-    future = rig.drive.tune(procedure, lambda now, _: shown.append(now.status.code))
-    wait_until(lambda: 28 in shown)
-    again = finish(rig, future)
-    assert again.success == (procedure is Procedure.CALCULATE), said(again.report)
+    with Rig(options={'tuning_ends_in': 'standby'}) as rig:
+        rig.connect()
+        result = rig.result(rig.drive.tune(procedure))
+        assert result.success and '37' in said(result.how)
+        assert result.changes
+        # the same again changes nothing, and standby may have come by a lost RUN input
+        again = rig.result(rig.drive.tune(procedure))
+        assert again.success == (procedure is Procedure.CALCULATE), said(again.report)
 
 
-@pytest.mark.parametrize('end', ['stop', 'RUN input', 'fault'])
-def test_a_tuning_that_was_ended_by_something_else_is_no_success(rig: Rig, end: str) -> None:
-    use_variant(rig, tuning_ends_in='standby')
-    rig.connect()
-    future = begin(rig)
-    with rig.simulator.lock:
-        if end == 'stop':
-            rig.far.control_unit.press('stop')
-        elif end == 'RUN input':
-            rig.far.set_run_input(False)
+ENDS: dict[str, tuple[Callable[[Rig], object], str]] = {
+    'STOP key': (lambda rig: rig.far.control_unit.press('stop'), '24 Stop'),
+    'RUN input': (lambda rig: rig.far.set_run_input(False), 'has changed no parameter'),
+    'fault': (lambda rig: rig.far.trip(12), 'fault_ack'),
+}
+
+
+@pytest.mark.parametrize('end', ENDS)
+@pytest.mark.parametrize('ends_in', ['code', 'standby'])
+def test_a_tuning_that_was_ended_by_something_else_is_no_success(end: str, ends_in: str) -> None:
+    with Rig(options={'tuning_ends_in': ends_in}) as rig:
+        rig.connect()
+        future = begin(rig)
+        rig.pass_time(0.5)
+        act, text = ENDS[end]
+        act(rig)
+        result = rig.result(future)
+        assert not result.success and text in said(result.how)
+        assert rig.far.faults or rig.far.control_unit.mode == Mode.STOP
+
+
+def test_control_is_given_back_as_it_was_found() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.far.write_raw(MODE, Mode.BUS)
+        assert rig.result(rig.drive.tune(Procedure.CALCULATE)).success
+        assert rig.far.control_unit.mode == Mode.BUS
+        # and nothing stands that would keep the motor from being enabled
+        assert rig.far.control_unit.status_code == 37
+        rig.enable()
+
+
+def test_mode_inhibit_is_no_take_over_and_the_status_flows() -> None:
+    with Rig() as rig:
+        rig.connect()
+        future = begin(rig)
+        assert rig.far.control_unit.mode == Mode.INHIBIT
+        rig.pass_time(2.0)
+        assert rig.drive.snapshot.text == 'Tuning'
+        assert not future.done()
+        assert not rig.notes.said('stopped') and not rig.drive.stop_unconfirmed
+        # the run command was not taken back behind the tuning
+        assert rig.written(SCMD)[-1] == Scmd.FULL_TUNING
+        assert rig.result(future).success
+
+
+def test_the_parameters_are_known_anew_and_not_changed_meanwhile() -> None:
+    with Rig() as rig:
+        rig.connect(parameters=True)
+        old = rig.drive.parameters.values['motor.r_stat']
+        rig.notes.parameters.clear()
+        future = begin(rig, Procedure.STATOR_RESISTANCE)
+        message = rig.answer(rig.drive.parameters.change({'control.accel': 7.0}))
+        assert 'the drive is tuning' in message
+        result = rig.result(future)
+        new = rig.drive.parameters.values['motor.r_stat']
+        assert [(one.key, one.old, one.new) for one in result.changes] == [
+            ('motor.r_stat', old, new)
+        ]
+        assert new == rig.far.peek('motor.r_stat') != old
+        assert 'motor.r_stat' in rig.notes.parameters
+        # said once, as the result, and not as a change by others
+        assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
+        rig.result(rig.drive.parameters.change({'control.accel': 7.0}))
+
+
+@every_way
+def test_a_failure_is_said_in_the_words_of_the_drive(way: str) -> None:
+    with Rig(way, poll_rate=5.0) as rig:
+        rig.connect()
+        for code, text in ((16, '16 TunFailP'), (17, '17 TunFailM')):
+            rig.far.control_unit.fail_tuning(code)
+            result = rig.result(rig.drive.tune(Procedure.STATOR_RESISTANCE))
+            assert not result.success and result.changes == ()
+            assert text in said(result.how) and 'fault_ack' in said(result.how)
+            # the fault keeps the next one from beginning, until it is acknowledged
+            assert f'{text} is active' in rig.answer(rig.drive.tune(Procedure.FULL))
+            rig.acknowledged += 1
+            assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {text}'
+        assert rig.result(rig.drive.tune(Procedure.CALCULATE)).success
+
+
+@every_way
+def test_cancelling_stops_it(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        future = begin(rig)
+        rig.answer(rig.drive.cancel_tuning())
+        assert rig.far.control_unit.tuning is None
+        result = rig.result(future)
+        assert not result.success and 'was stopped' in said(result.how)
+        assert rig.far.control_unit.mode == mode_at_rest(rig)
+        # with nothing to cancel, nothing happens: not even to a motor that runs
+        rig.enable()
+        rig.answer(rig.drive.cancel_tuning())
+        assert rig.drive.armed
+
+
+@pytest.mark.parametrize('out', ['stop', 'quick_stop', 'deactivate', 'disconnect'])
+def test_every_way_out_ends_it(out: str) -> None:
+    with Rig() as rig:
+        rig.connect()
+        future = begin(rig)
+        if out == 'quick_stop':
+            # MODE cannot be written meanwhile, so it ends as an ordinary stop does
+            assert 'NOT confirmed' in rig.answer(rig.drive.quick_stop())
         else:
-            rig.far.trip(12)
-    assert not future.result(PATIENCE).success
+            given = (1.0,) if out == 'disconnect' else ()
+            rig.answer(getattr(rig.drive, out)(*given))
+        rig.pass_time(1.0)
+        assert rig.far.control_unit.tuning is None and not rig.far.motor.driven
+        assert future.done()
 
 
-def test_control_is_given_back_as_it_was_found(rig: Rig) -> None:
-    rig.connect()
-    assert finish(rig, begin(rig, Procedure.CALCULATE)).success
-    assert mode(rig) == 1
-    with rig.simulator.lock:
-        rig.far.write_raw('fieldbus.mode', 3)
-    assert finish(rig, begin(rig, Procedure.CALCULATE)).success
-    assert mode(rig) == 3
-    # and nothing stands that would keep the motor from being enabled
-    assert rig.far.control_unit.status_code == 37
-    rig.enable()
+def test_a_drive_that_takes_no_stop_meanwhile_is_reported() -> None:
+    with Rig() as rig:
+        rig.connect()
+        future = begin(rig)
+        rig.spoil('refused', SCMD, times=9999)
+        message = rig.answer(rig.drive.stop())
+        assert 'NOT confirmed' in message and '28 Tuning' in message
+        assert rig.drive.stop_unconfirmed
+        rig.answer(future)
+        rig.spoil('', SCMD, times=0)
+        rig.pass_time(3.0)
+        assert not rig.drive.stop_unconfirmed
 
 
-def test_mode_inhibit_is_nobody_elses_take_over_and_the_status_flows(rig: Rig) -> None:
-    rig.connect()
-    future = begin(rig)
-    assert mode(rig) == 0
-    wait_until(lambda: rig.drive.snapshot.text == 'Tuning')
-    rig.next_snapshots(10)
-    assert not future.done()
-    assert not rig.notes.told('stopped')
-    assert not rig.drive.stop_unconfirmed
-    # the run command was not taken back behind the tuning
-    assert rig.writes(SCMD)[-1] == Scmd.FULL_TUNING
-    assert finish(rig, future).success
+def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back() -> None:
+    with Rig() as rig:
+        rig.connect()
+        future = begin(rig)
+        rig.far.control_unit.tuning.left = 3600.0
+        rig.line.state = 'silent'
+        assert 'did not answer' in rig.answer(future)
+        rig.pass_time(3.0)
+        assert not rig.drive.snapshot.connected
+        assert rig.far.control_unit.status_code == TUNING
+        rig.line.mend()
+        rig.pass_time(8.0)
+        assert rig.far.control_unit.status_code != TUNING
+        assert not rig.drive.stop_unconfirmed and not rig.drive.armed
 
 
-def test_the_parameters_are_known_anew(rig: Rig) -> None:
-    rig.drive.connect(parameters=True).result(PATIENCE)
-    rig.drive.activate()
-    old = rig.drive.parameters.values['motor.r_stat']
-    rig.notes.news.clear()
-    result = finish(rig, begin(rig, Procedure.STATOR_RESISTANCE))
-    new = rig.drive.parameters.values['motor.r_stat']
-    assert [(one.key, one.old, one.new) for one in result.changes] == [('motor.r_stat', old, new)]
-    assert new == rig.far.peek('motor.r_stat') != old
-    assert 'motor.r_stat' in rig.notes.news
-    # told once, as the result, and not as a change by somebody else
-    assert not rig.notes.told(Cause.CHANGED_AT_DRIVE)
+def test_not_two_at_a_time() -> None:
+    with Rig() as rig:
+        rig.connect()
+        future = begin(rig)
+        assert 'is going on already' in rig.answer(rig.drive.tune(Procedure.BASIC))
+        assert 'is going on already' in rig.answer(rig.drive.erase_error_log())
+        assert 'is going on' in rig.answer(rig.drive.enable())
+        assert rig.result(future).success
 
 
-def test_parameters_are_not_changed_meanwhile(rig: Rig) -> None:
-    rig.drive.connect(parameters=True).result(PATIENCE)
-    rig.drive.activate()
-    future = begin(rig)
-    message = rig.refused(rig.drive.parameters.change({'control.accel': 7.0}))
-    assert 'the drive is tuning' in message
-    assert finish(rig, future).success
-    rig.drive.parameters.change({'control.accel': 7.0}).result(PATIENCE)
-
-
-@pytest.mark.parametrize(('code', 'text'), [(16, '16 TunFailP'), (17, '17 TunFailM')])
-def test_a_failure_is_told_in_the_words_of_the_drive(rig: Rig, code: int, text: str) -> None:
-    rig.connect()
-    rig.simulator.inject('tuning-fails', code)
-    result = finish(rig, begin(rig))
-    assert not result.success
-    assert text in said(result.how) and 'fault_ack' in said(result.how)
-    assert result.changes == ()
-    # the fault keeps the next one from beginning, until somebody acknowledges it
-    assert text in rig.refused(rig.drive.tune(Procedure.FULL))
-    rig.acknowledged += 1
-    rig.drive.acknowledge().result(PATIENCE)
-    wait_until(lambda: not rig.drive.stop_unconfirmed)
-    assert finish(rig, begin(rig)).success
-
-
-def test_cancelling_stops_it(rig: Rig) -> None:
-    rig.connect()
-    future = begin(rig)
-    rig.drive.cancel_tuning().result(PATIENCE)
-    assert rig.far.control_unit.status_code != 28
-    result = future.result(PATIENCE)
-    assert not result.success
-    assert 'was stopped' in said(result.how)
-    assert mode(rig) == 1
-    # with nothing to cancel, nothing happens: not even to a motor that runs
+def turns_and_stops(rig: Rig) -> None:
+    rig.far.memory.set('control.retard', 60.0)
     rig.turn()
-    rig.drive.cancel_tuning().result(PATIENCE)
-    assert rig.drive.armed
+    rig.send(None)
+    rig.answer(rig.drive.stop())
 
 
-@pytest.mark.parametrize('way', ['stop', 'quick_stop', 'deactivate', 'disconnect'])
-def test_every_way_out_ends_it(rig: Rig, way: str) -> None:
-    rig.connect()
-    future = begin(rig)
-    if way == 'quick_stop':
-        # MODE cannot be written meanwhile, so it ends as an ordinary stop does
-        assert 'NOT confirmed' in rig.answer(rig.drive.quick_stop())
-    else:
-        rig.answer(rig.drive.disconnect(1.0) if way == 'disconnect' else getattr(rig.drive, way)())
-    wait_until(lambda: rig.far.control_unit.status_code != 28)
-    rig.answer(future)
-    assert rig.far.control_unit.tuning is None
-    assert not rig.far.motor.driven
+def run_by_keypad(rig: Rig) -> None:
+    rig.far.control_unit.press('start')
 
 
-def test_a_drive_that_takes_no_stop_meanwhile_is_told_of(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write = rig.far.control_unit._write_scmd
-
-    def stubborn(raw: int) -> None:
-        if rig.far.control_unit.tuning is not None:
-            raise Refused(Reason.STATE, 'tuning')
-        write(raw)
-
-    monkeypatch.setattr(rig.far.control_unit, '_write_scmd', stubborn)
-    rig.connect()
-    future = begin(rig)
-    message = rig.refused(rig.drive.stop())
-    assert 'NOT confirmed' in message and '28 Tuning' in message
-    assert rig.drive.stop_unconfirmed
-    lasts(rig, 0.0)
-    rig.answer(future)
-    wait_until(lambda: not rig.drive.stop_unconfirmed)
+def terminals(rig: Rig) -> None:
+    rig.far.set_run_input(False)
+    rig.far.control_unit.press('ext')
 
 
-def test_the_keypad_ends_it(rig: Rig) -> None:
-    rig.connect()
-    future = begin(rig)
-    with rig.simulator.lock:
-        rig.far.control_unit.press('stop')
-    result = future.result(PATIENCE)
-    assert not result.success and '24 Stop' in said(result.how)
-    assert mode(rig) == 1
+REFUSED: dict[str, tuple[Callable[[Rig], object], str]] = {
+    'enabled': (Rig.enable, 'the motor is enabled'),
+    'ramps down': (turns_and_stops, 'the motor runs'),
+    'run by the keypad': (run_by_keypad, 'the motor runs'),
+    'fault': (lambda rig: rig.far.trip(5), 'fault 5 Overload is active'),
+    'terminals': (terminals, 'press STOP at the drive first'),
+    'no motor data': (
+        lambda rig: rig.far.memory.put('motor.n_nom', 0),
+        'motor.n_nom: set it as the motor plate says',
+    ),
+    'not active': (lambda rig: rig.answer(rig.drive.deactivate()), 'not active'),
+}
 
 
-def test_without_the_run_input_it_does_not_begin(make_rig: MakeRig) -> None:
-    rig = make_rig(run_input=False)
-    rig.connect()
-    result = rig.drive.tune(Procedure.FULL).result(PATIENCE)
-    assert not result.success and 'RUN input' in said(result.how)
-    assert mode(rig) == 1
+@pytest.mark.parametrize('state', REFUSED)
+def test_refused(state: str) -> None:
+    with Rig() as rig:
+        rig.connect()
+        lead, text = REFUSED[state]
+        lead(rig)
+        driven = rig.far.motor.driven, rig.drive.armed
+        assert text in rig.answer(rig.drive.tune(Procedure.FULL))
+        assert (rig.far.motor.driven, rig.drive.armed) == driven
+        assert Scmd.FULL_TUNING not in rig.written(SCMD)
+        assert not rig.far.control_unit.tuning
 
 
-def test_the_run_input_lost_ends_it(rig: Rig) -> None:
-    rig.connect()
-    future = begin(rig)
-    rig.next_snapshots(20)
-    with rig.simulator.lock:
-        rig.far.set_run_input(False)
-    result = future.result(PATIENCE)
-    assert not result.success and 'has changed no parameter' in said(result.how)
+def test_without_the_run_input_it_does_not_begin() -> None:
+    with Rig(options={'run_input': False}) as rig:
+        rig.connect()
+        result = rig.result(rig.drive.tune(Procedure.FULL))
+        assert not result.success and 'RUN input' in said(result.how)
+        assert rig.far.control_unit.mode == Mode.STOP
 
 
-def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back(
-    make_rig: MakeRig, hasty: None
-) -> None:
-    rig = make_rig(retries=0)
-    rig.connect()
-    future = begin(rig)
-    rig.set_response_timeout(0.02)
-    rig.simulator.inject('silence', 3600.0)
-    assert 'did not answer' in rig.refused(future)
-    wait_until(lambda: not rig.drive.snapshot.connected)
-    rig.set_response_timeout(2.0)
-    with rig.simulator.lock:
-        assert rig.far.control_unit.status_code == 28, 'it should still be at it'
-        rig.far._silent_left = 0.0
-    wait_until(lambda: rig.far.control_unit.status_code != 28 and not rig.drive.stop_unconfirmed)
-    assert not rig.drive.armed
+def test_refused_where_there_is_no_such_command() -> None:
+    for way, settings, reason in (
+        ('rtu', {'control_method': 'monitor'}, 'only reads'),
+        ('rtu, control word', {}, 'does not mix control methods'),
+        ('optimal', {}, 'is not known of this model'),
+    ):
+        with Rig(way, **settings) as rig:
+            rig.connect()
+            for command in (
+                rig.drive.tune(Procedure.FULL), rig.drive.reset_energy(),
+                rig.drive.erase_error_log(),
+            ):
+                assert reason in rig.answer(command)
 
 
-def test_not_two_at_a_time(rig: Rig) -> None:
-    rig.connect()
-    future = begin(rig)
-    assert 'is going on already' in rig.refused(rig.drive.tune(Procedure.BASIC))
-    assert 'is going on already' in rig.refused(rig.drive.erase_error_log())
-    assert 'is going on' in rig.refused(rig.drive.enable())
-    assert finish(rig, future).success
+# --- while it is being prepared -------------------------------------------------------------------
+
+STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
+    'stop': lambda drive: drive.stop(),
+    'cancel': lambda drive: drive.cancel_tuning(),
+    'deactivate': lambda drive: drive.deactivate(),
+    'for good': lambda drive: drive.stop_for_good(2.0),
+}
 
 
-def test_refused_while_the_motor_is_enabled(rig: Rig) -> None:
-    rig.turn()
-    assert 'the motor is enabled' in rig.refused(rig.drive.tune(Procedure.FULL))
-    assert rig.drive.armed
-    assert Scmd.FULL_TUNING not in rig.writes(SCMD)
+def tuned_until_stopped(stop: str, moment: int) -> bool:
+    """Have a drive tune, and stop it at so many requests; tell whether it had begun by then."""
+    requests = itertools.count()
+    stops: list[Future[Any]] = []
+    begun = False
+
+    def act(key: str, data: bytes | None) -> None:
+        nonlocal begun
+        begun = begun or (key, data) == (SCMD, Scmd.FULL_TUNING.to_bytes(2, 'big'))
+        if next(requests) == moment:
+            stops.append(STOPS[stop](rig.drive))
+
+    with Rig(poll_rate=1.0, telemetry_rate=0.0) as rig:
+        rig.result(rig.drive.connect())
+        rig.drive.activate()
+        rig.meet = act
+        tuning = rig.drive.tune(Procedure.FULL)
+        rig.wait_until(lambda: stops)
+        had_begun = begun
+        rig.answer(stops[0])
+        rig.pass_time(0.5)
+        # what only waits for the line by then is kept off it
+        assert rig.written(SCMD).count(Scmd.FULL_TUNING) == had_begun
+        assert 'stopped' in rig.answer(tuning, 0.1)
+        assert rig.far.control_unit.status_code != TUNING
+    return had_begun
 
 
-def test_refused_while_the_motor_ramps_down(make_rig: MakeRig) -> None:
-    rig = make_rig(parameters={'control.retard': 60.0, 'control.st_mode': 'Brake'})
-    rig.turn()
-    rig.drive.stop().result(PATIENCE)
-    message = rig.refused(rig.drive.tune(Procedure.FULL))
-    assert 'the motor runs' in message, message
+@pytest.mark.parametrize('stop', STOPS)
+def test_a_stop_at_any_moment_of_the_preparation_ends_the_tuning(stop: str) -> None:
+    moment = 0
+    while not tuned_until_stopped(stop, moment):
+        moment += 1
+    assert moment > 10
 
 
-def test_refused_while_a_fault_stands(rig: Rig) -> None:
-    rig.connect()
-    rig.simulator.inject('fault', 5)
-    assert 'fault 5 Overload is active' in rig.refused(rig.drive.tune(Procedure.FULL))
+def busy_to_calculate(rig: Rig, times: int) -> list[float]:
+    """Have the drive be too busy to calculate, so many times; return when it was."""
+    busy: list[float] = []
+
+    def meet(key: str, data: bytes | None) -> str | None:
+        wanted = (key, data) == (SCMD, Scmd.PAR_CALC.to_bytes(2, 'big'))
+        if not wanted or len(busy) == times:
+            return None
+        busy.append(rig.clock.now)
+        return 'busy'
+
+    rig.meet = meet
+    return busy
 
 
-def test_refused_while_the_terminals_have_control(rig: Rig) -> None:
-    rig.connect()
-    with rig.simulator.lock:
-        rig.far.set_run_input(False)
-        rig.far.control_unit.press('ext')
-    assert 'press STOP at the drive first' in rig.refused(rig.drive.tune(Procedure.FULL))
-    assert rig.writes(MODE) == []
+def test_a_busy_drive_is_asked_again_to_tune() -> None:
+    with Rig() as rig:
+        rig.connect()
+        busy = busy_to_calculate(rig, 4)
+        assert '47 ParClcOK' in rig.answer(rig.drive.tune(Procedure.CALCULATE))
+        assert len(busy) == 4
+        assert rig.written(SCMD).count(Scmd.PAR_CALC) == 5
 
 
-def test_refused_without_motor_data(rig: Rig) -> None:
-    rig.connect()
-    with rig.simulator.lock:
-        rig.far.memory.put('motor.n_nom', 0)
-    assert 'motor.n_nom' in rig.refused(rig.drive.tune(Procedure.FULL))
-    assert rig.writes(MODE) == []
+def test_a_drive_that_stays_busy_does_not_tune() -> None:
+    with Rig() as rig:
+        rig.connect()
+        busy = busy_to_calculate(rig, 10_000)
+        assert 'the drive is busy' in rig.answer(rig.drive.tune(Procedure.CALCULATE))
+        assert 0.4 < busy[-1] - busy[0] < 0.6
+        # a line that others need, too, is not filled by it
+        assert len(busy) < 15
+        assert not rig.drive.stop_unconfirmed
 
 
-def test_refused_while_not_active(rig: Rig) -> None:
-    rig.drive.connect().result(PATIENCE)
-    assert 'not active' in rig.refused(rig.drive.tune(Procedure.FULL))
-
-
-@pytest.mark.parametrize(
-    ('settings', 'reason'),
-    [
-        ({'control_method': 'monitor'}, 'only reads'),
-        ({'control_method': 'drive_control'}, 'does not mix control methods'),
-        ({'model': 'sinus_optimal'}, 'not known of this model'),
-    ],
-)
-def test_refused_where_there_is_no_such_command(make_rig: MakeRig, settings, reason) -> None:
-    rig = make_rig(**settings)
-    rig.connect()
-    assert reason in rig.refused(rig.drive.tune(Procedure.FULL))
-    assert reason in rig.refused(rig.drive.reset_energy())
-    assert reason in rig.refused(rig.drive.erase_error_log())
-
-
-@pytest.mark.parametrize('dialect', ['2.03', '5.0'])
-def test_over_classic(dialect: str) -> None:
-    simulator = Simulator(protocol='classic', dialect=dialect, boot_time=0.2)
-    line = line_settings('classic', baud_rate=9600, response_timeout=2.0)
-    settings = DriveSettings(classic_dialect=f'v{dialect}')
-    with simulator:
-        bus = Bus(open_link('classic', simulator.port, line))
-        bus.start()
-        try:
-            drive = Drive(bus, settings, Notes())
-            drive.connect().result(PATIENCE)
-            drive.activate()
-            with simulator.lock:
-                simulator.drives[1].faults.log[:] = [LogEntry(5, 1200.0 - n) for n in range(40)]
-            entries = drive.error_log(40).result(PATIENCE)
-            assert len(entries) == (40 if dialect == '5.0' else 32)
-            assert entries[0].operating_time == 1200.0
-            assert entries[0].age == pytest.approx(34.5, abs=0.2)
-            assert said(drive.erase_error_log().result(PATIENCE))
-            tuned = drive.tune(Procedure.CALCULATE).result(PATIENCE)
-            assert tuned.success and '47 ParClcOK' in said(tuned.how)
-            assert tuned.changes
-            assert simulator.drives[1].control_unit.mode == 1
-            assert not simulator.drives[1].faults
-        finally:
-            bus.close()
+def test_a_drive_that_was_busy_is_not_asked_to_tune_after_a_stop() -> None:
+    with Rig() as rig:
+        rig.connect()
+        busy = busy_to_calculate(rig, 2)
+        tuning = rig.drive.tune(Procedure.CALCULATE)
+        rig.wait_until(lambda: busy)
+        before = len(busy)
+        rig.answer(rig.drive.stop())
+        assert 'was stopped' in rig.answer(tuning)
+        assert len(busy) == rig.written(SCMD).count(Scmd.PAR_CALC) == before
