@@ -12,167 +12,411 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""The error log and the kWh counter, against the simulated drive's own."""
+"""The error log and the kWh counter: read, watched, erased, reset; and when an entry came."""
 
 from __future__ import annotations
 
+from datetime import datetime
+from datetime import timedelta
 import math
 
-from drive_rig import MODE
-from drive_rig import PATIENCE
-from drive_rig import SCMD
-from drive_rig import MakeRig
-from drive_rig import Rig
+from hypothesis import given
+from hypothesis import strategies as st
 import pytest
-from support.said import said
+from support.addresses import packed
+from support.rig import WAYS
+from support.rig import Rig
 
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive.error_log import OperatingClock
+from nfo_sinus_driver.families.sinus_g2.words import Mode
+from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Reply
 from nfo_sinus_driver.simulator.faults import LogEntry
+
+#: What a request for an entry of the log is called: it is no parameter.
+LOG = ''
+#: Where the drive's hours begin.
+HOURS = 1234.5
+#: How long it may take until an entry is found that no fault announced, s.
+SEEN = 31.0
+G2 = [name for name, way in WAYS.items() if (way.model, way.method) == ('sinus_g2', 'mode_scmd')]
+#: A drive that is looked at without a hurry: the tests are about minutes.
+RARELY = {'poll_rate': 2.0, 'telemetry_rate': 0.0}
 
 
 def fill(rig: Rig, count: int) -> None:
     """Put entries into the drive's log, the newest first, one an hour."""
-    with rig.simulator.lock:
-        rig.far.faults.log[:] = [LogEntry(1 + n % 12, 1234.0 - n) for n in range(count)]
+    rig.far.faults.log[:] = [LogEntry(1 + n % 12, 1234.0 - n) for n in range(count)]
+    del rig.far.faults.log[rig.far.faults.log_size :]
 
 
-def test_an_empty_log(rig: Rig) -> None:
-    rig.connect()
-    assert rig.drive.error_log().result(PATIENCE) == ()
+def trip_unseen(rig: Rig, *codes: int) -> None:
+    """Have faults come, and go at once as if they were acknowledged between two polls."""
+    for code in codes:
+        rig.far.trip(code)
+    rig.far.faults.acknowledge()
+    rig.far._settle()
 
 
-@pytest.mark.parametrize('count', [1, 3, 32])
-def test_newest_first_with_text_and_age(rig: Rig, count: int) -> None:
-    rig.connect()
-    fill(rig, count)
-    entries = rig.drive.error_log().result(PATIENCE)
-    assert [entry.code for entry in entries] == [1 + n % 12 for n in range(count)]
-    assert [entry.operating_time for entry in entries] == [1234.0 - n for n in range(count)]
-    assert entries[0].text == 'Par Fail'
-    # the drive's hours begin at 1234.5
-    assert [entry.age for entry in entries] == pytest.approx(
-        [0.5 + n for n in range(count)], abs=0.1
-    )
+def asked(rig: Rig) -> list[str]:
+    return [key for _, key, _ in rig.asked]
 
 
-def test_as_many_as_wanted(rig: Rig) -> None:
-    rig.connect()
-    fill(rig, 10)
-    assert len(rig.drive.error_log(4).result(PATIENCE)) == 4
-    fill(rig, 32)
-    assert len(rig.drive.error_log(1000).result(PATIENCE)) == 32
+def is_written(rig: Rig) -> bool:
+    return any(data is not None for _, _, data in rig.asked)
 
 
-def test_an_entry_that_comes_in_meanwhile(rig: Rig) -> None:
-    rig.connect()
-    fill(rig, 5)
+# --- read and erased ------------------------------------------------------------------------------
 
-    def trip(register: int, words) -> None:
-        if register == 0xC000 + 4 * 3:
-            rig.tap.before = lambda register, words: None
-            with rig.simulator.lock:
+
+@pytest.mark.parametrize('way', G2)
+def test_newest_first_with_text_and_age(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        assert rig.result(rig.drive.error_log()) == ()
+        for count in (3, 130):
+            fill(rig, count)
+            entries = rig.result(rig.drive.error_log())
+            length = min(count, 32)
+            assert [one.code for one in entries] == [1 + n % 12 for n in range(length)]
+            assert [one.operating_time for one in entries] == [1234.0 - n for n in range(length)]
+            assert entries[0].text == 'Par Fail'
+            # the drive's hours begin at 1234.5
+            ages = [one.age for one in entries]
+            assert ages == pytest.approx([0.5 + n for n in range(length)], abs=0.1)
+        assert len(rig.result(rig.drive.error_log(4))) == 4
+        # only the older firmware has more of them [C4]
+        most = 128 if way == 'classic v5.0' else 32
+        assert len(rig.result(rig.drive.error_log(1000))) == most
+        assert rig.answer(rig.drive.erase_error_log()) == 'the error log is erased'
+        assert rig.far.faults.log == [] and not rig.far.faults
+        assert rig.result(rig.drive.error_log()) == ()
+
+
+def test_an_entry_that_comes_in_meanwhile() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        fill(rig, 5)
+        begun = len(rig.asked)
+
+        def trip(key: str, data: bytes | None) -> None:
+            if key == LOG and asked(rig)[begun:].count(LOG) == 4:
                 rig.far.faults.log.insert(0, LogEntry(12, 1234.4))
 
-    rig.tap.before = trip
-    entries = rig.drive.error_log().result(PATIENCE)
-    assert [entry.code for entry in entries] == [12, 1, 2, 3, 4, 5]
+        rig.meet = trip
+        entries = rig.result(rig.drive.error_log())
+        assert [one.code for one in entries] == [12, 1, 2, 3, 4, 5]
 
 
-def test_a_time_to_come_has_no_age(rig: Rig) -> None:
-    rig.connect()
-    with rig.simulator.lock:
+def test_a_time_to_come_has_no_age() -> None:
+    with Rig() as rig:
+        rig.connect()
         rig.far.faults.log[:] = [LogEntry(5, 2000.0)]
-    (entry,) = rig.drive.error_log().result(PATIENCE)
-    assert math.isnan(entry.age)
-    assert str(entry) == '5 Overload at 2000.0 h'
+        (entry,) = rig.result(rig.drive.error_log())
+        assert math.isnan(entry.age)
+        assert str(entry) == '5 Overload at 2000.0 h'
 
 
-def test_reading_writes_nothing_and_works_in_monitor(make_rig: MakeRig) -> None:
-    rig = make_rig(control_method='monitor')
-    rig.connect()
-    fill(rig, 2)
-    assert len(rig.drive.error_log().result(PATIENCE)) == 2
-    assert rig.far.command_writes == {} == rig.far.writes
+def test_reading_writes_nothing_and_lets_a_motor_run() -> None:
+    with Rig(control_method='monitor') as rig:
+        rig.connect()
+        fill(rig, 2)
+        assert len(rig.result(rig.drive.error_log())) == 2
+        assert not is_written(rig)
+    with Rig() as rig:
+        rig.turn()
+        fill(rig, 32)
+        assert len(rig.result(rig.drive.error_log())) == 32
+        assert rig.drive.armed and rig.turns
+        # what changes something is refused while the motor is enabled
+        for command in (rig.drive.erase_error_log, rig.drive.reset_energy):
+            assert 'stop it first' in rig.answer(command())
+        assert rig.drive.armed
+        assert not {0x800, 0x900} & set(rig.written('fieldbus.scmd'))
 
 
-def test_a_motor_that_runs_runs_on(rig: Rig) -> None:
-    rig.turn()
-    fill(rig, 32)
-    assert len(rig.drive.error_log().result(PATIENCE)) == 32
-    assert rig.drive.armed and rig.far.motor.driven
+def test_erasing_gives_control_back_as_it_was_found() -> None:
+    for found in (Mode.STOP, Mode.BUS):
+        with Rig() as rig:
+            rig.connect()
+            rig.far.write_raw('fieldbus.mode', found)
+            fill(rig, 5)
+            rig.result(rig.drive.erase_error_log())
+            assert rig.far.control_unit.mode == found
+            assert 0x800 in rig.written('fieldbus.scmd')
 
 
-def test_the_optimal_has_none_that_is_documented(make_rig: MakeRig) -> None:
-    rig = make_rig(model='sinus_optimal')
-    rig.connect()
-    assert 'not documented' in rig.refused(rig.drive.error_log())
+def test_a_log_that_is_not_empty_after_all() -> None:
+    with Rig() as rig:
+        rig.connect()
+        fill(rig, 5)
+
+        def immortal(key: str, data: bytes | None) -> None:
+            if key == LOG and not rig.far.faults.log:
+                fill(rig, 1)
+
+        rig.meet = immortal
+        assert 'not empty' in rig.answer(rig.drive.erase_error_log())
 
 
-def test_not_connected(make_rig: MakeRig) -> None:
-    rig = make_rig()
-    for future in (rig.drive.error_log(), rig.drive.erase_error_log(), rig.drive.reset_energy()):
-        assert 'is not connected' in rig.refused(future)
+@pytest.mark.parametrize('way', G2)
+def test_the_energy_counter(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        total, energy = rig.far.counters.total_energy, rig.far.counters.energy
+        answer = rig.answer(rig.drive.reset_energy())
+        if way == 'classic v5.0':
+            assert 'came with firmware 4.38; this drive has an older one' in answer
+            assert rig.far.counters.energy == energy > 1
+        else:
+            assert answer == 'status.e_out: 1.234 -> 0.000 kWh'
+            assert rig.far.counters.energy == 0
+            assert 0x900 in rig.written('fieldbus.scmd')
+        assert rig.far.counters.total_energy == total
+        assert rig.far.control_unit.mode == (Mode.BUS if way == 'canopen' else Mode.STOP)
+        assert rig.far.control_unit.mode_ext_writes == 0 and not rig.far.faults
 
 
-@pytest.mark.parametrize('found', [1, 3])
-def test_erasing(rig: Rig, found: int) -> None:
-    rig.connect()
-    fill(rig, 5)
-    if found == 3:
-        with rig.simulator.lock:
-            rig.far.write_raw('fieldbus.mode', 3)
-    assert said(rig.drive.erase_error_log().result(PATIENCE)) == 'the error log is erased'
-    assert rig.far.faults.log == []
-    assert rig.far.control_unit.mode == found
-    assert rig.drive.error_log().result(PATIENCE) == ()
+def test_older_firmware_cannot_reset_it() -> None:
+    with Rig(parameters={'fieldbus.sw_ver': 4.37}) as rig:
+        rig.connect()
+        message = rig.answer(rig.drive.reset_energy())
+        assert 'firmware 4.38' in message and '4.37' in message
+        assert not is_written(rig)
 
 
-def test_a_log_that_is_not_empty_after_all(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    rig.connect()
-    fill(rig, 5)
-
-    def immortal(register: int, words) -> None:
-        if register == SCMD and words == (0x800,):
-            return
-        with rig.simulator.lock:
-            if not rig.far.faults.log:
-                rig.far.faults.log[:] = [LogEntry(5, 1.0)]
-
-    rig.tap.before = immortal
-    assert 'not empty' in rig.refused(rig.drive.erase_error_log())
+def test_neither_before_it_is_connected_nor_after_its_end() -> None:
+    with Rig() as rig:
+        changing = rig.drive.erase_error_log, rig.drive.reset_energy
+        for command in (rig.drive.error_log, *changing):
+            assert 'is not connected' in rig.answer(command())
+        rig.connect()
+        rig.answer(rig.drive.stop_for_good(1.0))
+        for command in changing:
+            assert 'is ending' in rig.answer(command())
+        assert rig.far.control_unit.mode == Mode.STOP
 
 
-def test_the_energy_counter(rig: Rig) -> None:
-    rig.connect()
-    assert rig.far.counters.energy > 1
-    total = rig.far.counters.total_energy
-    answer = said(rig.drive.reset_energy().result(PATIENCE))
-    assert answer == 'status.e_out: 1.234 -> 0.000 kWh'
-    assert rig.far.counters.energy == 0
-    assert rig.far.counters.total_energy == total
-    assert rig.far.control_unit.mode == 1
+def test_an_optimal_has_none_that_is_documented() -> None:
+    with Rig('optimal', **RARELY) as rig:
+        rig.connect()
+        assert 'not documented' in rig.answer(rig.drive.error_log())
+        rig.far.trip(5)
+        rig.pass_time(SEEN)
+        assert rig.drive.snapshot.text == 'Overload'
+        assert LOG not in asked(rig) and rig.drive.last_error is None
 
 
-def test_older_firmware_cannot_reset_it(make_rig: MakeRig) -> None:
-    rig = make_rig(parameters={'fieldbus.sw_ver': 4.37})
-    rig.connect()
-    message = rig.refused(rig.drive.reset_energy())
-    assert 'firmware 4.38' in message and '4.37' in message
-    assert rig.writes(SCMD) == rig.writes(MODE) == []
+# --- watched --------------------------------------------------------------------------------------
 
 
-def test_nothing_is_taken_by_a_driver_that_ends(rig: Rig) -> None:
-    rig.connect()
-    rig.drive.stop_for_good(1.0).result(PATIENCE)
-    assert 'is ending' in rig.refused(rig.drive.erase_error_log())
-    assert 'is ending' in rig.refused(rig.drive.reset_energy())
-    assert rig.far.control_unit.mode == 1
+@pytest.mark.parametrize('way', [*G2, 'rtu, control word', 'monitor'])
+def test_the_entry_of_a_fault_is_told(way: str) -> None:
+    monitor = {'control_method': 'monitor'} if way == 'monitor' else {}
+    with Rig('rtu' if monitor else way, poll_rate=10.0, **monitor) as rig:
+        rig.connect()
+        rig.pass_time(2.0)
+        began = rig.clock.now
+        rig.far.trip(5)
+        rig.pass_time(2.0)
+        (entry,) = rig.notes.entries
+        assert (entry.code, entry.text, entry.operating_time) == (5, 'Overload', HOURS)
+        assert began <= entry.at <= began + 0.5
+        assert rig.notes.said('error log: 5 Overload at 1234.5 h', Severity.INFO)
+        assert rig.drive.last_error == entry
+        # and the log, when it is read, says the same
+        assert rig.result(rig.drive.error_log())[0].at == entry.at
+        rig.pass_time(2.0)
+        assert rig.notes.entries == [entry]
+        assert rig.far.control_unit.ack_reads == rig.far.control_unit.sio_err_reads == 0
+        assert not (monitor and is_written(rig))
 
 
-@pytest.mark.parametrize('command', ['erase_error_log', 'reset_energy'])
-def test_refused_while_the_motor_is_enabled(rig: Rig, command: str) -> None:
-    rig.turn()
-    fill(rig, 5)
-    assert 'stop it first' in rig.refused(getattr(rig.drive, command)())
-    assert rig.drive.armed
-    assert not {0x800, 0x900} & set(rig.writes(SCMD))
+def test_an_entry_has_the_local_time_of_its_moment() -> None:
+    with Rig(**RARELY) as rig:
+        rig.connect()
+        rig.far.trip(5)
+        rig.pass_time(70.0)
+        (entry,) = rig.notes.entries
+        ago = timedelta(seconds=rig.clock.now - entry.at)
+        before = datetime.now() - ago
+        told = entry.wall_time
+        after = datetime.now() - ago
+        assert told in {one.isoformat(' ', 'minutes') for one in (before, after)}
+
+
+def test_the_motor_is_stopped_first() -> None:
+    with Rig() as rig:
+        rig.turn()
+        rig.pass_time(1.0)
+        rig.asked.clear()
+        rig.far.trip(5)
+        rig.pass_time(1.0)
+        stops = [(key, data) for _, key, data in rig.asked].index(('fieldbus.scmd', b'\0\0'))
+        assert stops < asked(rig).index(LOG)
+        assert not rig.drive.armed and rig.notes.entries
+
+
+def test_what_is_older_than_the_driver_is_no_news() -> None:
+    with Rig() as rig:
+        rig.far.faults.log[:] = [LogEntry(3, 1200.0), LogEntry(4, 1100.0)]
+        rig.connect()
+        rig.pass_time(1.0)
+        assert rig.drive.last_error is not None and rig.drive.last_error.code == 3
+        rig.far.trip(12)
+        rig.pass_time(1.0)
+        assert [entry.code for entry in rig.notes.entries] == [12]
+        assert not rig.notes.said('log', Severity.WARNING)
+
+
+def test_a_fault_that_stands_already_is_told_but_not_since_when() -> None:
+    with Rig() as rig:
+        rig.far.trip(5)
+        rig.connect()
+        rig.pass_time(1.0)
+        (entry,) = rig.notes.entries
+        assert entry.code == 5 and math.isnan(entry.at)
+        assert entry.wall_time.endswith(' or before')
+
+
+def test_faults_that_no_poll_saw() -> None:
+    with Rig(**RARELY) as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        began = rig.clock.now
+        trip_unseen(rig, 7, 8)
+        rig.pass_time(SEEN)
+        # the older one first
+        assert [entry.code for entry in rig.notes.entries] == [7, 8]
+        assert all(began - 1 < entry.at <= rig.clock.now for entry in rig.notes.entries)
+        assert rig.notes.said('8 DC High at 1234.5 h', Severity.WARNING)
+
+
+def test_the_same_fault_twice_within_a_tick_is_told_twice() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        rig.far.trip(5)
+        rig.pass_time(3.0)
+        trip_unseen(rig)
+        rig.pass_time(0.5)
+        rig.far.trip(5)
+        rig.pass_time(1.0)
+        first, second = rig.notes.entries
+        assert first.operating_time == second.operating_time and second.at > first.at
+        entries = rig.result(rig.drive.error_log())
+        assert [entry.at for entry in entries] == [second.at, first.at]
+
+
+def test_a_drive_that_writes_its_log_late() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        rig.far.trip(5)
+        late = list(rig.far.faults.log)
+        rig.far.faults.log.clear()
+        rig.pass_time(1.0)
+        assert rig.notes.entries == []
+        rig.far.faults.log[:] = late
+        rig.pass_time(0.5)
+        (entry,) = rig.notes.entries
+        assert entry.code == 5 and not math.isnan(entry.at)
+
+
+def test_what_came_while_the_drive_was_not_reached() -> None:
+    with Rig(**RARELY) as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        rig.far.power_cycle(boot_time=90.0)
+        rig.far.faults.log.insert(0, LogEntry(7, HOURS))
+        rig.pass_time(100.0)
+        (entry,) = rig.notes.entries
+        assert entry.code == 7 and math.isnan(entry.at)
+
+
+def test_a_drive_that_has_no_log_is_asked_once() -> None:
+    with Rig(**RARELY) as rig:
+        rig.meet = lambda key, data: 'refused' if key == LOG else None
+        rig.connect()
+        rig.pass_time(2 * SEEN)
+        assert rig.notes.said(Cause.LOG_NOT_WATCHED)
+        assert asked(rig).count(LOG) == 1
+        assert rig.drive.snapshot.connected
+
+
+def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with Rig(**RARELY) as rig:
+        rig.connect()
+        rig.pass_time(3.0)
+        read, hours = rig.link.read, rig.drive.registers.address('status.op_time').index
+
+        def absurd(unit: int, address: Address) -> Reply:
+            reply = read(unit, address)
+            if address.index != hours:
+                return reply
+            return Reply(packed(0xFFFF, 0x7FFF), reply.arrived)
+
+        monkeypatch.setattr(rig.link, 'read', absurd)
+        # not looked at for long, so that only the hours tell when the entry came
+        rig.drive._error_log_monitor._looked_at = -math.inf
+        for code, name in ((5, 'Overload'), (1, 'Par Fail')):
+            trip_unseen(rig, code)
+            rig.pass_time(SEEN)
+            assert rig.notes.said(f'error log: {code} {name} at 1234.5 h')
+            assert not rig.notes.said('or before')
+        entries = rig.result(rig.drive.error_log())
+        assert [str(one).split(' at ')[0] for one in entries] == ['1 Par Fail', '5 Overload']
+
+
+# --- the clock ------------------------------------------------------------------------------------
+
+
+def cut(hours: float) -> float:
+    """The operating time as a drive shows it."""
+    return math.floor(hours * 10 + 1e-6) / 10
+
+
+@given(
+    start=st.floats(0, 1e5),
+    steps=st.lists(st.floats(1.0, 7200.0), min_size=1, max_size=40),
+    when=st.floats(0, 1),
+)
+def test_a_drive_with_power_all_the_time(start: float, steps: list[float], when: float) -> None:
+    clock = OperatingClock()
+    at = 1000.0
+    clock.note(cut(start), at)
+    for step in steps:
+        at += step
+        clock.note(cut(start + (at - 1000.0) / 3600), at)
+    assert clock.since == cut(start)
+    moment = 1000.0 + when * (at - 1000.0)
+    hours = cut(start + (moment - 1000.0) / 3600)
+    mapped = clock.moment(hours)
+    if hours == clock.since:
+        assert math.isnan(mapped)
+    else:
+        assert mapped == pytest.approx(moment, abs=400.0)
+
+
+@given(start=st.floats(0, 1e5), off=st.floats(0.25, 1e4), on=st.floats(0.15, 100.0))
+def test_a_drive_that_was_off(start: float, off: float, on: float) -> None:
+    clock = OperatingClock()
+    assert math.isnan(clock.moment(1.0))
+    clock.note(cut(start), 0.0)
+    later = start + on
+    clock.note(cut(later), (off + on) * 3600)
+    assert clock.since == cut(later)
+    assert math.isnan(clock.moment(cut(start + 0.1)))
+
+
+def test_many_readings_are_finer_than_a_tick() -> None:
+    clock = OperatingClock()
+    for second in range(0, 1000, 10):
+        clock.note(cut(50.0 + second / 3600), float(second))
+    # hour 50.1 begins at 360 s, and lasts for 360 s
+    assert clock.moment(50.1) == pytest.approx(540.0, abs=10.0)
