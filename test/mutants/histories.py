@@ -22,7 +22,6 @@ from mutant import COMMANDS
 from mutant import CONTROL_TAKEN
 from mutant import CONTROLLER
 from mutant import DRIVE
-from mutant import EVERY_WAY
 from mutant import G2
 from mutant import G2_CONTROL
 from mutant import G2_SCMD
@@ -36,6 +35,7 @@ from mutant import SETPOINT
 from mutant import STARTING
 from mutant import STOP_CONFIRMED
 from mutant import TABLE
+from mutant import TERMINALS_KEEP
 from mutant import TUNING_BEGINS
 from mutant import WATCH
 from mutant import Mutant
@@ -315,7 +315,7 @@ HISTORIES = (
         G2,
         '        if not elsewhere:\n            yield from self._remove_control()\n',
         '        yield from self._remove_control()\n',
-        EVERY_WAY,
+        TERMINALS_KEEP,
     ),
     Mutant(
         3,

@@ -19,11 +19,16 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+from support.rig import WAYS
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 OVERLOAD = 5
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
@@ -189,37 +194,128 @@ def test_drive_that_refuses_the_run_command() -> None:
         assert not rig.drive.stop_unconfirmed
 
 
-def test_acknowledge() -> None:
-    # those of the serial line, too, although it is the line that works
-    for code, text in ((OVERLOAD, 'Overload'), (14, 'Sio Fail'), (15, 'Bus Fail')):
-        with Rig() as rig:
-            rig.connect()
-            assert rig.answer(rig.drive.acknowledge()).startswith('nothing to acknowledge (')
-            assert rig.far.control_unit.ack_reads == 0
-            rig.turn()
-            rig.far.trip(code)
-            rig.pass_time(0.5)
-            told = rig.drive.snapshot
-            assert (told.kind, told.text) == (Kind.FAULT, text) and told.remedy
-            assert told.requires_ack or code != OVERLOAD
-            assert rig.notes.said(f'fault {code} {text}')
-            rig.acknowledged = 1
-            assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {code} {text}'
-            # a Sio Fail goes when control is given back [C9]
-            assert rig.far.control_unit.ack_reads == (code != 14)
-            assert rig.far.faults.codes == []
-            rig.assert_only_enable_helps()
+# --- acknowledging --------------------------------------------------------------------------------
+
+SINUS = [
+    name for name, way in WAYS.items() if way.model != 'movitrac31' and way.protocol != 'telegram1'
+]
+SIO_FAIL = 14
+every_sinus = pytest.mark.parametrize('way', SINUS)
+every_serial = pytest.mark.parametrize(
+    'way', ['rtu', 'rtu, control word', 'classic', 'classic, control word', 'classic v5.0']
+)
 
 
-def test_acknowledge_what_still_stands() -> None:
-    with Rig() as rig:
+@every_sinus
+def test_acknowledge(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        assert rig.answer(rig.drive.acknowledge()).startswith('nothing to acknowledge (')
+        assert rig.far.control_unit.ack_reads == 0
+        rig.far.trip(OVERLOAD)
+        rig.pass_time(1.0)
+        told = rig.drive.snapshot
+        assert (told.kind, told.text) == (Kind.FAULT, 'Overload') and told.remedy
+        assert told.requires_ack
+        assert rig.notes.said('fault 5 Overload')
+        rig.acknowledged = 1
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
+        unit, reads = rig.far.control_unit, rig.way.method == 'mode_scmd'
+        assert (unit.ack_reads, unit.sio_err_reads, unit.mode_ext_writes) == (reads, 0, 0)
+        assert rig.far.faults.codes == []
+
+
+@every_sinus
+def test_acknowledge_what_still_stands(way: str) -> None:
+    with Rig(way) as rig:
         rig.connect()
         rig.far.trip(OVERLOAD, cause_present=True)
         rig.acknowledged = 1
         message = rig.answer(rig.drive.acknowledge())
-        assert message.startswith('5 Overload is still active: The power monitor has tripped')
+        assert message.startswith('5 Overload is still active: ')
         assert 'Reduce the load' in message
         assert rig.far.faults.codes == [OVERLOAD]
+
+
+@every_serial
+@pytest.mark.parametrize('strict', [False, True])
+def test_acknowledge_a_fault_that_ended_a_ride(
+    way: str, strict: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if strict:
+        refuse_control_words(monkeypatch)
+    # those of the serial line, too, although it is the line that works
+    for code, text in ((OVERLOAD, 'Overload'), (SIO_FAIL, 'Sio Fail'), (15, 'Bus Fail')):
+        with Rig(way) as rig:
+            rig.turn()
+            rig.far.trip(code)
+            rig.pass_time(1.0)
+            assert not rig.drive.armed
+            rig.acknowledged = 1
+            assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {code} {text}'
+            assert rig.far.faults.codes == []
+            # what was refused of the stops before and after it is no fault of its own
+            assert not rig.far.faults.sio_err & ~(LineError.BLOCKED | LineError.NOT_PERMITTED)
+            rig.pass_time(1.0)
+            assert not rig.drive.stop_unconfirmed and not rig.far.motor.driven
+            rig.enable()
+
+
+def refuse_control_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While a fault is active, no control word is taken either: [M0 §6.1.5] has no exception."""
+    write = G2ControlUnit._write_control
+
+    def refuse(unit: G2ControlUnit, raw: int) -> None:
+        if unit.faults:
+            raise Refused(Reason.STATE, 'a fault is active')
+        write(unit, raw)
+
+    monkeypatch.setattr(G2ControlUnit, '_write_control', refuse)
+
+
+@pytest.mark.parametrize('way', ['classic', 'classic, control word'])
+def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
+    way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuse_control_words(monkeypatch)
+    with Rig(way) as rig:
+        rig.turn()
+        rig.far.trip(OVERLOAD, cause_present=True)
+        rig.pass_time(1.0)
+        rig.acknowledged = 1
+        assert '5 Overload is still active' in rig.answer(rig.drive.acknowledge())
+
+
+@every_serial
+def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        rig.far.set_run_input(False)
+        rig.far.trip(SIO_FAIL)
+        rig.far.control_unit.press('ext')
+        rig.acknowledged = 1
+        answer = rig.answer(rig.drive.acknowledge())
+        if rig.way.protocol == 'modbus_rtu':
+            # the one way that is left would take it from them
+            assert 'keypad or terminals have control' in answer
+            assert rig.far.faults
+        else:
+            assert 'acknowledged 14 Sio Fail' in answer
+            assert not rig.far.faults
+        assert rig.far.control_unit.mode == Mode.EXT
+
+
+@every_serial
+def test_the_reason_of_a_serial_fault_is_said(way: str) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        rig.far.control_unit.serial_error(LineError.TIMEOUT)
+        rig.pass_time(1.0)
+        assert not rig.drive.armed
+        rig.acknowledged = 1
+        # there is no SioErr over Modbus, and MODE = Stop clears it where it is obeyed [C9], [C99]
+        reason = ' (time-out of the serial communication)' if way == 'classic v5.0' else ''
+        assert rig.answer(rig.drive.acknowledge()) == f'acknowledged 14 Sio Fail{reason}'
 
 
 def test_monitor_writes_nothing_at_all() -> None:
