@@ -24,36 +24,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from drive_rig import PATIENCE
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
 import pytest
-from support.addresses import Words
-from support.said import said
+from support.rig import Rig
 
 from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.simulator import motor as motor_module
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
 
 OVERLOAD = 5
-STATUS = 0x258
-CONTROL = 0x254
+WAY = 'rtu, control word'
+CONTROL, MASK = 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
 POWER = Control.NET_CTRL | Control.NET_REF | Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
 RAMP = Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
 ON = POWER | RAMP | Control.SWITCH_ON
 FORWARD = ON | Control.ENABLE_OP
 REVERSE = ON | Control.ENABLE_REV_OP
-#: So long a ramp is met on its way.
-SLOW = {'control.retard': 20.0}
-
-pytestmark = pytest.mark.usefixtures('hasty')
+EVENT = Control.EVENT_TRIGGERED_OP
+N, D, R, S, E, B, X, Q, A, F = Phase
 
 Exits = list[tuple[Phase, Phase]]
 
@@ -92,116 +83,100 @@ def shown(rig: Rig) -> State:
 
 def command(rig: Rig, *words: Control) -> None:
     """Write control words, as another master does: no poll comes between them."""
-    with rig.simulator.lock:
-        for word in words:
-            rig.far.write_raw('fieldbus.drive_control', int(word))
+    for word in words:
+        rig.far.write_raw(CONTROL, int(word))
 
 
 def self_test(rig: Rig) -> None:
     """Begin anew as after power-on, but answering."""
-    with rig.simulator.lock:
-        rig.far.control_unit.restart()
-        rig.far.motor.release(at_once=True)
-        rig.far._settle()
-        assert phase(rig) is Phase.NOT_READY_TO_SWITCH_ON
+    unit(rig).restart()
+    rig.far.motor.release(at_once=True)
+    rig.far._settle()
+    assert phase(rig) is N
 
 
 def initialise(rig: Rig) -> None:
     """End the self-test."""
-    with rig.simulator.lock:
-        rig.far.control_unit.initialised = True
-        rig.far._settle()
+    unit(rig).initialised = True
+    rig.far._settle()
 
 
-def assert_it_can_be_enabled(rig: Rig) -> None:
-    """It stands, no run command does, and the motor turns as soon as somebody enables it."""
-    wait_until(lambda: not rig.drive.stop_unconfirmed)
-    rig.wait_until_still()
-    assert not unit(rig).word & Control.SWITCH_ON
-    assert rig.enable().startswith('enabled')
-    rig.publish(10.0)
-    rig.wait_for_frequency(10.0)
-    assert unit(rig).word & FORWARD == FORWARD
-    assert not unit(rig).word & Control.ENABLE_REV_OP
+def slow(rig: Rig) -> None:
+    """So long a ramp is met on its way."""
+    rig.far.memory.set('control.retard', 20.0)
 
 
-def assert_disarmed(rig: Rig, cause: str) -> None:
-    """The driver has noticed, says why, and takes the run command back."""
-    wait_until(lambda: not rig.drive.armed)
-    rig.notes.wait_for(cause)
-    wait_until(lambda: not rig.drive.stop_unconfirmed)
-    with rig.simulator.lock:
-        rig.far.memory.set('control.retard', 0.2)
-    rig.wait_until_still()
-    assert not unit(rig).word & Control.SWITCH_ON
+def turn(rig: Rig) -> None:
+    """Enable, if it is not, and turn; any earlier state has to allow that."""
+    rig.enable()
+    rig.send(20.0)
+    rig.wait_until(lambda: rig.far.motor.frequency > 19.8, 5.0)
+    rig.pass_time(0.2)
+    assert unit(rig).word & (FORWARD | REVERSE | EVENT) == FORWARD
+
+
+def require_stopped(rig: Rig) -> None:
+    """It comes to stand, the stop is confirmed, and no run command is left."""
+    rig.far.memory.set('control.retard', 0.3)
+    rig.pass_time(1.5)
+    assert not rig.drive.armed and not rig.drive.stop_unconfirmed
+    assert not rig.far.motor.driven and not unit(rig).word & Control.SWITCH_ON
+
+
+def rows_that_fail(rows: dict[str, tuple], check: Callable[..., None]) -> dict[str, str]:
+    """Return what is wrong, by the row."""
+    wrong = {}
+    for name, row in rows.items():
+        try:
+            check(*row)
+        except AssertionError as complaint:
+            wrong[name] = str(complaint)
+    return wrong
 
 
 # --- what the driver leads it through -------------------------------------------------------------
 
 
-def enables(rig: Rig) -> None:
-    rig.connect()
-    assert rig.enable().startswith('enabled')
-    rig.publish(20.0)
-    rig.wait_for_frequency(20.0)
-    rig.wait_until_it_shows()
-
-
 def stops(rig: Rig) -> None:
-    enables(rig)
-    assert said(rig.drive.stop().result(PATIENCE)).startswith('stop')
-    wait_until(lambda: phase(rig) is Phase.READY_TO_SWITCH_ON)
+    turn(rig)
+    assert rig.answer(rig.drive.stop()).startswith('stop')
 
 
 def stops_and_coasts(rig: Rig) -> None:
-    rig.connect()
-    with rig.simulator.lock:
-        rig.far.memory.set('control.st_mode', 'Release')
+    rig.far.memory.set('control.st_mode', 'Release')
     stops(rig)
 
 
 def stops_quickly(rig: Rig) -> None:
-    enables(rig)
-    assert said(rig.drive.quick_stop().result(PATIENCE)) == 'released: the motor coasts'
-    wait_until(lambda: phase(rig) is Phase.SWITCH_ON_DISABLED)
-
-
-def stops_down_a_ramp(rig: Rig) -> None:
-    enables(rig)
-    with rig.simulator.lock:
-        rig.far.memory.set('control.retard', 20.0)
-    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
-    assert phase(rig) is Phase.SHUTDOWN
+    turn(rig)
+    assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
 
 
 def stops_quickly_on_a_ramp(rig: Rig) -> None:
-    stops_down_a_ramp(rig)
-    assert said(rig.drive.quick_stop().result(PATIENCE)) == 'released: the motor coasts'
-    with rig.simulator.lock:
-        rig.far.memory.set('control.retard', 0.2)
+    slow(rig)
+    stops(rig)
+    assert phase(rig) is X
+    assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
 
 
 def enables_on_a_ramp(rig: Rig) -> None:
-    stops_down_a_ramp(rig)
-    assert rig.enable().startswith('enabled')
-    assert phase(rig) is Phase.OPERATION_ENABLED
-    assert rig.far.motor.frequency > 1.0, 'it came to its end'
-    assert said(rig.drive.stop().result(PATIENCE)) == 'stopping: it ramps down'
-    with rig.simulator.lock:
-        rig.far.memory.set('control.retard', 0.2)
+    slow(rig)
+    stops(rig)
+    rig.enable()
+    assert phase(rig) is E and rig.far.motor.frequency > 1.0
+    assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
 
 
 def when_switched_on(rig: Rig, act: Callable[[], object]) -> str:
     """Enable, and do something before the driver can give the direction; what enable answers."""
-    rig.connect()
-    done: list[int] = []
+    done: list[bool] = []
 
-    def before(register: int, words: Words | None) -> None:
-        if register == STATUS and not done and phase(rig) is Phase.SWITCHED_ON:
-            done.append(register)
+    def before(key: str, data: bytes | None) -> None:
+        if data is None and not done and phase(rig) is S:
+            done.append(True)
             act()
 
-    rig.tap.before = before
+    rig.meet = before
     answer = rig.answer(rig.drive.enable())
     assert done
     return answer
@@ -216,231 +191,185 @@ def stops_quickly_before_the_direction(rig: Rig) -> None:
     stops: list[Future[str]] = []
     answer = when_switched_on(rig, lambda: stops.append(rig.drive.quick_stop()))
     assert answer == 'it was stopped while it was being enabled'
-    stops[0].result(PATIENCE)
+    rig.result(stops[0])
 
 
-def is_enabled_after_its_self_test(rig: Rig) -> None:
-    rig.connect()
+def is_left_by_another_before_the_direction(rig: Rig) -> None:
+    answer = when_switched_on(rig, lambda: command(rig, ON & ~Control.ENABLE_VOLTAGE))
+    assert 'does not start' in answer or 'RUN input' in answer
+
+
+def is_met_in_its_self_test(rig: Rig) -> None:
     self_test(rig)
-    rig.next_snapshots(2)
+    rig.pass_time(0.2)
     assert shown(rig) is State.NOT_READY_TO_SWITCH_ON
     initialise(rig)
 
 
-N, D, R, S, E, B, X, Q, A, F = Phase
-LED = {
-    'not_ready_to_switch_on_leaves_when_initialised': ([(N, D)], is_enabled_after_its_self_test),
-    'switch_on_disabled_leaves_on_bits_1_and_2_with_bit_0_low': ([(D, R)], enables),
-    'ready_to_switch_on_leaves_on_switch_on': ([(R, S)], enables),
-    'ready_to_switch_on_leaves_on_quick_stop': ([(R, D)], stops_quickly_before_the_direction),
-    'switched_on_leaves_on_switch_off': ([(S, R)], stops_before_the_direction),
-    'switched_on_leaves_on_quick_stop': ([(S, R), (R, D)], stops_quickly_before_the_direction),
-    'switched_on_leaves_on_forward': ([(S, E)], enables),
-    'operation_enabled_leaves_on_quick_stop': ([(E, Q)], stops_quickly),
-    'operation_enabled_leaves_on_switch_off': ([(E, X)], stops),
-    'shutdown_leaves_when_it_has_braked_and_the_voltage_is_off': ([(X, R)], stops),
-    'shutdown_leaves_when_it_coasts_and_the_voltage_is_off': ([(X, R)], stops_and_coasts),
-    'shutdown_leaves_on_quick_stop': ([(X, Q)], stops_quickly_on_a_ramp),
-    'shutdown_leaves_on_switch_on': ([(X, E)], enables_on_a_ramp),
-    'quick_stop_leaves_when_the_voltage_is_off': ([(Q, D)], stops_quickly),
-}
+def has_its_self_test_while_enabled(rig: Rig) -> None:
+    turn(rig)
+    self_test(rig)
+    rig.pass_time(1.0)
+    assert not rig.drive.armed and rig.notes.said('the drive is starting (')
+    initialise(rig)
 
 
-@pytest.mark.parametrize(('wanted', 'lead'), LED.values(), ids=LED)
-def test_table_16_led(make_rig: MakeRig, exits: Exits, wanted: Exits, lead) -> None:
-    rig = make_rig(control_method='drive_control')
-    lead(rig)
-    wait_until(lambda: set(wanted) <= set(exits))
-    if rig.drive.armed:
-        rig.drive.stop().result(PATIENCE)
-    assert_it_can_be_enabled(rig)
-    assert not rig.notes.told(Cause.CANNOT_STOP)
+LED: list[tuple[Callable[[Rig], None], Exits]] = [
+    (is_met_in_its_self_test, [(N, D)]),
+    (has_its_self_test_while_enabled, [(N, D)]),
+    (stops, [(D, R), (R, S), (S, E), (E, X), (X, R)]),
+    (stops_and_coasts, [(E, X), (X, R)]),
+    (stops_quickly, [(E, Q), (Q, D)]),
+    (stops_quickly_on_a_ramp, [(X, Q)]),
+    (enables_on_a_ramp, [(X, E)]),
+    (stops_before_the_direction, [(S, R)]),
+    (stops_quickly_before_the_direction, [(S, R), (R, D)]),
+    (is_left_by_another_before_the_direction, []),
+]
 
 
-def masks(rig: Rig) -> list[tuple[int, int]]:
-    """What was written to DrvCtrlWriteMask, AND and OR, in order."""
-    data = [bytes.fromhex(frame['hex']) for frame in rig.trace() if frame['direction'] == 'request']
-    return [
-        (int.from_bytes(one[7:9], 'big'), int.from_bytes(one[9:11], 'big'))
-        for one in data
-        if one[1:4] == b'\x10\x02\x50'
-    ]
+@pytest.mark.parametrize(('lead', 'wanted'), LED, ids=[lead.__name__ for lead, _ in LED])
+def test_table_16_led(exits: Exits, lead: Callable[[Rig], None], wanted: Exits) -> None:
+    with Rig(WAY) as rig:
+        rig.connect()
+        lead(rig)
+        require_stopped(rig)
+        assert set(wanted) <= set(exits)
+        assert not rig.notes.said(Cause.CANNOT_STOP)
+        rig.assert_only_enable_helps()
 
 
 @pytest.mark.parametrize(('reference', 'net_ref'), [('fieldbus', 0x8000), ('terminal', 0)])
-def test_words_of_table_14(make_rig: MakeRig, reference: str, net_ref: int) -> None:
-    rig = make_rig(control_method='drive_control', reference=reference)
-    rig.connect()
-    rig.enable()
-    # NetCtrl, power, no quick stop, ramp; bit 0 low first, then SwitchOn, then the direction
-    assert rig.writes(CONTROL) == [net_ref | 0x4076, net_ref | 0x4077, net_ref | 0x407F]
-    rig.drive.stop().result(PATIENCE)
-    # SwitchOn and both directions are taken back, and nothing is added
-    assert set(masks(rig)) == {(0xDFF6, 0)}
-    rig.drive.quick_stop().result(PATIENCE)
-    # no longer DisableQuickStop; OverrideCoast
-    assert (0xDFF2, 0x0800) in masks(rig)
-    # the mask saves reading the word
-    assert not any(frame['hex'][2:8] == '030254' for frame in rig.trace())
+def test_words_of_table_14(reference: str, net_ref: int) -> None:
+    with Rig(WAY, reference=reference) as rig:
+        rig.connect()
+        rig.enable()
+        # NetCtrl, power, no quick stop, ramp; bit 0 low first, then SwitchOn, then the direction
+        assert rig.written(CONTROL) == [net_ref | 0x4076, net_ref | 0x4077, net_ref | 0x407F]
+        rig.answer(rig.drive.stop())
+        # SwitchOn and both directions are taken back by AND, and nothing is added by OR
+        assert set(rig.written(MASK)) == {0x0000DFF6}
+        rig.answer(rig.drive.quick_stop())
+        # no longer DisableQuickStop; OverrideCoast
+        assert 0x0800DFF2 in rig.written(MASK)
+        # the mask saves reading the word
+        assert (1, CONTROL, None) not in rig.asked
 
 
 # --- what another master leads it through, under the driver's eyes --------------------------------
 
+STOPPED = 'the drive stopped by itself'
 #: From a motor that turns: the words, the exits, and what the driver says; '' if it goes on.
-MISLED = {
-    'operation_enabled_leaves_on_voltage_disabled': (
-        [FORWARD & ~Control.ENABLE_VOLTAGE], [(E, Q), (Q, D)], 'the drive stopped by itself',
+MISLED: dict[str, tuple[list[Control], Exits, str]] = {
+    'operation enabled, voltage disabled': (
+        [FORWARD & ~Control.ENABLE_VOLTAGE], [(E, Q), (Q, D)], STOPPED,
     ),
-    'operation_enabled_leaves_on_quick_stop': (
-        [FORWARD & ~Control.DISABLE_QUICK_STOP], [(E, Q), (Q, D)], 'the drive stopped by itself',
+    'operation enabled, quick stop': (
+        [FORWARD & ~Control.DISABLE_QUICK_STOP], [(E, Q), (Q, D)], STOPPED,
     ),
-    'operation_enabled_leaves_on_switch_off': (
-        [POWER | RAMP], [(E, X)], 'the drive stopped by itself',
-    ),
+    'operation enabled, switch off': ([POWER | RAMP], [(E, X)], STOPPED),
     # and on by the driver, which takes bit 0 back
-    'operation_enabled_leaves_on_a_lost_direction': (
-        [ON], [(E, B), (B, X)], 'the drive stopped by itself',
-    ),
-    'operation_enabled_leaves_on_local_control': (
+    'operation enabled, a lost direction': ([ON], [(E, B), (B, X)], STOPPED),
+    'operation enabled, local control': (
         [FORWARD & ~Control.NET_CTRL], [(E, Q), (Q, D)], 'the bus has lost control',
     ),
-    'disable_leaves_on_voltage_disabled': (
-        [ON, ON & ~Control.ENABLE_VOLTAGE], [(E, B), (B, Q)], 'the drive stopped by itself',
+    'disable, voltage disabled': (
+        [ON, ON & ~Control.ENABLE_VOLTAGE], [(E, B), (B, Q)], STOPPED,
     ),
-    'disable_leaves_on_quick_stop': (
-        [ON, ON & ~Control.DISABLE_QUICK_STOP], [(E, B), (B, Q)], 'the drive stopped by itself',
+    'disable, quick stop': (
+        [ON, ON & ~Control.DISABLE_QUICK_STOP], [(E, B), (B, Q)], STOPPED,
     ),
-    'disable_leaves_on_switch_off': (
-        [ON, POWER | RAMP], [(E, B), (B, X)], 'the drive stopped by itself',
+    'disable, switch off': ([ON, POWER | RAMP], [(E, B), (B, X)], STOPPED),
+    'disable, coast': ([ON, ON | Control.OVERRIDE_COAST], [(E, B), (B, S)], STOPPED),
+    'disable, a direction': ([ON, FORWARD], [(E, B), (B, E)], ''),
+    'shutdown, switch on': ([POWER | RAMP, FORWARD], [(E, X), (X, E)], ''),
+    'shutdown, switch on without direction': (
+        [POWER | RAMP, ON], [(E, X), (X, E), (E, B)], STOPPED,
     ),
-    'disable_leaves_on_coast': (
-        [ON, ON | Control.OVERRIDE_COAST], [(E, B), (B, S)], 'the drive stopped by itself',
+    'shutdown, voltage disabled': (
+        [POWER, POWER & ~Control.ENABLE_VOLTAGE], [(E, X), (X, Q)], STOPPED,
     ),
-    'disable_leaves_on_a_direction': ([ON, FORWARD], [(E, B), (B, E)], ''),
-    'shutdown_leaves_on_switch_on': ([POWER | RAMP, FORWARD], [(E, X), (X, E)], ''),
-    'shutdown_leaves_on_switch_on_without_direction': (
-        [POWER | RAMP, ON], [(E, X), (X, E), (E, B)], 'the drive stopped by itself',
-    ),
-    'shutdown_leaves_on_voltage_disabled': (
-        [POWER, POWER & ~Control.ENABLE_VOLTAGE], [(E, X), (X, Q)], 'the drive stopped by itself',
-    ),
-    'shutdown_leaves_when_coast_is_chosen_and_the_voltage_is_off': (
-        [POWER | RAMP | Control.OVERRIDE_COAST], [(E, X), (X, R)], 'the drive stopped by itself',
-    ),
+    'shutdown, coast': ([POWER | RAMP | Control.OVERRIDE_COAST], [(E, X), (X, R)], STOPPED),
 }
 
 
-@pytest.mark.parametrize(('words', 'wanted', 'cause'), MISLED.values(), ids=MISLED)
-def test_table_16_misled(make_rig: MakeRig, exits: Exits, words, wanted, cause: str) -> None:
-    rig = make_rig(control_method='drive_control', parameters=SLOW)
-    rig.turn()
-    exits.clear()
-    command(rig, *words)
-    if cause:
-        assert_disarmed(rig, cause)
-        wait_until(lambda: set(wanted) <= set(exits))
-        assert_it_can_be_enabled(rig)
-    else:
-        # it follows us again before anybody could see it
-        rig.next_snapshots(3)
-        assert exits == wanted
-        assert rig.drive.armed
-        rig.wait_for_frequency(20.0)
+def test_table_16_misled(exits: Exits) -> None:
+    with Rig(WAY, telemetry_rate=0.0) as rig:
+        rig.connect()
+
+        def check(words: list[Control], wanted: Exits, cause: str) -> None:
+            turn(rig)
+            slow(rig)
+            exits.clear()
+            rig.notes.events.clear()
+            command(rig, *words)
+            rig.pass_time(0.5)
+            if cause:
+                assert rig.notes.said(cause), rig.notes.events
+                require_stopped(rig)
+                assert set(wanted) <= set(exits), exits
+            else:
+                # it follows us again before that can be seen
+                assert exits == wanted
+                assert rig.drive.armed and rig.far.motor.frequency > 19.0
+
+        assert not rows_that_fail(MISLED, check)
 
 
-def test_table_16_disable_leaves_at_zero_rpm(make_rig: MakeRig, exits: Exits) -> None:
-    rig = make_rig(control_method='drive_control')
-    rig.turn()
-    exits.clear()
-    with rig.simulator.lock:
+def test_table_16_disable_leaves_at_zero_rpm(exits: Exits) -> None:
+    with Rig(WAY) as rig:
+        rig.turn()
+        exits.clear()
         command(rig, ON)
-        rig.skip(2.0)
+        rig.far.advance(2.0)
         assert exits == [(E, B), (B, S)]
-    assert_disarmed(rig, 'the drive stopped by itself')
-    assert (S, R) in exits
-    assert_it_can_be_enabled(rig)
+        rig.pass_time(3.0)
+        assert rig.notes.said(STOPPED)
+        require_stopped(rig)
+        assert (S, R) in exits
+        rig.assert_only_enable_helps()
 
 
+UNASKED = 'although nobody enabled it'
 #: From a motor that stands under our control.
-IDLE = {
-    'switch_on_disabled_leaves_on_auto_init': (
-        [Control(0), ON | Control.AUTO_INIT], [(D, R), (R, S)], '',
-    ),
-    'switch_on_disabled_stays_while_bit_0_is_set': (
-        [POWER & ~Control.DISABLE_QUICK_STOP, ON], [(R, D)], '',
-    ),
-    'ready_to_switch_on_leaves_on_voltage_disabled': (
-        [POWER & ~Control.ENABLE_VOLTAGE], [(R, D)], '',
-    ),
-    'ready_to_switch_on_leaves_on_quick_stop': (
-        [POWER & ~Control.DISABLE_QUICK_STOP], [(R, D)], '',
-    ),
-    'switched_on_leaves_on_voltage_disabled': (
+IDLE: dict[str, tuple[list[Control], Exits, str]] = {
+    'switch on disabled, AutoInit': ([Control(0), ON | Control.AUTO_INIT], [(D, R), (R, S)], ''),
+    'switch on disabled, bit 0 stays': ([POWER & ~Control.DISABLE_QUICK_STOP, ON], [(R, D)], ''),
+    'ready, voltage disabled': ([POWER & ~Control.ENABLE_VOLTAGE], [(R, D)], ''),
+    'ready, quick stop': ([POWER & ~Control.DISABLE_QUICK_STOP], [(R, D)], ''),
+    'switched on, voltage disabled': (
         [ON, ON & ~Control.ENABLE_VOLTAGE], [(R, S), (S, R), (R, D)], '',
     ),
-    'switched_on_leaves_on_reverse': (
-        [ON, REVERSE], [(R, S), (S, E)], 'although nobody enabled it',
+    'switched on, reverse': ([ON, REVERSE], [(R, S), (S, E)], UNASKED),
+    'switched on, both directions': ([ON, FORWARD | REVERSE], [(R, S)], ''),
+    'switched on, an old direction where an event is required': (
+        [POWER | Control.ENABLE_OP, FORWARD | EVENT], [(R, S)], '',
     ),
-    'switched_on_stays_on_both_directions': (
-        [ON, FORWARD | REVERSE], [(R, S)], '',
-    ),
-    'switched_on_stays_on_an_old_direction_if_an_event_is_required': (
-        [POWER | Control.ENABLE_OP, FORWARD | Control.EVENT_TRIGGERED_OP], [(R, S)], '',
-    ),
-    'switched_on_leaves_on_a_direction_that_changes_if_an_event_is_required': (
-        [
-            POWER | Control.ENABLE_OP,
-            FORWARD | Control.EVENT_TRIGGERED_OP,
-            REVERSE | Control.EVENT_TRIGGERED_OP,
-        ],
-        [(R, S), (S, E)],
-        'although nobody enabled it',
+    'switched on, a direction that changes where an event is required': (
+        [POWER | Control.ENABLE_OP, FORWARD | EVENT, REVERSE | EVENT], [(R, S), (S, E)], UNASKED,
     ),
 }
 
 
-@pytest.mark.parametrize(('words', 'wanted', 'cause'), IDLE.values(), ids=IDLE)
-def test_table_16_idle(make_rig: MakeRig, exits: Exits, words, wanted, cause: str) -> None:
-    rig = make_rig(control_method='drive_control')
-    rig.connect()
-    rig.enable()
-    rig.drive.stop().result(PATIENCE)
-    wait_until(lambda: phase(rig) is Phase.READY_TO_SWITCH_ON)
-    exits.clear()
-    with rig.simulator.lock:
-        command(rig, *words)
-        assert exits[-len(wanted) :] == wanted
-    if cause:
-        rig.notes.wait_for(cause)
-        rig.wait_until_still()
-    # whatever another master left behind, the first word of an enable ends
-    wait_until(lambda: not rig.drive.stop_unconfirmed)
-    rig.next_snapshots(2)
-    assert not rig.far.motor.driven
-    assert rig.enable().startswith('enabled')
-    assert rig.drive.armed
-    assert unit(rig).word & (FORWARD | REVERSE | Control.EVENT_TRIGGERED_OP) == FORWARD
+def test_table_16_idle(exits: Exits) -> None:
+    with Rig(WAY, telemetry_rate=0.0) as rig:
+        rig.connect()
 
+        def check(words: list[Control], wanted: Exits, cause: str) -> None:
+            # whatever another master left behind, the first word of an enable ends
+            stops(rig)
+            require_stopped(rig)
+            assert phase(rig) is R
+            exits.clear()
+            rig.notes.events.clear()
+            command(rig, *words)
+            assert exits[-len(wanted) :] == wanted, exits
+            rig.pass_time(1.5)
+            assert not cause or rig.notes.said(cause), rig.notes.events
+            assert not rig.drive.stop_unconfirmed and not rig.far.motor.driven
 
-def test_table_16_switched_on_that_is_left_while_it_is_being_enabled(
-    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 2.0)
-    rig = make_rig(control_method='drive_control')
-    answer = when_switched_on(rig, lambda: command(rig, ON & ~Control.ENABLE_VOLTAGE))
-    assert 'does not start' in answer or 'RUN input' in answer
-    assert not rig.drive.armed
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 10.0)
-    assert_it_can_be_enabled(rig)
-
-
-def test_table_16_not_ready_to_switch_on_of_a_drive_that_was_enabled(make_rig: MakeRig) -> None:
-    rig = make_rig(control_method='drive_control')
-    rig.turn()
-    self_test(rig)
-    assert_disarmed(rig, 'the drive is starting (')
-    initialise(rig)
-    assert_it_can_be_enabled(rig)
+        assert not rows_that_fail(IDLE, check)
+        turn(rig)
 
 
 # --- faults ---------------------------------------------------------------------------------------
@@ -458,60 +387,54 @@ TO_A_FAULT = {
 }
 
 
-@pytest.mark.parametrize(
-    'state', TO_A_FAULT, ids=lambda state: f'{state.value.lower()}_leaves_on_a_fault'
-)
-def test_table_16_fault(make_rig: MakeRig, exits: Exits, state: Phase) -> None:
-    rig = make_rig(control_method='drive_control')
-    rig.turn()
-    with rig.simulator.lock:
+@pytest.mark.parametrize('state', TO_A_FAULT, ids=lambda state: state.value)
+def test_table_16_fault(exits: Exits, state: Phase) -> None:
+    with Rig(WAY) as rig:
+        rig.turn()
         if state is N:
             self_test(rig)
         command(rig, *TO_A_FAULT[state])
         if state in (D, R):
-            rig.skip(0.1)
+            rig.far.advance(0.1)
         assert phase(rig) is state
         rig.far.trip(OVERLOAD)
         assert (state, A) in exits
-    wait_until(lambda: shown(rig) is State.FAULTED)
-    assert not rig.drive.armed
-    assert (A, F) in exits
-    # it is told right after
-    wait_until(lambda: sum('fault 5 Overload' in text for _, text in rig.notes.events))
-    assert sum('fault 5 Overload' in text for _, text in rig.notes.events) == 1
-    if state is N:
-        initialise(rig)
-    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
-    assert (F, D) in exits
-    assert rig.far.control_unit.ack_reads == 0
-    assert_it_can_be_enabled(rig)
+        rig.pass_time(1.0)
+        assert shown(rig) is State.FAULTED and not rig.drive.armed
+        assert (A, F) in exits
+        assert sum('fault 5 Overload' in one.text for one in rig.notes.events) == 1
+        if state is N:
+            initialise(rig)
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
+        assert (F, D) in exits
+        assert unit(rig).ack_reads == 0
+        require_stopped(rig)
+        rig.assert_only_enable_helps()
 
 
-def test_table_16_fault_reaction_active_leaves_when_the_voltage_is_off(
-    make_rig: MakeRig, exits: Exits, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_table_16_fault_reaction_active_leaves_when_the_voltage_is_off(exits: Exits) -> None:
     # an acknowledgement that comes before would have no effect
-    monkeypatch.setattr(motor_module, '_DEMAGNETISING', 0.5)
-    rig = make_rig(control_method='drive_control')
-    rig.turn()
-    rig.simulator.inject('fault', OVERLOAD)
-    wait_until(lambda: shown(rig) is State.FAULT_REACTION_ACTIVE)
-    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
-    assert [exit for exit in exits if A in exit] == [(E, A), (A, F)]
-    assert_it_can_be_enabled(rig)
+    with Rig(WAY) as rig:
+        rig.turn()
+        rig.far.trip(OVERLOAD)
+        rig.far.motor._voltage_left = 0.5
+        rig.pass_time(0.2)
+        assert shown(rig) is State.FAULT_REACTION_ACTIVE
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
+        assert [exit for exit in exits if A in exit] == [(E, A), (A, F)]
 
 
-def test_table_16_faulted_stays_while_the_fault_stands(make_rig: MakeRig, exits: Exits) -> None:
-    rig = make_rig(control_method='drive_control')
-    rig.turn()
-    rig.simulator.inject('fault', OVERLOAD, standing=True)
-    wait_until(lambda: phase(rig) is F)
-    assert '5 Overload is still active' in rig.refused(rig.drive.acknowledge())
-    assert phase(rig) is F
-    assert 'fault 5 Overload is active' in rig.refused(rig.drive.enable())
-    rig.simulator.inject('ack-cause-gone')
-    rig.next_snapshots(3)
-    # bit 7 has to rise again
-    assert phase(rig) is F
-    assert said(rig.drive.acknowledge().result(PATIENCE)) == 'acknowledged 5 Overload'
-    assert_it_can_be_enabled(rig)
+def test_table_16_faulted_stays_while_the_fault_stands() -> None:
+    with Rig(WAY) as rig:
+        rig.turn()
+        rig.far.trip(OVERLOAD, cause_present=True)
+        rig.pass_time(1.0)
+        assert '5 Overload is still active' in rig.answer(rig.drive.acknowledge())
+        assert phase(rig) is F
+        assert 'fault 5 Overload is active' in rig.answer(rig.drive.enable())
+        rig.far.end_fault_causes()
+        rig.pass_time(0.5)
+        # bit 7 has to rise again
+        assert phase(rig) is F
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
+        rig.assert_only_enable_helps()
