@@ -12,209 +12,182 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A drive that is busy (Modbus exception 06) has done nothing, and is asked again."""
 
 from __future__ import annotations
 
-from drive_rig import MODE
-from drive_rig import PATIENCE
-from drive_rig import SCMD
-from drive_rig import Rig
-from drive_rig import wait_until
 import pytest
-from support.addresses import Words
-from support.said import said
-from virtual_rig import MakeVirtual
+from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
 
-ACCEL = 0x2B0
-FREQUENCY = 0x3FC
+MODE, SCMD, STATUS = 'fieldbus.mode', 'fieldbus.scmd', 'fieldbus.inv_st'
+FREQUENCY = 'status.frq_set'
+ALWAYS = 10_000
 
 
 class Busy:
-    """Has the drive say that it is busy, so many times for each register that was named."""
+    """Has the drive say that it is busy, so many times for each parameter that is named."""
 
-    def __init__(self, rig: Rig, times: int, *registers: int, writes: bool = False) -> None:
-        self._left = dict.fromkeys(registers, times)
-        self._writes = writes
+    def __init__(self, rig: Rig, times: int, *keys: str, written: bool = True) -> None:
+        self._left = dict.fromkeys(keys, times)
+        self._written = written
         self.said = 0
-        rig.tap.before = self
+        rig.meet = self
 
-    def __call__(self, register: int, words: Words | None) -> None:
-        if self._left.get(register, 0) > 0 and (words is not None or not self._writes):
-            self._left[register] -= 1
-            self.said += 1
-            raise Refused(Refused.BUSY)
-
-
-def test_a_command_is_given_again(rig: Rig) -> None:
-    rig.connect()
-    busy = Busy(rig, 2, MODE, SCMD)
-    rig.enable()
-    assert busy.said == 4
-    assert rig.drive.armed
-    assert rig.writes(SCMD).count(0x101) == 1
+    def __call__(self, key: str, data: bytes | None) -> str | None:
+        if self._left.get(key, 0) == 0 or (data is not None) != self._written:
+            return None
+        self._left[key] -= 1
+        self.said += 1
+        return 'busy'
 
 
-def test_a_value_is_read_again(rig: Rig) -> None:
-    rig.connect()
-    busy = Busy(rig, 3, 0x2A5, 0x258)
-    rig.next_snapshots(5)
-    assert busy.said == 6
-    assert rig.drive.snapshot.connected
-    assert not rig.notes.told('lost')
+def test_a_command_is_given_again() -> None:
+    with Rig() as rig:
+        rig.connect()
+        busy = Busy(rig, 2, MODE, SCMD)
+        rig.enable()
+        assert busy.said == 4
+        assert rig.drive.armed
+        assert rig.written(SCMD).count(0x101) == 1
 
 
-def test_one_that_is_busy_for_ever_is_told_of(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(drive_state, 'TIMEOUT', 0.5)
-    rig.connect()
-    Busy(rig, 10_000, MODE)
-    assert 'the drive is busy (exception 6)' in rig.refused(rig.drive.enable())
+def test_a_value_is_read_again() -> None:
+    with Rig() as rig:
+        rig.connect()
+        busy = Busy(rig, 3, 'fieldbus.drive_status', STATUS, written=False)
+        rig.pass_time(1.0)
+        assert busy.said == 6
+        assert rig.drive.snapshot.connected and not rig.notes.said('lost')
 
 
-def test_a_stop_is_tried_on(rig: Rig) -> None:
-    rig.turn()
-    busy = Busy(rig, 3, SCMD)
-    assert said(rig.drive.stop().result(PATIENCE)).startswith(('stopping', 'stopped'))
-    assert busy.said == 3
-    rig.wait_until_still()
+def test_one_that_stays_busy_is_reported() -> None:
+    with Rig() as rig:
+        rig.connect()
+        Busy(rig, ALWAYS, MODE)
+        assert 'the drive is busy (exception 6)' in rig.answer(rig.drive.enable())
+    # and is no other model
+    with Rig() as rig:
+        Busy(rig, ALWAYS, 'fieldbus.sw_ver', written=False)
+        answer = rig.answer(rig.drive.connect())
+        assert 'the drive is busy' in answer and 'model' not in answer
 
 
-def test_a_setpoint_is_written_again(rig: Rig) -> None:
-    rig.turn(20.0)
-    register = rig.drive.registers.address('status.frq_set').index
-    busy = Busy(rig, 3, register, writes=True)
-    rig.publish(10.0)
-    rig.wait_for_frequency(10.0)
-    assert busy.said == 3
-    assert rig.drive.armed
+def test_one_that_is_busy_when_it_is_there_again_is_no_other_model() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.line.state = 'silent'
+        rig.pass_time(3.0)
+        assert rig.notes.said('lost: ')
+        Busy(rig, ALWAYS, 'fieldbus.sw_ver', written=False)
+        rig.line.mend()
+        rig.pass_time(8.0)
+        assert not rig.notes.said('another model')
+        Busy(rig, 0)
+        rig.pass_time(5.0)
+        assert rig.drive.snapshot.connected
 
 
-def test_a_drive_that_takes_no_setpoint_for_long_is_stopped(rig: Rig) -> None:
-    rig.turn(20.0)
-    register = rig.drive.registers.address('status.frq_set').index
-    Busy(rig, 10_000, register, writes=True)
-    rig.publish(10.0)
-    wait_until(lambda: not rig.drive.armed)
-    reason = 'refused set-point 10: the drive is busy'
-    rig.notes.wait_for(reason, Severity.WARNING)
-    rig.tap.before = lambda register, words: None
-    rig.wait_until_still()
+def test_a_stop_is_tried_on() -> None:
+    with Rig() as rig:
+        rig.turn()
+        busy = Busy(rig, 3, SCMD)
+        assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
+        assert busy.said == 3
 
 
 @pytest.mark.parametrize(
-    ('method', 'key'),
-    [('mode_scmd', 'fieldbus.mode'), ('drive_control', 'fieldbus.drv_ctrl_write_mask')],
+    ('way', 'key'),
+    [('rtu', MODE), ('rtu, control word', 'fieldbus.drv_ctrl_write_mask')],
 )
-def test_a_quick_stop_stays_one(make_virtual: MakeVirtual, method: str, key: str) -> None:
-    rig = make_virtual({'control.retard': 10.0}, control_method=method)
-    rig.ride()
-    rig.be_busy(rig.register(key), writes=True)
-    assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
-    assert not rig.far.motor.driven
+def test_a_quick_stop_stays_one(way: str, key: str) -> None:
+    with Rig(way, parameters={'control.retard': 10.0}) as rig:
+        rig.turn()
+        busy = Busy(rig, 1, key)
+        assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
+        assert busy.said == 1 and not rig.far.motor.driven
 
 
 @pytest.mark.parametrize('retard', [0.3, 10.0])
-def test_a_stop_is_confirmed_whatever_else_cannot_be_read(
-    make_virtual: MakeVirtual, retard: float
+def test_a_stop_is_confirmed_whatever_else_cannot_be_read(retard: float) -> None:
+    with Rig(parameters={'control.retard': retard}) as rig:
+        rig.turn()
+        Busy(rig, ALWAYS, 'control.st_mode', written=False)
+        assert rig.answer(rig.drive.stop()).startswith('stopping (')
+        assert not rig.drive.stop_unconfirmed
+
+
+def test_a_set_point_is_written_again() -> None:
+    with Rig() as rig:
+        rig.turn(20.0)
+        busy = Busy(rig, 3, FREQUENCY)
+        rig.send(10.0)
+        rig.pass_time(1.0)
+        assert busy.said == 3
+        assert rig.drive.armed and abs(rig.far.motor.frequency - 10.0) < 0.2
+
+
+def test_set_point_0_is_written_again_when_no_others_come() -> None:
+    with Rig(setpoint_timeout=0.5) as rig:
+        rig.turn()
+        Busy(rig, 1, FREQUENCY)
+        rig.send(None)
+        rig.pass_time(2.0)
+        assert rig.notes.said('no set-point for 0.5 s', Severity.WARNING)
+        assert abs(rig.far.motor.frequency) < 0.1 and rig.drive.armed
+        # how long it was busy then does not count any more
+        Busy(rig, 1, FREQUENCY)
+        rig.send(15.0)
+        rig.pass_time(1.0)
+        assert rig.drive.armed and abs(rig.far.motor.frequency - 15.0) < 0.2
+
+
+def test_a_drive_that_takes_no_set_point_for_long_is_stopped() -> None:
+    with Rig() as rig:
+        rig.turn(20.0)
+        Busy(rig, ALWAYS, FREQUENCY)
+        rig.send(10.0)
+        rig.pass_time(3.0)
+        assert not rig.drive.armed
+        assert rig.notes.said('refused set-point 10: the drive is busy', Severity.WARNING)
+        assert not rig.turns
+
+
+def test_a_status_that_stays_refused_is_a_loss_too() -> None:
+    # the motor could not be watched
+    with Rig() as rig:
+        rig.turn()
+        Busy(rig, 10, STATUS, written=False)
+        rig.pass_time(2.0)
+        assert rig.drive.armed
+        Busy(rig, ALWAYS, STATUS, written=False)
+        rig.pass_time(5.0)
+        assert rig.notes.said('lost: the drive is busy')
+        assert not rig.drive.armed
+
+
+@pytest.mark.parametrize('wrong', ['busy', 'unheard'])
+def test_one_that_was_busy_was_not_switched_off_and_one_that_was_silent_may_have_been(
+    wrong: str,
 ) -> None:
-    rig = make_virtual({'control.retard': retard})
-    rig.ride()
-    rig.be_busy(rig.register('control.st_mode'), 10_000)
-    assert rig.answer(rig.drive.stop()).startswith('stopping (')
-    assert not rig.drive.stop_unconfirmed
+    with Rig() as rig:
+        rig.turn()
+        left = [5 if wrong == 'busy' else 1]
 
-
-def test_set_point_0_is_written_again_when_no_others_come(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual(setpoint_timeout=0.5)
-    rig.ride()
-    rig.be_busy(rig.register('status.frq_set'), writes=True)
-    rig.send(None)
-    rig.pass_time(2.0)
-    assert rig.said('no set-point for 0.5 s', Severity.WARNING)
-    assert abs(rig.far.motor.frequency) < 0.1
-    assert rig.drive.armed
-    # how long it was busy then does not count any more
-    rig.be_busy(rig.register('status.frq_set'), writes=True)
-    rig.send(15.0)
-    rig.pass_time(1.0)
-    assert rig.drive.armed
-    assert abs(rig.far.motor.frequency - 15.0) < 0.2
-
-
-def test_one_that_was_busy_was_not_switched_off(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual()
-    rig.ride()
-    rig.be_busy(rig.register('status.frq_set'), 5, writes=True)
-    rig.send(10.0)
-    rig.pass_time(0.03)
-    rig.far.control_unit.press('stop')
-    rig.pass_time(0.5)
-    assert rig.said(Cause.CONTROL_LOST, Severity.WARNING)
-    assert not rig.said('did not answer')
-    assert not rig.said('switched off')
-
-
-def test_one_that_did_not_answer_a_setpoint_may_have_been(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual()
-    rig.ride()
-    setpoint = rig.register('status.frq_set')
-
-    def miss(register: int, words: Words | None) -> None:
-        if register == setpoint and words is not None:
-            rig.before = lambda register, words: None
+        def meet(key: str, data: bytes | None) -> str | None:
+            if key != FREQUENCY or data is None or not left[0]:
+                return None
+            left[0] -= 1
             rig.far.control_unit.press('stop')
-            raise NoAnswer('nobody answers')
+            return wrong
 
-    rig.before = miss
-    rig.send(10.0)
-    rig.pass_time(0.5)
-    assert rig.said(Cause.POWER_CYCLED, Severity.WARNING)
-
-
-def test_one_that_is_busy_while_connected_to_is_no_other_model(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual()
-    rig.be_busy(rig.register('fieldbus.sw_ver'), 10_000)
-    answer = rig.answer(rig.drive.connect())
-    assert 'the drive is busy' in answer
-    assert 'model' not in answer
-
-
-def test_one_that_is_busy_when_it_is_there_again_is_no_other_model(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual()
-    rig.connect()
-    rig.link.state = 'silent'
-    rig.pass_time(3.0)
-    assert rig.said('lost: ')
-    rig.be_busy(rig.register('fieldbus.sw_ver'), 10_000)
-    rig.link.mend()
-    rig.pass_time(8.0)
-    assert not rig.said('another model')
-    rig.before = lambda register, words: None
-    rig.pass_time(5.0)
-    assert rig.drive.snapshot.connected
-
-
-def test_a_status_that_is_refused_for_ever_is_a_loss_too(make_virtual: MakeVirtual) -> None:
-    # nobody could watch the motor
-    rig = make_virtual()
-    rig.ride()
-    rig.be_busy(rig.register('fieldbus.inv_st'), 10)
-    rig.pass_time(2.0)
-    assert rig.drive.armed
-    rig.be_busy(rig.register('fieldbus.inv_st'), 10_000)
-    rig.pass_time(5.0)
-    assert rig.said('lost: the drive is busy')
-    assert not rig.drive.armed
+        rig.meet = meet
+        rig.send(10.0)
+        rig.pass_time(1.0)
+        if wrong == 'busy':
+            assert rig.notes.said(Cause.CONTROL_LOST, Severity.WARNING)
+            assert not rig.notes.said('did not answer') and not rig.notes.said('switched off')
+        else:
+            assert rig.notes.said(Cause.POWER_CYCLED, Severity.WARNING)
