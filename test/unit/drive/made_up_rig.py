@@ -12,17 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Made-up drives at the other end of a line: registers behind what the bus knows as a link."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 import struct
-import threading
-import time
 from types import SimpleNamespace
+from typing import Any
 
+from support.rig import Rig
+
+from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.link import Address
 from nfo_sinus_driver.link import Identification
@@ -31,6 +32,9 @@ from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.link import Remarks
 from nfo_sinus_driver.link import Reply
 
+#: How long an access takes, s.
+_ACCESS = 0.002
+
 
 class FarEnd:
     """The registers of a drive; it refuses what it does not have."""
@@ -38,10 +42,11 @@ class FarEnd:
     protocol = PROTOCOLS['modbus_rtu']
     remarks = Remarks()
     supervision = None
+    write_and_read = None
+    rig: MadeUpRig
 
     def __init__(self, registers: dict[int, int]) -> None:
         self.registers = registers
-        self.lock = threading.Lock()
         #: What becomes of the next access to a register.
         self.fates: dict[int, LinkError] = {}
         #: Register and word of all that was written, in order; the registers read, likewise.
@@ -78,27 +83,45 @@ class FarEnd:
         return (address,)
 
     def read(self, unit: int, address: Address) -> Reply:
-        with self.lock:
-            numbers = self._numbers(address)
-            self.reads.append(address.index)
-            self.was_read(address.index)
-            words = [self.registers[number] for number in numbers]
-        return Reply(struct.pack(f'>{len(words)}H', *words), time.monotonic())
+        numbers = self._numbers(address)
+        self.reads.append(address.index)
+        self.was_read(address.index)
+        words = [self.registers[number] for number in numbers]
+        return Reply(struct.pack(f'>{len(words)}H', *words), self.rig.clock.now)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        with self.lock:
-            numbers = self._numbers(address)
-            words = struct.unpack(f'>{len(numbers)}H', data)
-            before = dict(self.registers)
-            self.writes += zip(numbers, words, strict=True)
-            self.registers.update(zip(numbers, words, strict=True))
-            self.was_written(before)
-        return Reply(b'', time.monotonic())
+        numbers = self._numbers(address)
+        words = struct.unpack(f'>{len(numbers)}H', data)
+        before = dict(self.registers)
+        self.writes += zip(numbers, words, strict=True)
+        self.registers.update(zip(numbers, words, strict=True))
+        self.was_written(before)
+        return Reply(b'', self.rig.clock.now)
 
     def _numbers(self, address: Address) -> range:
+        self.rig.line.go_to(self.rig.clock.now + _ACCESS)
         numbers = range(address.index, address.index + address.size // 2)
         if not all(number in self.registers for number in numbers):
             raise Refused(Refused.ILLEGAL_ADDRESS, 'there is no such register')
         if address.index in self.fates:
             raise self.fates.pop(address.index)
         return numbers
+
+
+class MadeUpRig(Rig):
+    """A driver of a made-up drive; the line with its simulated drive only has the clock."""
+
+    def __init__(self, made_up: FarEnd, model: str, **settings: Any) -> None:
+        self.made_up = made_up
+        made_up.rig = self
+        usual = {'control_method': '', 'setpoint_timeout': 0.0, 'model': model}
+        super().__init__(**{**usual, **settings})
+
+    def begin(self) -> None:
+        self.line.link = lambda: self.made_up  # type: ignore[method-assign,assignment]
+        super().begin()
+
+    @property
+    def found(self) -> Any:
+        """The model that the driver takes it for."""
+        return self.result(self.bus.run(detect_model(self.bus, 1)))

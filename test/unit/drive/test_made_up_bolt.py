@@ -21,28 +21,23 @@ closed, has a time-out that always stops, and runs in one direction.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 import dataclasses
+import math
 from pathlib import Path
 import shutil
 from typing import Any
 
-from drive_rig import PATIENCE
-from drive_rig import Notes
-from drive_rig import wait_until
 from made_up_rig import FarEnd
+from made_up_rig import MadeUpRig
 import pytest
 from support.said import raises
-from support.said import said
 
 from nfo_sinus_driver import families
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import CatalogError
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
@@ -97,39 +92,24 @@ def _more_folders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(families, '__path__', [*families.__path__, str(MADE_UP)])
 
 
-@pytest.fixture
-def bolt() -> Bolt:
-    return Bolt()
+class Bench(MadeUpRig):
+    """A Bolt and its driver."""
+
+    def __init__(self, **settings: Any) -> None:
+        self.bolt = Bolt()
+        super().__init__(self.bolt, 'bolt', **settings)
+
+    def turn_at_40(self) -> None:
+        self.connect(parameters=True)
+        self.enable()
+        self.drive.set_setpoint(40.0)
+        self.wait_until(lambda: self.bolt.hertz == 40.0)
+        self.pass_time(0.2)
 
 
-@pytest.fixture
-def bus(bolt: Bolt) -> Iterator[Bus]:
-    bus = Bus(bolt)  # type: ignore[arg-type]
-    bus.start()
-    yield bus
-    bus.close()
-
-
-def connected(bus: Bus, notes: Notes, **settings: Any) -> Drive:
-    """A drive that can be enabled."""
-    settings = {'model': 'bolt', 'setpoint_timeout': 0.0, **settings}
-    drive = Drive(bus, DriveSettings(**settings), notes)
-    drive.connect(parameters=True).result(PATIENCE)
-    drive.activate()
-    return drive
-
-
-def turning(bolt: Bolt, bus: Bus, notes: Notes) -> Drive:
-    """A drive that turns at 40 Hz."""
-    drive = connected(bus, notes)
-    drive.enable().result(PATIENCE)
-    drive.set_setpoint(40.0)
-    wait_until(lambda: bolt.hertz == 40.0)
-    return drive
-
-
-def test_it_is_found(bus: Bus) -> None:
-    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'bolt'
+def test_it_is_found() -> None:
+    with Bench() as rig:
+        assert rig.found == 'bolt'
 
 
 def test_the_usual_control_method_is_that_of_the_family() -> None:
@@ -142,199 +122,197 @@ def test_the_usual_control_method_is_that_of_the_family() -> None:
         DriveSettings(model='bolt', control_method='mode_scmd')
 
 
-def test_a_status_is_one_read_and_the_frequency_comes_with_it(bolt: Bolt, bus: Bus) -> None:
-    drive = turning(bolt, bus, Notes())
-    seen = drive.snapshot.status
-    assert seen is not None
-    assert (seen.code, drive.snapshot.text) == (2, 'Run')
-    assert seen.word == 2 << 16 | RUNNING
-    # the code is not published a second time
-    assert seen.shown_word == RUNNING
-    with bolt.lock:
-        bolt.reads.clear()
-    wait_until(lambda: bolt.reads.count(TOLD) > 20)
-    with bolt.lock:
-        reads = [number for number in bolt.reads if number in (TOLD, HERTZ)]
-    # it may be in the midst of one when it is begun to be counted
-    reads = reads[reads.index(TOLD) :]
-    assert reads[: len(reads) // 2 * 2] == [TOLD, HERTZ] * (len(reads) // 2)
-    assert (drive.snapshot.frequency, drive.snapshot.actual) == (40.0, 40.0)
+def test_a_status_is_one_read_and_the_frequency_comes_with_it() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        snapshot = rig.drive.snapshot
+        seen = snapshot.status
+        assert seen is not None
+        assert (seen.code, snapshot.text, seen.word) == (2, 'Run', 2 << 16 | RUNNING)
+        # the code is not published a second time
+        assert seen.shown_word == RUNNING
+        assert (snapshot.frequency, snapshot.actual) == (40.0, 40.0)
+        rig.bolt.reads.clear()
+        rig.pass_time(2.0)
+        reads = [number for number in rig.bolt.reads if number in (TOLD, HERTZ)]
+        # it may be in the midst of one when it is begun to be counted
+        reads = reads[reads.index(TOLD) :]
+        assert len(reads) > 40
+        assert reads[: len(reads) // 2 * 2] == [TOLD, HERTZ] * (len(reads) // 2)
 
 
-def test_the_word_tells_the_sign_of_what_is_measured(bolt: Bolt, bus: Bus) -> None:
-    drive = turning(bolt, bus, Notes())
-    bolt.registers[TURNS] = 1200
-    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (40.0, 1200.0))
-    bolt.backwards = True
-    wait_until(lambda: (drive.snapshot.frequency, drive.snapshot.speed) == (-40.0, -1200.0))
-    # in size it has not changed
-    assert drive.snapshot.status is not None and drive.snapshot.status.keeps_running
+def test_the_word_tells_the_sign_of_what_is_measured() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        rig.bolt.registers[TURNS] = 1200
+        rig.pass_time(2.0)
+        assert (rig.drive.snapshot.frequency, rig.drive.snapshot.speed) == (40.0, 1200.0)
+        rig.bolt.backwards = True
+        rig.wait_until(lambda: rig.drive.snapshot.speed < 0, 0.3)
+        assert rig.drive.snapshot.frequency == pytest.approx(-rig.bolt.hertz, abs=2.0)
+        assert rig.drive.snapshot.speed == -1200.0
+        # in size it has hardly changed
+        assert rig.drive.snapshot.status.driven
 
 
-def test_who_has_control_is_asked_now_and_then(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    with bolt.lock:
-        bolt.reads.clear()
-    wait_until(lambda: SOURCE in bolt.reads)
-    wait_until(lambda: bolt.reads.count(SOURCE) > 1)
-    with bolt.lock:
-        asked = [number for number in bolt.reads if number in (TOLD, SOURCE)]
-    first = asked.index(SOURCE)
-    # not with every status
-    assert asked.index(SOURCE, first + 1) - first > 10
-    with bolt.lock:
-        bolt.registers[SOURCE] = 0
-    notes.wait_for(Cause.OTHERS_IN_CONTROL)
-    wait_until(lambda: not drive.snapshot.enabled)
+def test_who_has_control_is_asked_now_and_then() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        rig.bolt.reads.clear()
+        rig.wait_until(lambda: rig.bolt.reads.count(SOURCE) > 1)
+        asked = [number for number in rig.bolt.reads if number in (TOLD, SOURCE)]
+        first = asked.index(SOURCE)
+        # not with every status
+        assert asked.index(SOURCE, first + 1) - first > 10
+        rig.bolt.registers[SOURCE] = 0
+        rig.pass_time(5.0)
+        assert rig.notes.said(Cause.OTHERS_IN_CONTROL)
+        assert not rig.drive.snapshot.enabled
 
 
-def test_a_stop_is_confirmed_by_a_frequency_that_falls(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    bolt.step = 1
-    assert drive.stop().result(PATIENCE).cause is Cause.RAMPING
-    seen = drive.inverter.seen
-    assert seen is not None and seen.runs and seen.driven and seen.frequency > 0
-    # all the way down nobody takes it for a motor that runs unasked
-    looks = len(notes.snapshots)
-    wait_until(lambda: len(notes.snapshots) > looks + 50)
-    bolt.step = 100
-    wait_until(lambda: drive.snapshot.frequency == 0)
-    assert not notes.told(Cause.RUNS_UNASKED)
-    assert drive.snapshot.status is not None and not drive.snapshot.status.driven
-    assert drive.stop().result(PATIENCE).cause is Cause.STOPPED
+def test_a_stop_is_confirmed_by_a_frequency_that_falls() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        rig.bolt.step = 1
+        assert rig.result(rig.drive.stop()).cause is Cause.RAMPING
+        seen = rig.drive.inverter.seen
+        assert seen is not None and seen.runs and seen.driven and seen.frequency > 0
+        # all the way down it is not taken for a motor that runs unasked
+        rig.pass_time(2.5)
+        rig.bolt.step = 100
+        rig.pass_time(3.0)
+        assert rig.drive.snapshot.frequency == 0
+        assert not rig.notes.said(Cause.RUNS_UNASKED)
+        assert not rig.drive.snapshot.status.driven
+        assert rig.result(rig.drive.stop()).cause is Cause.STOPPED
 
 
-def test_a_motor_that_stands_is_not_driven_whatever_the_word_says(bus: Bus) -> None:
-    drive = connected(bus, Notes())
-    drive.enable().result(PATIENCE)
-    seen = drive.read_status().result(PATIENCE)
-    assert seen.runs and seen.frequency == 0
-    assert not seen.driven and not seen.keeps_running
+def test_a_motor_that_stands_is_not_driven_whatever_the_word_says() -> None:
+    with Bench() as rig:
+        rig.connect()
+        rig.enable()
+        seen = rig.result(rig.drive.read_status())
+        assert seen.runs and seen.frequency == 0
+        assert not seen.driven and not seen.keeps_running
 
 
-def test_a_fall_from_before_the_stop_confirms_nothing(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    bolt.step = 5
-    drive.set_setpoint(20.0)
-    wait_until(lambda: bolt.hertz < 35)
-    with bolt.lock:
-        bolt.deaf, bolt.step = True, 0
-    with raises(Cause.STOP_UNCONFIRMED):
-        drive.stop().result(PATIENCE)
-    notes.wait_for('CANNOT STOP THE MOTOR')
-    with bolt.lock:
-        bolt.deaf, bolt.step = False, 5
-    wait_until(lambda: not drive.stop_unconfirmed)
-    assert bolt.registers[BITS] == 0
+def falls(rig: Bench) -> None:
+    """It falls before the stop, and no more after it."""
+    rig.bolt.step = 5
+    rig.drive.set_setpoint(20.0)
+    rig.wait_until(lambda: rig.bolt.hertz < 35)
+    rig.bolt.step = 0
 
 
-def test_a_frequency_that_wobbles_confirms_nothing(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    with bolt.lock:
-        bolt.deaf, bolt.step, bolt.wobble = True, 0, 5
-    with raises(Cause.STOP_UNCONFIRMED):
-        drive.stop().result(PATIENCE)
-    with bolt.lock:
-        bolt.deaf, bolt.step, bolt.wobble = False, 5, 0
-    wait_until(lambda: not drive.stop_unconfirmed)
+def wobbles(rig: Bench) -> None:
+    rig.bolt.step, rig.bolt.wobble = 0, 5
 
 
-def test_a_motor_that_runs_unasked_is_stopped(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    drive.stop().result(PATIENCE)
-    wait_until(lambda: drive.snapshot.frequency == 0)
-    with bolt.lock:
-        before = dict(bolt.registers)
-        bolt.registers.update({BITS: RUN, SIZE: 3000})
-        bolt.was_written(before)
-    notes.wait_for(Cause.RUNS_UNASKED)
-    wait_until(lambda: bolt.registers[BITS] == 0)
-    wait_until(lambda: bolt.hertz == 0)
+def is_not_known(rig: Bench) -> None:
+    rig.meet = lambda key, data: 'refused' if key == 'status.hertz' else None
+    rig.pass_time(2.0)
+    assert math.isnan(rig.drive.snapshot.frequency)
 
 
-def test_without_a_frequency_no_stop_is_believed(bolt: Bolt, bus: Bus) -> None:
-    drive = turning(bolt, bus, Notes())
-    del bolt.registers[HERTZ]
-    wait_until(lambda: drive.snapshot.frequency != drive.snapshot.frequency)
-    with raises(Cause.STOP_UNCONFIRMED):
-        drive.stop().result(PATIENCE)
+@pytest.mark.parametrize('frequency', [falls, wobbles, is_not_known])
+def test_a_frequency_that_does_not_fall_after_the_stop_confirms_nothing(
+    frequency: Callable[[Bench], None],
+) -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        frequency(rig)
+        rig.bolt.deaf = True
+        with raises(Cause.STOP_UNCONFIRMED):
+            rig.result(rig.drive.stop())
+        rig.pass_time(1.0)
+        assert rig.notes.said('CANNOT STOP THE MOTOR')
+        rig.bolt.deaf, rig.bolt.step, rig.bolt.wobble = False, 5, 0
+        rig.meet = lambda key, data: None
+        rig.pass_time(5.0)
+        assert not rig.drive.stop_unconfirmed
+        assert rig.bolt.registers[BITS] == 0
 
 
-def test_what_is_stored_is_written_once_and_reported(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = connected(bus, notes)
-    drive.enable().result(PATIENCE)
-    told = 'bus.source (SOURCE) was changed to take control, and is stored in the drive: terminals'
-    assert notes.told(f'{told} -> line')
-    drive.stop().result(PATIENCE)
-    drive.enable().result(PATIENCE)
-    assert bolt.writes.count((SOURCE, 1)) == 1
+def test_a_motor_that_runs_unasked_is_stopped() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        rig.answer(rig.drive.stop())
+        rig.pass_time(5.0)
+        assert rig.drive.snapshot.frequency == 0
+        before = dict(rig.bolt.registers)
+        rig.bolt.registers.update({BITS: RUN, SIZE: 3000})
+        rig.bolt.was_written(before)
+        rig.pass_time(5.0)
+        assert rig.notes.said(Cause.RUNS_UNASKED)
+        assert (rig.bolt.registers[BITS], rig.bolt.hertz) == (0, 0)
 
 
-def test_control_that_is_kept_is_said(bolt: Bolt, bus: Bus) -> None:
-    drive = turning(bolt, bus, Notes())
-    answer = drive.disconnect(PATIENCE).result(PATIENCE)
-    assert answer.cause is Cause.CONTROL_KEPT
-    assert said(answer).endswith(
-        'the bus keeps control: SOURCE is stored; set it to terminals at the keypad'
-    )
-    assert (bolt.hertz, bolt.registers[BITS], bolt.registers[SOURCE]) == (0, 0, 1)
+def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        assert rig.notes.said(
+            'bus.source (SOURCE) was changed to take control, and is stored in the drive: '
+            'terminals -> line'
+        )
+        rig.answer(rig.drive.stop())
+        rig.enable()
+        assert rig.bolt.writes.count((SOURCE, 1)) == 1
+        answer = rig.answer(rig.drive.disconnect(4.0))
+        assert Cause.CONTROL_KEPT in answer.causes
+        assert answer.endswith(
+            'the bus keeps control: SOURCE is stored; set it to terminals at the keypad'
+        )
+        assert (rig.bolt.hertz, rig.bolt.registers[BITS], rig.bolt.registers[SOURCE]) == (0, 0, 1)
 
 
-def test_an_enable_that_is_not_possible_leaves_the_drive_as_it_was(bolt: Bolt, bus: Bus) -> None:
-    bolt.registers[SOURCE] = 1
-    drive = connected(bus, Notes())
-    bolt.registers[INPUTS] = 1
-    begun = len(bolt.writes)
-    with raises(Cause.NOT_POSSIBLE) as refused:
-        drive.enable().result(PATIENCE)
-    assert said(refused.value) == 'terminal X1 is closed: open it'
-    assert bolt.writes[begun:] == []
-    assert not drive.stop_unconfirmed
-    bolt.registers[INPUTS] = 0
-    assert drive.enable().result(PATIENCE).cause is Cause.ENABLED
+def test_an_enable_that_is_not_possible_leaves_the_drive_as_it_was() -> None:
+    with Bench() as rig:
+        rig.bolt.registers[SOURCE] = 1
+        rig.connect()
+        rig.bolt.registers[INPUTS] = 1
+        begun = len(rig.bolt.writes)
+        answer = rig.answer(rig.drive.enable())
+        assert Cause.NOT_POSSIBLE in answer.causes
+        assert answer == 'terminal X1 is closed: open it'
+        assert rig.bolt.writes[begun:] == []
+        assert not rig.drive.stop_unconfirmed
+        rig.bolt.registers[INPUTS] = 0
+        rig.enable()
 
 
-def test_a_fault_that_is_there_at_the_start_waits_for_a_person(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    bolt.fault, bolt.registers[SOURCE] = 145, 1
-    drive = connected(bus, notes)
-    notes.wait_for('fault 145 Bus')
-    begun = len(bolt.writes)
-    with raises(Cause.FAULT_FORBIDS):
-        drive.enable().result(PATIENCE)
-    assert bolt.writes[begun:] == []
-    assert (BITS, RESET) not in bolt.writes
-    assert said(drive.acknowledge().result(PATIENCE)) == 'acknowledged 145 Bus'
-    assert drive.enable().result(PATIENCE).cause is Cause.ENABLED
+def test_a_fault_that_is_there_at_the_start_waits_for_a_person() -> None:
+    with Bench() as rig:
+        rig.bolt.fault, rig.bolt.registers[SOURCE] = 145, 1
+        rig.connect()
+        assert rig.notes.said('fault 145 Bus')
+        begun = len(rig.bolt.writes)
+        with raises(Cause.FAULT_FORBIDS):
+            rig.result(rig.drive.enable())
+        assert rig.bolt.writes[begun:] == []
+        assert (BITS, RESET) not in rig.bolt.writes
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 145 Bus'
+        rig.enable()
 
 
-def test_a_time_out_that_always_stops_needs_nothing_else(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = connected(bus, notes, drive_timeout=4.0)
-    assert bolt.registers[PATIENT] == 40
-    assert drive.inverter.timeout.seconds == 4.0 and drive.inverter.timeout.stops_motor
-    assert not notes.told('time-out of its own')
+def test_a_time_out_that_always_stops_needs_nothing_else() -> None:
+    with Bench(drive_timeout=4.0) as rig:
+        rig.connect()
+        assert rig.bolt.registers[PATIENT] == 40
+        assert rig.drive.inverter.timeout.seconds == 4.0 and rig.drive.inverter.timeout.stops_motor
+        assert not rig.notes.said('time-out of its own')
+    with Bench() as rig:
+        rig.connect()
+        assert rig.notes.said('no time-out of its own (T BUS is 0)')
 
 
-def test_a_time_out_that_is_off_is_called_by_its_name(bus: Bus) -> None:
-    notes = Notes()
-    connected(bus, notes)
-    notes.wait_for('no time-out of its own (T BUS is 0)')
-
-
-def test_a_set_point_is_limited_to_the_one_direction(bolt: Bolt, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(bolt, bus, notes)
-    drive.set_setpoint(-5.0)
-    wait_until(lambda: bolt.hertz == 0)
-    notes.wait_for('set-point -5 is limited to 0')
-    assert drive.armed and drive.snapshot.setpoint_clamped
+def test_a_set_point_is_limited_to_the_one_direction() -> None:
+    with Bench() as rig:
+        rig.turn_at_40()
+        rig.drive.set_setpoint(-5.0)
+        rig.pass_time(5.0)
+        assert rig.bolt.hertz == 0
+        assert rig.notes.said('set-point -5 is limited to 0')
+        assert rig.drive.armed and rig.drive.snapshot.setpoint_clamped
 
 
 def test_what_a_drive_cannot_measure_is_its_familys() -> None:
