@@ -23,7 +23,6 @@ its direction in another register.
 from __future__ import annotations
 
 from collections.abc import Callable
-from collections.abc import Iterator
 import dataclasses
 import math
 from pathlib import Path
@@ -31,22 +30,16 @@ import shutil
 import struct
 from typing import Any
 
-from drive_rig import PATIENCE
-from drive_rig import Notes
-from drive_rig import wait_until
 from made_up_rig import FarEnd
+from made_up_rig import MadeUpRig
 import pytest
 from support.said import raises
 from support.said import said
 
 from nfo_sinus_driver import families
-from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import CatalogError
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.link import NoAnswer
 from nfo_sinus_driver.link import Refused
 
@@ -104,166 +97,154 @@ def _one_folder_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(families, '__path__', [*families.__path__, more])
 
 
-@pytest.fixture
-def acme() -> Acme:
-    return Acme()
+class Bench(MadeUpRig):
+    """An Acme and its driver."""
+
+    def __init__(self, model: str = 'acme', **settings: Any) -> None:
+        self.acme = Acme()
+        settings = {'control_method': 'drive_control', **settings}
+        super().__init__(self.acme, model, **settings)
+
+    def turn_at(self, frequency: float) -> None:
+        """Set this set-point, enabled before if need be."""
+        if not self.drive.armed:
+            self.connect()
+            self.enable()
+        self.drive.set_setpoint(frequency)
+        self.wait_until(lambda: self.acme.hertz == frequency, 5.0)
+        self.pass_time(0.2)
 
 
-@pytest.fixture
-def bus(acme: Acme) -> Iterator[Bus]:
-    bus = Bus(acme)  # type: ignore[arg-type]
-    bus.start()
-    yield bus
-    bus.close()
+def test_it_is_found() -> None:
+    with Bench() as rig:
+        assert rig.found == 'acme'
 
 
-def test_it_is_found(bus: Bus) -> None:
-    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'acme'
+def test_one_that_tells_nothing_is_the_one_of_which_nothing_tells() -> None:
+    with Bench() as rig:
+        del rig.acme.registers[KIND]
+        assert rig.found == 'sinus_optimal'
 
 
-def test_one_that_tells_nothing_is_the_one_of_which_nothing_tells(acme: Acme, bus: Bus) -> None:
-    del acme.registers[KIND]
-    assert bus.run(detect_model(bus, 1)).result(PATIENCE) == 'sinus_optimal'
-
-
-def test_of_two_that_tell_nothing_a_person_has_to_say(
-    acme: Acme, bus: Bus, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_two_that_tell_nothing_a_person_has_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
     silent = dataclasses.replace(load_family('acme').profile, told_by='')
     monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
-    with raises(Cause.SEVERAL_MODELS):
-        bus.run(detect_model(bus, 1)).result(PATIENCE)
+    with Bench() as rig, raises(Cause.SEVERAL_MODELS):
+        _ = rig.found
 
 
-def driver(bus: Bus, notes: Notes, **settings: Any) -> Drive:
-    usual = {'model': 'acme', 'control_method': 'drive_control', 'setpoint_timeout': 0.0}
-    settings = {**usual, **settings}
-    return Drive(bus, DriveSettings(**settings), notes)
+def test_a_ride() -> None:
+    with Bench() as rig:
+        acme = rig.acme
+        rig.connect(parameters=True)
+        assert dict(rig.drive.parameters.values) == {'ramp.up': 5.0}
+        assert not acme.writes
 
+        rig.enable()
+        runs = acme.writes.index((WORD, REMOTE | RUN))
+        # with control and set-point 0, and only then
+        assert {(WORD, REMOTE), (TURN, 0), (SIZE, 0), (SIZE + 1, 0)} <= {*acme.writes[:runs]}
+        assert acme.registers[TOLD] == HAS_REMOTE | RUNNING
 
-def turning(acme: Acme, bus: Bus, notes: Notes, **settings: Any) -> Drive:
-    """A drive that turns at -20 Hz."""
-    drive = driver(bus, notes, **settings)
-    drive.connect().result(PATIENCE)
-    drive.activate()
-    drive.enable().result(PATIENCE)
-    drive.set_setpoint(-20.0)
-    wait_until(lambda: acme.hertz == -20.0)
-    return drive
+        rig.turn_at(20.0)
+        begun = len(acme.writes)
+        rig.turn_at(-12.34)
+        # the size is none before the direction changes
+        none, size = [(SIZE, 0), (SIZE + 1, 0)], [(SIZE, 0), (SIZE + 1, 0x1234)]
+        assert acme.writes[begun:] == [*none, (TURN, 1), *size]
+        snapshot = rig.drive.snapshot
+        assert (snapshot.actual, snapshot.setpoint, snapshot.text) == (-12.34, -12.34, 'Run')
+        # what stands there already is not written again
+        rig.turn_at(-50.0)
+        assert acme.writes[begun + 5 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
 
-
-def test_a_ride(acme: Acme, bus: Bus) -> None:
-    notes = Notes()
-    drive = driver(bus, notes)
-    drive.connect(parameters=True).result(PATIENCE)
-    drive.activate()
-    assert dict(drive.parameters.values) == {'ramp.up': 5.0}
-    assert not acme.writes
-
-    assert 'enabled' in said(drive.enable().result(PATIENCE))
-    runs = acme.writes.index((WORD, REMOTE | RUN))
-    # with control and set-point 0, and only then
-    assert {(WORD, REMOTE), (TURN, 0), (SIZE, 0), (SIZE + 1, 0)} <= {*acme.writes[:runs]}
-    assert acme.registers[TOLD] == HAS_REMOTE | RUNNING
-
-    drive.set_setpoint(20.0)
-    wait_until(lambda: acme.hertz == 20.0)
-    begun = len(acme.writes)
-    drive.set_setpoint(-12.34)
-    wait_until(lambda: acme.hertz == -12.34)
-    # the size is none before the direction changes
-    none, size = [(SIZE, 0), (SIZE + 1, 0)], [(SIZE, 0), (SIZE + 1, 0x1234)]
-    assert acme.writes[begun:] == [*none, (TURN, 1), *size]
-    wait_until(lambda: drive.snapshot.actual == -12.34)
-    assert (drive.snapshot.setpoint, drive.snapshot.text) == (-12.34, 'Run')
-    # what stands there already is not written again
-    drive.set_setpoint(-50.0)
-    wait_until(lambda: acme.hertz == -50.0)
-    assert acme.writes[begun + 5 :] == [(SIZE, 0), (SIZE + 1, 0x5000)]
-
-    with acme.lock:
         acme.trip(70)
-    wait_until(lambda: not drive.armed)
-    wait_until(lambda: acme.registers[WORD] == REMOTE)
-    notes.wait_for('Too hot. Let it cool')
-    assert said(drive.acknowledge().result(PATIENCE)) == 'acknowledged 70 Hot'
-    assert acme.hertz == 0
+        rig.pass_time(1.0)
+        assert not rig.drive.armed and acme.registers[WORD] == REMOTE
+        assert rig.notes.said('Too hot. Let it cool')
+        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 70 Hot'
+        assert acme.hertz == 0
 
-    drive.enable().result(PATIENCE)
-    drive.set_setpoint(-30.0)
-    wait_until(lambda: acme.hertz == -30.0)
-    assert 'stopped' in said(drive.stop().result(PATIENCE))
-    assert (acme.hertz, acme.registers[WORD]) == (0, REMOTE)
-    assert 'released' in said(drive.disconnect(1.0).result(PATIENCE))
-    assert acme.registers[WORD] == 0
-
-
-def test_a_set_point_that_nobody_refreshes_ends_in_both_registers(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
-    drive.settings = dataclasses.replace(drive.settings, setpoint_timeout=0.2)
-    wait_until(lambda: (acme.hertz, acme.registers[TURN]) == (0, 0))
-    wait_until(lambda: drive.snapshot.setpoint == 0)
-    assert drive.armed
-    drive.set_setpoint(-5.0)
-    wait_until(lambda: -5.0 in acme.followed)
+        rig.enable()
+        rig.turn_at(-30.0)
+        assert 'stopped' in rig.answer(rig.drive.stop())
+        assert (acme.hertz, acme.registers[WORD]) == (0, REMOTE)
+        assert 'released' in rig.answer(rig.drive.disconnect(1.0))
+        assert acme.registers[WORD] == 0
 
 
-def test_a_lost_answer_to_a_set_point_slows_no_motor_down(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
-    acme.fates[SIZE] = NoAnswer('silence')
-    begun = len(acme.writes)
-    drive.set_setpoint(-30.0)
-    wait_until(lambda: acme.hertz == -30.0)
-    assert acme.writes[begun:] == [(SIZE, 0), (SIZE + 1, 0x3000)]
-    wait_until(lambda: drive.snapshot.setpoint == -30.0)
+def test_a_set_point_that_is_not_refreshed_ends_in_both_registers() -> None:
+    with Bench(setpoint_timeout=0.2) as rig:
+        rig.turn_at(-20.0)
+        rig.pass_time(1.0)
+        assert (rig.acme.hertz, rig.acme.registers[TURN]) == (0, 0)
+        assert rig.drive.snapshot.setpoint == 0 and rig.drive.armed
+        rig.drive.set_setpoint(-5.0)
+        rig.pass_time(0.1)
+        assert -5.0 in rig.acme.followed
 
 
-def test_after_silence_a_direction_is_written_again(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
-    acme.fates[TURN] = NoAnswer('silence')
-    begun = len(acme.writes)
-    drive.set_setpoint(30.0)
-    wait_until(lambda: acme.hertz == 30.0)
-    none = [(SIZE, 0), (SIZE + 1, 0)]
-    assert acme.writes[begun:] == [*none, (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]
-    wait_until(lambda: drive.snapshot.setpoint == 30.0)
+#: What goes wrong with a write: the register, the set-point, and what is written in all.
+LOST: list[tuple[int, float, list[tuple[int, int]]]] = [
+    # no motor is slowed down for it
+    (SIZE, -30.0, [(SIZE, 0), (SIZE + 1, 0x3000)]),
+    # after silence a direction is written again
+    (TURN, 30.0, [(SIZE, 0), (SIZE + 1, 0), (TURN, 0), (SIZE, 0), (SIZE + 1, 0x3000)]),
+]
 
 
-def test_no_size_is_followed_in_the_other_direction(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
+def test_a_lost_answer_to_a_part_of_a_set_point() -> None:
+    for register, wanted, written in LOST:
+        with Bench() as rig:
+            rig.turn_at(-20.0)
+            rig.acme.fates[register] = NoAnswer('silence')
+            begun = len(rig.acme.writes)
+            rig.turn_at(wanted)
+            assert rig.acme.writes[begun:] == written
+            assert rig.drive.snapshot.setpoint == wanted
+
+
+def test_no_size_is_followed_in_the_other_direction() -> None:
     wanted = [35.0, -12.5, -50.0, 50.0, 0.0, -1.0, 0.0, 1.0, -0.01, 400.0, -400.0]
-    for before, value in zip([-20.0, *wanted], wanted, strict=False):
-        acme.followed.clear()
-        drive.set_setpoint(value)
-        wait_until(lambda value=value: acme.hertz == drive.snapshot.setpoint == value)
-        assert set(acme.followed) <= {before, 0.0, value}, value
+    with Bench() as rig:
+        rig.turn_at(-20.0)
+        for before, value in zip([-20.0, *wanted], wanted, strict=False):
+            rig.acme.followed.clear()
+            rig.turn_at(value)
+            assert rig.drive.snapshot.setpoint == value
+            assert set(rig.acme.followed) <= {before, 0.0, value}, value
 
 
-def test_a_newer_set_point_comes_between_the_writes_of_one(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
-    begun = len(acme.writes)
-    # when the size of -20 Hz is none, it is asked for once more, instead of 30 Hz
-    acme.then = lambda: drive.set_setpoint(-20.0)
-    drive.set_setpoint(30.0)
-    wait_until(lambda: len(acme.writes) == begun + 4)
-    assert acme.writes[begun:] == [(SIZE, 0), (SIZE + 1, 0), (SIZE, 0), (SIZE + 1, 0x2000)]
-    assert acme.hertz == -20.0
+def test_a_newer_set_point_comes_between_the_writes_of_one() -> None:
+    with Bench() as rig:
+        rig.turn_at(-20.0)
+        begun = len(rig.acme.writes)
+        # when the size of -20 Hz is none, it is wanted once more, instead of 30 Hz
+        rig.acme.then = lambda: rig.drive.set_setpoint(-20.0)
+        rig.drive.set_setpoint(30.0)
+        rig.pass_time(0.3)
+        assert rig.acme.writes[begun:] == [
+            (SIZE, 0), (SIZE + 1, 0), (SIZE, 0), (SIZE + 1, 0x2000),
+        ]
+        assert rig.acme.hertz == -20.0
 
 
-def test_a_refused_part_stops_the_motor(acme: Acme, bus: Bus) -> None:
-    notes = Notes()
-    drive = turning(acme, bus, notes)
-    acme.fates[SIZE] = Refused(Refused.ILLEGAL_VALUE, 'not that')
-    drive.set_setpoint(-35.0)
-    notes.wait_for('it refused set-point -35: not that')
-    wait_until(lambda: acme.registers[WORD] == REMOTE)
-    assert not drive.armed
+def test_a_refused_part_stops_the_motor() -> None:
+    with Bench() as rig:
+        rig.turn_at(-20.0)
+        rig.acme.fates[SIZE] = Refused(Refused.ILLEGAL_VALUE, 'not that')
+        rig.drive.set_setpoint(-35.0)
+        rig.pass_time(1.0)
+        assert rig.notes.said('it refused set-point -35: not that')
+        assert rig.acme.registers[WORD] == REMOTE and not rig.drive.armed
 
 
-def test_it_follows_no_set_point_for_all(acme: Acme, bus: Bus) -> None:
-    drive = turning(acme, bus, Notes())
-    refused = said(drive.setpoint.why_not_shared('acme'))
-    assert refused == 'acme takes a set-point in several writes'
+def test_it_follows_no_set_point_for_all() -> None:
+    with Bench() as rig:
+        rig.connect()
+        rig.enable()
+        refused = said(rig.drive.setpoint.why_not_shared('acme'))
+        assert refused == 'acme takes a set-point in several writes'
 
 
 @pytest.fixture
@@ -278,18 +259,15 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return folder.name
 
 
-def test_a_role_that_is_missing_is_a_feature_that_it_lacks(
-    acme: Acme, bus: Bus, bare: str
-) -> None:
-    notes = Notes()
-    drive = turning(acme, bus, notes, model=bare)
-    polls = len(notes.snapshots)
-    wait_until(lambda: len(notes.snapshots) > polls + 20)
-    assert drive.snapshot.connected and drive.armed
-    assert math.isnan(drive.snapshot.speed) and math.isnan(drive.snapshot.frequency)
-    # nothing says that it coasts
-    assert drive.stop().result(PATIENCE).cause is not Cause.COASTING
-    assert acme.hertz == 0
+def test_a_role_that_is_missing_is_a_feature_that_it_lacks(bare: str) -> None:
+    with Bench(bare) as rig:
+        rig.turn_at(-20.0)
+        rig.pass_time(2.0)
+        assert rig.drive.snapshot.connected and rig.drive.armed
+        assert math.isnan(rig.drive.snapshot.speed) and math.isnan(rig.drive.snapshot.frequency)
+        # nothing says that it coasts
+        assert rig.result(rig.drive.stop()).cause is not Cause.COASTING
+        assert rig.acme.hertz == 0
 
 
 def test_a_family_without_a_status_code_is_none(bare: str, tmp_path: Path) -> None:
