@@ -254,7 +254,7 @@ LAWS = (
         COMMANDS,
         'carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)',
         'carry_out(self._method.stop(control_mode), self._registers, Priority.REFRESH)',
-        ('test/unit/drive/test_stop_first.py',),
+        ('test/unit/drive/test_drive_commands.py', '-k', 'ahead_of_all'),
     ),
     Mutant(
         4,

@@ -22,6 +22,7 @@ import pytest
 from support.rig import WAYS
 from support.rig import Rig
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
@@ -92,6 +93,29 @@ def test_a_stop_says_what_it_finds() -> None:
             # whoever runs it at the keypad is not disturbed
             assert rig.far.motor.driven
         assert rig.written(MODE) == []
+
+
+def test_a_stop_goes_ahead_of_all_that_waits() -> None:
+    with Rig() as rig:
+        rig.turn()
+        ended = False
+        status = rig.drive.registers.address('fieldbus.drive_status')
+
+        async def flood(priority: Priority) -> None:
+            while not ended:
+                await rig.bus.read(1, status, priority)
+
+        others = [priority for priority in Priority if priority is not Priority.STOP]
+        flooding = [rig.bus.run(flood(priority)) for priority in others * 20]
+        rig.pass_time(0.5)
+        begun = len(rig.asked)
+        assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
+        # before it comes at most what was about to be sent
+        stop = [(key, data) for _, key, data in rig.asked[begun:]].index((SCMD, b'\0\0'))
+        assert stop <= 1
+        ended = True
+        for future in flooding:
+            rig.result(future)
 
 
 def test_enable_needs_an_active_drive() -> None:
