@@ -354,13 +354,14 @@ class Rig:
 
     # --- usual steps ---
 
-    def connect(self, *, parameters: bool = False) -> None:
-        """Connect to all drives and activate them."""
+    def connect(self, *, parameters: bool = False) -> Rig:
+        """Connect to all drives and activate them; return the rig."""
         for future in [drive.connect(parameters=parameters) for drive in self.drives.values()]:
             self.result(future)
         for drive in self.drives.values():
             drive.activate()
         self.pass_time(0.2)
+        return self
 
     def enable(self, *addresses: int) -> None:
         """Enable some drives, or all."""
@@ -370,8 +371,8 @@ class Rig:
         # what is asked for in the very moment of enabling does not come after it
         self.pass_time(SLICE)
 
-    def turn(self, frequency: float = 20.0) -> None:
-        """Connect, enable and turn, with a program that keeps on giving the set-point."""
+    def turn(self, frequency: float = 20.0) -> Rig:
+        """Connect, enable and turn; a program keeps on giving the set-point; return the rig."""
         self.connect()
         self.enable()
         if self.drive.settings.follows_setpoints:
@@ -381,6 +382,7 @@ class Rig:
         self.pass_time(0.3)
         for notes in self.notes_of.values():
             notes.events.clear()
+        return self
 
     def assert_only_enable_helps(self, frequency: float = 20.0) -> None:
         """Nothing turns although set-points keep arriving, until enable is called."""
