@@ -45,8 +45,7 @@ class Busy:
 
 
 def test_a_command_is_given_again() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         busy = Busy(rig, 2, MODE, SCMD)
         rig.enable()
         assert busy.said == 4
@@ -55,8 +54,7 @@ def test_a_command_is_given_again() -> None:
 
 
 def test_a_value_is_read_again() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         busy = Busy(rig, 3, 'fieldbus.drive_status', STATUS, written=False)
         rig.pass_time(1.0)
         assert busy.said == 6
@@ -64,8 +62,7 @@ def test_a_value_is_read_again() -> None:
 
 
 def test_one_that_stays_busy_is_reported() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         Busy(rig, ALWAYS, MODE)
         assert 'the drive is busy (exception 6)' in rig.answer(rig.drive.enable())
     # and is no other model
@@ -76,8 +73,7 @@ def test_one_that_stays_busy_is_reported() -> None:
 
 
 def test_one_that_is_busy_when_it_is_there_again_is_no_other_model() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.line.state = 'silent'
         rig.pass_time(3.0)
         assert rig.notes.said('lost: ')
@@ -91,8 +87,7 @@ def test_one_that_is_busy_when_it_is_there_again_is_no_other_model() -> None:
 
 
 def test_a_stop_is_tried_on() -> None:
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         busy = Busy(rig, 3, SCMD)
         assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
         assert busy.said == 3
@@ -103,8 +98,7 @@ def test_a_stop_is_tried_on() -> None:
     [('rtu', MODE), ('rtu, control word', 'fieldbus.drv_ctrl_write_mask')],
 )
 def test_a_quick_stop_stays_one(way: str, key: str) -> None:
-    with Rig(way, parameters={'control.retard': 10.0}) as rig:
-        rig.turn()
+    with Rig(way, parameters={'control.retard': 10.0}).turn() as rig:
         busy = Busy(rig, 1, key)
         assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
         assert busy.said == 1 and not rig.far.motor.driven
@@ -112,16 +106,14 @@ def test_a_quick_stop_stays_one(way: str, key: str) -> None:
 
 @pytest.mark.parametrize('retard', [0.3, 10.0])
 def test_a_stop_is_confirmed_whatever_else_cannot_be_read(retard: float) -> None:
-    with Rig(parameters={'control.retard': retard}) as rig:
-        rig.turn()
+    with Rig(parameters={'control.retard': retard}).turn() as rig:
         Busy(rig, ALWAYS, 'control.st_mode', written=False)
         assert rig.answer(rig.drive.stop()).startswith('stopping (')
         assert not rig.drive.stop_unconfirmed
 
 
 def test_a_set_point_is_written_again() -> None:
-    with Rig() as rig:
-        rig.turn(20.0)
+    with Rig().turn(20.0) as rig:
         busy = Busy(rig, 3, FREQUENCY)
         rig.send(10.0)
         rig.pass_time(1.0)
@@ -130,8 +122,7 @@ def test_a_set_point_is_written_again() -> None:
 
 
 def test_set_point_0_is_written_again_when_no_others_come() -> None:
-    with Rig(setpoint_timeout=0.5) as rig:
-        rig.turn()
+    with Rig(setpoint_timeout=0.5).turn() as rig:
         Busy(rig, 1, FREQUENCY)
         rig.send(None)
         rig.pass_time(2.0)
@@ -145,8 +136,7 @@ def test_set_point_0_is_written_again_when_no_others_come() -> None:
 
 
 def test_a_drive_that_takes_no_set_point_for_long_is_stopped() -> None:
-    with Rig() as rig:
-        rig.turn(20.0)
+    with Rig().turn(20.0) as rig:
         Busy(rig, ALWAYS, FREQUENCY)
         rig.send(10.0)
         rig.pass_time(3.0)
@@ -157,8 +147,7 @@ def test_a_drive_that_takes_no_set_point_for_long_is_stopped() -> None:
 
 def test_a_status_that_stays_refused_is_a_loss_too() -> None:
     # the motor could not be watched
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         Busy(rig, 10, STATUS, written=False)
         rig.pass_time(2.0)
         assert rig.drive.armed
@@ -172,8 +161,7 @@ def test_a_status_that_stays_refused_is_a_loss_too() -> None:
 def test_one_that_was_busy_was_not_switched_off_and_one_that_was_silent_may_have_been(
     wrong: str,
 ) -> None:
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         left = [5 if wrong == 'busy' else 1]
 
         def meet(key: str, data: bytes | None) -> str | None:

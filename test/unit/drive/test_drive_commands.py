@@ -36,8 +36,7 @@ MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
 
 
 def test_a_ride() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         assert rig.answer(rig.drive.enable()) == (
             'enabled; it follows set-points that arrive from now on'
         )
@@ -57,16 +56,14 @@ def test_a_ride() -> None:
 
 def test_stop_that_coasts_says_so() -> None:
     # a slow ramp would be noticed: it is not used
-    with Rig(parameters={'control.st_mode': 'Release', 'control.retard': 60.0}) as rig:
-        rig.turn()
+    with Rig(parameters={'control.st_mode': 'Release', 'control.retard': 60.0}).turn() as rig:
         assert rig.answer(rig.drive.stop()) == 'stopping: it coasts'
         rig.pass_time(0.5)
         assert not rig.far.motor.driven
 
 
 def test_quick_stop_lets_the_motor_coast() -> None:
-    with Rig(parameters={'control.retard': 60.0}) as rig:
-        rig.turn()
+    with Rig(parameters={'control.retard': 60.0}).turn() as rig:
         assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
         assert not rig.far.motor.driven
         assert rig.written(MODE)[-1] == Mode.STOP
@@ -78,14 +75,12 @@ def test_quick_stop_lets_the_motor_coast() -> None:
 
 
 def test_a_stop_says_what_it_finds() -> None:
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         rig.far.trip(OVERLOAD)
         rig.pass_time(1.0)
         for command in (rig.drive.stop, rig.drive.quick_stop):
             assert rig.answer(command()).startswith('stopped by fault 5 Overload')
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.control_unit.press('start')
         rig.pass_time(0.5)
         for command in (rig.drive.stop, rig.drive.quick_stop):
@@ -96,8 +91,7 @@ def test_a_stop_says_what_it_finds() -> None:
 
 
 def test_a_stop_goes_ahead_of_all_that_waits() -> None:
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         ended = False
         status = rig.drive.registers.address('fieldbus.drive_status')
 
@@ -134,8 +128,7 @@ def test_enable_needs_an_active_drive() -> None:
 
 
 def test_two_at_a_time_cannot_enable() -> None:
-    with Rig(parameters={'control.run_dly': 5}) as rig:
-        rig.connect()
+    with Rig(parameters={'control.run_dly': 5}).connect() as rig:
         first = rig.drive.enable()
         rig.pass_time(0.5)
         assert rig.answer(rig.drive.enable()) == 'it is being enabled already'
@@ -145,15 +138,13 @@ def test_two_at_a_time_cannot_enable() -> None:
 
 def test_start_delay_of_the_drive_is_waited_for() -> None:
     # what follows the delay has as long as everything else
-    with Rig(parameters={'control.run_dly': 5}) as rig:
-        rig.connect()
+    with Rig(parameters={'control.run_dly': 5}).connect() as rig:
         rig.enable()
         assert rig.far.motor.driven
 
 
 def test_a_fault_that_stands_keeps_it_from_being_enabled() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.trip(OVERLOAD)
         message = rig.answer(rig.drive.enable())
         assert message.startswith('fault 5 Overload is active: The power monitor has tripped')
@@ -163,8 +154,7 @@ def test_a_fault_that_stands_keeps_it_from_being_enabled() -> None:
 
 
 def test_run_input_is_missing() -> None:
-    with Rig(options={'run_input': False}) as rig:
-        rig.connect()
+    with Rig(options={'run_input': False}).connect() as rig:
         assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable())
         rig.pass_time(0.5)
         # the run command that waits for RUN is taken back
@@ -175,8 +165,7 @@ def test_run_input_is_missing() -> None:
 
 def test_unexpected_control_mode() -> None:
     for expected in ('Speed', 'PI-Reg'):
-        with Rig(expected_control_mode=expected) as rig:
-            rig.connect()
+        with Rig(expected_control_mode=expected).connect() as rig:
             message = rig.answer(rig.drive.enable())
             assert message.startswith(
                 f'the drive is in control mode Freque, expected is {expected}'
@@ -189,8 +178,7 @@ def test_unexpected_control_mode() -> None:
 
 
 def test_drive_that_gives_control_to_none() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.write_raw(MODE, Mode.BUS)
         rig.far.write_raw(SCMD, Scmd.FULL_TUNING)
         assert 'MODE is Inhibit' in rig.answer(rig.drive.enable())
@@ -198,8 +186,7 @@ def test_drive_that_gives_control_to_none() -> None:
 
 
 def test_drive_that_keeps_its_set_point() -> None:
-    with Rig(parameters={'status.frq_set': 30.0}) as rig:
-        rig.connect()
+    with Rig(parameters={'status.frq_set': 30.0}).connect() as rig:
         rig.spoil('ignored', 'status.frq_set', times=99)
         message = rig.answer(rig.drive.enable())
         assert message == 'the drive keeps a set-point of 30 where 0 was written'
@@ -207,8 +194,7 @@ def test_drive_that_keeps_its_set_point() -> None:
 
 
 def test_drive_that_refuses_the_run_command() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.meet = lambda key, data: (
             'refused' if (key, data) == (SCMD, b'\x01\x01') else None
         )
@@ -232,8 +218,7 @@ every_serial = pytest.mark.parametrize(
 
 @every_sinus
 def test_acknowledge(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         assert rig.answer(rig.drive.acknowledge()).startswith('nothing to acknowledge (')
         assert rig.far.control_unit.ack_reads == 0
         rig.far.trip(OVERLOAD)
@@ -251,8 +236,7 @@ def test_acknowledge(way: str) -> None:
 
 @every_sinus
 def test_acknowledge_what_still_stands(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         rig.far.trip(OVERLOAD, cause_present=True)
         rig.acknowledged = 1
         message = rig.answer(rig.drive.acknowledge())
@@ -270,8 +254,7 @@ def test_acknowledge_a_fault_that_ended_a_ride(
         refuse_control_words(monkeypatch)
     # those of the serial line, too, although it is the line that works
     for code, text in ((OVERLOAD, 'Overload'), (SIO_FAIL, 'Sio Fail'), (15, 'Bus Fail')):
-        with Rig(way) as rig:
-            rig.turn()
+        with Rig(way).turn() as rig:
             rig.far.trip(code)
             rig.pass_time(1.0)
             assert not rig.drive.armed
@@ -302,8 +285,7 @@ def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
     way: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refuse_control_words(monkeypatch)
-    with Rig(way) as rig:
-        rig.turn()
+    with Rig(way).turn() as rig:
         rig.far.trip(OVERLOAD, cause_present=True)
         rig.pass_time(1.0)
         rig.acknowledged = 1
@@ -312,8 +294,7 @@ def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
 
 @every_serial
 def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         rig.far.set_run_input(False)
         rig.far.trip(SIO_FAIL)
         rig.far.control_unit.press('ext')
@@ -331,8 +312,7 @@ def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(way: str)
 
 @every_serial
 def test_the_reason_of_a_serial_fault_is_said(way: str) -> None:
-    with Rig(way) as rig:
-        rig.turn()
+    with Rig(way).turn() as rig:
         rig.far.control_unit.serial_error(LineError.TIMEOUT)
         rig.pass_time(1.0)
         assert not rig.drive.armed
@@ -343,8 +323,7 @@ def test_the_reason_of_a_serial_fault_is_said(way: str) -> None:
 
 
 def test_monitor_writes_nothing_at_all() -> None:
-    with Rig(control_method='monitor', drive_timeout=2.0) as rig:
-        rig.connect()
+    with Rig(control_method='monitor', drive_timeout=2.0).connect() as rig:
         # another one runs it over the bus
         rig.far.write_raw(MODE, Mode.BUS)
         rig.far.write_raw('status.frq_set', 100)

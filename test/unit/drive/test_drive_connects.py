@@ -93,8 +93,7 @@ def test_rubbish_at_this_address() -> None:
 
 
 def test_snapshot_is_what_the_drive_says() -> None:
-    with Rig() as rig:
-        rig.turn(20.0)
+    with Rig().turn(20.0) as rig:
         snapshot = rig.drive.snapshot
         assert snapshot.connected and snapshot.enabled
         assert (snapshot.control_method, snapshot.control_mode) == ('mode_scmd', 'Freque')
@@ -108,24 +107,21 @@ def test_snapshot_is_what_the_drive_says() -> None:
 
 
 def test_telemetry() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.pass_time(2.0)
         values = rig.notes.telemetry[0].values
         assert values[Role.DC_LINK_VOLTAGE] == pytest.approx(565, abs=5)
         assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.1)
         assert values[Role.ENERGY] == pytest.approx(1.234)
         assert not any(math.isnan(value) for value in values.values())
-    with Rig(telemetry_rate=0.0) as rig:
-        rig.connect()
+    with Rig(telemetry_rate=0.0).connect() as rig:
         rig.pass_time(2.0)
         assert rig.notes.telemetry == []
 
 
 def test_telemetry_of_older_firmware() -> None:
     # E-Out came with 4.38, and what is not there must not be asked for
-    with Rig(parameters={'fieldbus.sw_ver': 4.30}) as rig:
-        rig.connect()
+    with Rig(parameters={'fieldbus.sw_ver': 4.30}).connect() as rig:
         rig.pass_time(2.0)
         values = rig.notes.telemetry[0].values
         assert {role for role, value in values.items() if math.isnan(value)} == {
@@ -139,8 +135,7 @@ def test_telemetry_of_older_firmware() -> None:
 
 
 def test_clean_exit() -> None:
-    with Rig(drive_timeout=20.0) as rig:
-        rig.turn()
+    with Rig(drive_timeout=20.0).turn() as rig:
         rig.send(None)
         answer = rig.answer(rig.drive.disconnect(4.0))
         assert answer == 'stopping: it ramps down; control released'
@@ -158,8 +153,7 @@ def test_clean_exit() -> None:
 
 
 def test_exit_of_one_that_never_had_control() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.control_unit.press('start')
         assert rig.answer(rig.drive.disconnect(1.0)) == 'not under bus control'
         rig.pass_time(1.0)
@@ -170,8 +164,7 @@ def test_exit_of_one_that_never_had_control() -> None:
 def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
     drive_timeout: float,
 ) -> None:
-    with Rig(parameters={'control.retard': 60.0}, drive_timeout=drive_timeout) as rig:
-        rig.turn()
+    with Rig(parameters={'control.retard': 60.0}, drive_timeout=drive_timeout).turn() as rig:
         rig.send(None)
         answer = rig.answer(rig.drive.disconnect(0.1))
         if drive_timeout:
@@ -190,8 +183,7 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
 @pytest.mark.parametrize('retries', [0, 2])
 def test_exit_in_the_middle_of_silence(retries: int) -> None:
     # a driver that cannot stop the motor says so and keeps trying
-    with Rig(retries=retries) as rig:
-        rig.turn()
+    with Rig(retries=retries).turn() as rig:
         rig.send(None)
         rig.line.state = 'silent'
         assert 'NOT' in rig.answer(rig.drive.disconnect(0.1))

@@ -73,8 +73,7 @@ def is_written(rig: Rig) -> bool:
 
 @pytest.mark.parametrize('way', G2)
 def test_newest_first_with_text_and_age(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         assert rig.result(rig.drive.error_log()) == ()
         for count in (3, 130):
             fill(rig, count)
@@ -96,8 +95,7 @@ def test_newest_first_with_text_and_age(way: str) -> None:
 
 
 def test_an_entry_that_comes_in_meanwhile() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.pass_time(1.0)
         fill(rig, 5)
         begun = len(rig.asked)
@@ -112,8 +110,7 @@ def test_an_entry_that_comes_in_meanwhile() -> None:
 
 
 def test_a_time_to_come_has_no_age() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.faults.log[:] = [LogEntry(5, 2000.0)]
         (entry,) = rig.result(rig.drive.error_log())
         assert math.isnan(entry.age)
@@ -121,13 +118,11 @@ def test_a_time_to_come_has_no_age() -> None:
 
 
 def test_reading_writes_nothing_and_lets_a_motor_run() -> None:
-    with Rig(control_method='monitor') as rig:
-        rig.connect()
+    with Rig(control_method='monitor').connect() as rig:
         fill(rig, 2)
         assert len(rig.result(rig.drive.error_log())) == 2
         assert not is_written(rig)
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         fill(rig, 32)
         assert len(rig.result(rig.drive.error_log())) == 32
         assert rig.drive.armed and rig.turns
@@ -140,8 +135,7 @@ def test_reading_writes_nothing_and_lets_a_motor_run() -> None:
 
 def test_erasing_gives_control_back_as_it_was_found() -> None:
     for found in (Mode.STOP, Mode.BUS):
-        with Rig() as rig:
-            rig.connect()
+        with Rig().connect() as rig:
             rig.far.write_raw('fieldbus.mode', found)
             fill(rig, 5)
             rig.result(rig.drive.erase_error_log())
@@ -150,8 +144,7 @@ def test_erasing_gives_control_back_as_it_was_found() -> None:
 
 
 def test_a_log_that_is_not_empty_after_all() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         fill(rig, 5)
 
         def immortal(key: str, data: bytes | None) -> None:
@@ -164,8 +157,7 @@ def test_a_log_that_is_not_empty_after_all() -> None:
 
 @pytest.mark.parametrize('way', G2)
 def test_the_energy_counter(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         total, energy = rig.far.counters.total_energy, rig.far.counters.energy
         answer = rig.answer(rig.drive.reset_energy())
         if way == 'classic v5.0':
@@ -181,8 +173,7 @@ def test_the_energy_counter(way: str) -> None:
 
 
 def test_older_firmware_cannot_reset_it() -> None:
-    with Rig(parameters={'fieldbus.sw_ver': 4.37}) as rig:
-        rig.connect()
+    with Rig(parameters={'fieldbus.sw_ver': 4.37}).connect() as rig:
         message = rig.answer(rig.drive.reset_energy())
         assert 'firmware 4.38' in message and '4.37' in message
         assert not is_written(rig)
@@ -201,8 +192,7 @@ def test_neither_before_it_is_connected_nor_after_its_end() -> None:
 
 
 def test_an_optimal_has_none_that_is_documented() -> None:
-    with Rig('optimal', **RARELY) as rig:
-        rig.connect()
+    with Rig('optimal', **RARELY).connect() as rig:
         assert 'not documented' in rig.answer(rig.drive.error_log())
         rig.far.trip(5)
         rig.pass_time(SEEN)
@@ -216,8 +206,7 @@ def test_an_optimal_has_none_that_is_documented() -> None:
 @pytest.mark.parametrize('way', [*G2, 'rtu, control word', 'monitor'])
 def test_the_entry_of_a_fault_is_told(way: str) -> None:
     monitor = {'control_method': 'monitor'} if way == 'monitor' else {}
-    with Rig('rtu' if monitor else way, poll_rate=10.0, **monitor) as rig:
-        rig.connect()
+    with Rig('rtu' if monitor else way, poll_rate=10.0, **monitor).connect() as rig:
         rig.pass_time(2.0)
         began = rig.clock.now
         rig.far.trip(5)
@@ -236,8 +225,7 @@ def test_the_entry_of_a_fault_is_told(way: str) -> None:
 
 
 def test_an_entry_has_the_local_time_of_its_moment() -> None:
-    with Rig(**RARELY) as rig:
-        rig.connect()
+    with Rig(**RARELY).connect() as rig:
         rig.far.trip(5)
         rig.pass_time(70.0)
         (entry,) = rig.notes.entries
@@ -249,8 +237,7 @@ def test_an_entry_has_the_local_time_of_its_moment() -> None:
 
 
 def test_the_motor_is_stopped_first() -> None:
-    with Rig() as rig:
-        rig.turn()
+    with Rig().turn() as rig:
         rig.pass_time(1.0)
         rig.asked.clear()
         rig.far.trip(5)
@@ -283,8 +270,7 @@ def test_a_fault_that_stands_already_is_told_but_not_since_when() -> None:
 
 
 def test_faults_that_no_poll_saw() -> None:
-    with Rig(**RARELY) as rig:
-        rig.connect()
+    with Rig(**RARELY).connect() as rig:
         rig.pass_time(1.0)
         began = rig.clock.now
         trip_unseen(rig, 7, 8)
@@ -296,8 +282,7 @@ def test_faults_that_no_poll_saw() -> None:
 
 
 def test_the_same_fault_twice_within_a_tick_is_told_twice() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.pass_time(1.0)
         rig.far.trip(5)
         rig.pass_time(3.0)
@@ -312,8 +297,7 @@ def test_the_same_fault_twice_within_a_tick_is_told_twice() -> None:
 
 
 def test_a_drive_that_writes_its_log_late() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.pass_time(1.0)
         rig.far.trip(5)
         late = list(rig.far.faults.log)
@@ -327,8 +311,7 @@ def test_a_drive_that_writes_its_log_late() -> None:
 
 
 def test_what_came_while_the_drive_was_not_reached() -> None:
-    with Rig(**RARELY) as rig:
-        rig.connect()
+    with Rig(**RARELY).connect() as rig:
         rig.pass_time(1.0)
         rig.far.power_cycle(boot_time=90.0)
         rig.far.faults.log.insert(0, LogEntry(7, HOURS))
@@ -350,8 +333,7 @@ def test_a_drive_that_has_no_log_is_asked_once() -> None:
 def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with Rig(**RARELY) as rig:
-        rig.connect()
+    with Rig(**RARELY).connect() as rig:
         rig.pass_time(3.0)
         read, hours = rig.link.read, rig.drive.registers.address('status.op_time').index
 

@@ -188,8 +188,7 @@ def test_a_stop_is_confirmed_by_a_frequency_that_falls() -> None:
 
 
 def test_a_motor_that_stands_is_not_driven_whatever_the_word_says() -> None:
-    with Bench() as rig:
-        rig.connect()
+    with Bench().connect() as rig:
         rig.enable()
         seen = rig.result(rig.drive.read_status())
         assert seen.runs and seen.frequency == 0
@@ -295,13 +294,11 @@ def test_a_fault_that_is_there_at_the_start_waits_for_a_person() -> None:
 
 
 def test_a_time_out_that_always_stops_needs_nothing_else() -> None:
-    with Bench(drive_timeout=4.0) as rig:
-        rig.connect()
+    with Bench(drive_timeout=4.0).connect() as rig:
         assert rig.bolt.registers[PATIENT] == 40
         assert rig.drive.inverter.timeout.seconds == 4.0 and rig.drive.inverter.timeout.stops_motor
         assert not rig.notes.said('time-out of its own')
-    with Bench() as rig:
-        rig.connect()
+    with Bench().connect() as rig:
         assert rig.notes.said('no time-out of its own (T BUS is 0)')
 
 

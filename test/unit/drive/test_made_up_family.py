@@ -240,8 +240,7 @@ def test_a_refused_part_stops_the_motor() -> None:
 
 
 def test_it_follows_no_set_point_for_all() -> None:
-    with Bench() as rig:
-        rig.connect()
+    with Bench().connect() as rig:
         rig.enable()
         refused = said(rig.drive.setpoint.why_not_shared('acme'))
         assert refused == 'acme takes a set-point in several writes'

@@ -48,8 +48,7 @@ def show(rig: Rig, patch: pytest.MonkeyPatch, code: int | None, *, driven: bool 
 
 
 def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
-    with Rig(WAY, parameters={'control.retard': 20.0}) as rig:
-        rig.turn(40.0)
+    with Rig(WAY, parameters={'control.retard': 20.0}).turn(40.0) as rig:
         assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
         rig.pass_time(5.0)
         assert rig.far.motor.driven
@@ -74,8 +73,7 @@ def test_torque_has_the_decimals_of_its_firmware() -> None:
 def test_a_chopper_and_a_current_limit_are_no_take_over(
     monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
-    with Rig(WAY) as rig:
-        rig.turn()
+    with Rig(WAY).turn() as rig:
         show(rig, monkeypatch, code)
         rig.pass_time(1.0)
         assert rig.drive.armed and rig.turns, rig.notes.events
@@ -91,8 +89,7 @@ def test_a_chopper_and_a_current_limit_are_no_take_over(
 def test_a_take_over_behind_a_current_limit_is_noticed(
     monkeypatch: pytest.MonkeyPatch, press: str
 ) -> None:
-    with Rig(WAY) as rig:
-        rig.turn()
+    with Rig(WAY).turn() as rig:
         show(rig, monkeypatch, LIMIT)
         rig.pass_time(0.5)
         assert rig.drive.armed
@@ -104,16 +101,14 @@ def test_a_take_over_behind_a_current_limit_is_noticed(
 
 
 def test_a_motor_that_starts_against_its_current_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    with Rig(WAY) as rig:
-        rig.connect()
+    with Rig(WAY).connect() as rig:
         show(rig, monkeypatch, LIMIT, driven=True)
         rig.enable()
         assert rig.drive.armed
 
 
 def test_a_stop_is_not_confirmed_by_a_current_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    with Rig(WAY) as rig:
-        rig.turn()
+    with Rig(WAY).turn() as rig:
         show(rig, monkeypatch, LIMIT)
         monkeypatch.setattr(type(rig.far.control_unit), 'command', lambda self, scmd: None)
         with raises(Cause.STOP_UNCONFIRMED):
@@ -125,8 +120,7 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize('press', ['start', 'ext'])
 def test_a_motor_that_others_run_is_seen_to_run_and_left_alone(press: str) -> None:
-    with Rig(WAY) as rig:
-        rig.connect()
+    with Rig(WAY).connect() as rig:
         rig.far.control_unit.press(press)
         rig.pass_time(1.0)
         status = rig.drive.snapshot.status
@@ -140,8 +134,7 @@ def test_a_motor_that_others_run_is_seen_to_run_and_left_alone(press: str) -> No
 
 def test_current_limit_is_no_stop() -> None:
     # its code stands in for the one that says who runs the motor
-    with Rig(WAY) as rig:
-        rig.turn()
+    with Rig(WAY).turn() as rig:
         rig.far.motor.load = 6.0
         rig.pass_time(3.0)
         status = rig.drive.snapshot.status
@@ -168,8 +161,7 @@ def test_counters_have_24_bits_over_classic(monkeypatch: pytest.MonkeyPatch) -> 
         return word | 0xA500 if number in (0x0127, 0x0128, 0x00DE) else word
 
     monkeypatch.setattr(Server, 'enquiry', filled)
-    with Rig(WAY) as rig:
-        rig.connect()
+    with Rig(WAY).connect() as rig:
         rig.pass_time(10.0)
         values = rig.notes.telemetry[-1].values
         assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.2)

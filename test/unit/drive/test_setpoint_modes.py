@@ -133,8 +133,7 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(ends: tuple[float, f
         'control.mode': 'PI-Reg', 'pi_reg.unit': 'kPa',
         'pi_reg.setmin': setmin, 'pi_reg.setmax': setmax,
     }
-    with Rig(parameters=process, setpoint_timeout=0.0) as rig:
-        rig.connect()
+    with Rig(parameters=process, setpoint_timeout=0.0).connect() as rig:
         rig.enable()
         low, high = sorted(ends) if setmin != setmax else (-2000.0, 2000.0)
         for value in (400.0, high + 100.0, low - 100.0):
@@ -148,8 +147,7 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(ends: tuple[float, f
 
 def test_setpoint_max_is_kept_where_it_is_less_than_the_drive_takes() -> None:
     process = {'control.mode': 'PI-Reg', 'pi_reg.setmin': 100.0, 'pi_reg.setmax': 400.0}
-    with Rig(parameters=process, setpoint_max=50.0) as rig:
-        rig.connect()
+    with Rig(parameters=process, setpoint_max=50.0).connect() as rig:
         rig.enable()
         rig.send(80.0)
         rig.pass_time(0.3)
@@ -194,8 +192,7 @@ def test_the_newest_set_point_counts_and_what_is_no_number_is_none() -> None:
 
 
 def test_neither_a_set_point_from_before_nor_one_in_the_drive_counts() -> None:
-    with Rig(parameters={'status.frq_set': 50.0}) as rig:
-        rig.connect()
+    with Rig(parameters={'status.frq_set': 50.0}).connect() as rig:
         rig.drive.set_setpoint(30.0)
         rig.enable()
         rig.pass_time(0.5)
@@ -205,8 +202,7 @@ def test_neither_a_set_point_from_before_nor_one_in_the_drive_counts() -> None:
 
 
 def test_unchanged_set_point_is_written_every_five_seconds() -> None:
-    with Rig() as rig:
-        rig.turn(10.0)
+    with Rig().turn(10.0) as rig:
         before = len(rig.written('status.frq_set'))
         rig.pass_time(10.0)
         # it is written all the same, for the drive may have lost it
@@ -214,8 +210,7 @@ def test_unchanged_set_point_is_written_every_five_seconds() -> None:
 
 
 def test_set_points_that_stop_coming_are_no_stop() -> None:
-    with Rig(setpoint_timeout=0.3) as rig:
-        rig.turn(10.0)
+    with Rig(setpoint_timeout=0.3).turn(10.0) as rig:
         rig.send(None)
         rig.pass_time(1.5)
         assert rig.far.motor.frequency == rig.drive.snapshot.setpoint == 0.0
@@ -270,8 +265,7 @@ def test_mode_that_is_changed_at_the_keypad_disarms(way: str, before: str, after
 
 @both_methods
 def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect(parameters=True)
+    with Rig(way).connect(parameters=True) as rig:
         rig.enable()
         # a motor that is enabled is driven, and a drive changes its mode at standstill only
         change = {'control.mode': 'Speed'}
@@ -292,8 +286,7 @@ def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
 
 @both_methods
 def test_mode_that_was_changed_at_a_standstill_is_found_by_enable(way: str) -> None:
-    with Rig(way) as rig:
-        rig.turn()
+    with Rig(way).turn() as rig:
         rig.answer(rig.drive.stop())
         rig.send(None)
         rig.pass_time(1.0)
@@ -329,8 +322,7 @@ def timeouts(rig: Rig) -> tuple[int, int]:
 
 
 def test_drive_timeout_is_set() -> None:
-    with Rig(drive_timeout=2.5) as rig:
-        rig.connect()
+    with Rig(drive_timeout=2.5).connect() as rig:
         assert timeouts(rig) == (25, 1)
         assert rig.far.writes == {TOT: 1, STOP: 1}
         assert rig.notes.said('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
@@ -344,15 +336,13 @@ def test_drive_timeout_is_set() -> None:
 
 
 def test_drive_timeout_may_be_left_as_it_is() -> None:
-    with Rig(parameters={TOT: 7.0}) as rig:
-        rig.connect()
+    with Rig(parameters={TOT: 7.0}).connect() as rig:
         assert rig.result(rig.drive.set_drive_timeout(0.0)) == ()
         assert timeouts(rig) == (70, 0) and not rig.far.writes
 
 
 def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> None:
-    with Rig(parameters={TOT: 1.2, STOP: True}) as rig:
-        rig.connect()
+    with Rig(parameters={TOT: 1.2, STOP: True}).connect() as rig:
         assert rig.notes.said('SioTot 1.2 s) is less than lost_after + 0.5 s', Severity.WARNING)
         assert rig.notes.said('set drive_timeout, at least 1.5 s', Severity.WARNING)
 
@@ -360,8 +350,7 @@ def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> Non
 def test_a_drive_timeout_that_is_not_taken_leaves_what_was_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with Rig(parameters={TOT: 7.0}) as rig:
-        rig.connect()
+    with Rig(parameters={TOT: 7.0}).connect() as rig:
         rig.spoil('refused', STOP)
         assert 'exception 4' in rig.answer(rig.drive.set_drive_timeout(2.0))
         assert timeouts(rig) == (70, 0)
@@ -389,8 +378,7 @@ def test_bus_is_never_silent_for_long(way: str) -> None:
         pytest.skip('its time-out is another')
     # polls are wanted less often than the drive must hear of us
     rare = {'poll_rate': 0.1, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
-    with Rig(way, drive_timeout=2.5, **rare) as rig:
-        rig.connect()
+    with Rig(way, drive_timeout=2.5, **rare).connect() as rig:
         rig.enable()
         rig.answer(rig.drive.stop())
         rig.pass_time(30.0)

@@ -65,8 +65,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(way: str) -> Non
     # the long ones once
     for procedure in COMMANDS if way == 'rtu' else list(COMMANDS)[2:]:
         command, code, text = COMMANDS[procedure]
-        with Rig(way, poll_rate=5.0) as rig:
-            rig.connect()
+        with Rig(way, poll_rate=5.0).connect() as rig:
             news: list[tuple[Snapshot, float]] = []
             before = {key: rig.far.peek(key) for key in rig.far.settings}
             future = rig.drive.tune(procedure, lambda *told, news=news: news.append(told))
@@ -93,8 +92,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(way: str) -> Non
 def test_standby_after_a_tuning_is_success_where_something_was_measured(
     procedure: Procedure,
 ) -> None:
-    with Rig(options={'tuning_ends_in': 'standby'}) as rig:
-        rig.connect()
+    with Rig(options={'tuning_ends_in': 'standby'}).connect() as rig:
         result = rig.result(rig.drive.tune(procedure))
         assert result.success and '37' in said(result.how)
         assert result.changes
@@ -113,8 +111,7 @@ ENDS: dict[str, tuple[Callable[[Rig], object], str]] = {
 @pytest.mark.parametrize('end', ENDS)
 @pytest.mark.parametrize('ends_in', ['code', 'standby'])
 def test_a_tuning_that_was_ended_by_something_else_is_no_success(end: str, ends_in: str) -> None:
-    with Rig(options={'tuning_ends_in': ends_in}) as rig:
-        rig.connect()
+    with Rig(options={'tuning_ends_in': ends_in}).connect() as rig:
         future = begin(rig)
         rig.pass_time(0.5)
         act, text = ENDS[end]
@@ -125,8 +122,7 @@ def test_a_tuning_that_was_ended_by_something_else_is_no_success(end: str, ends_
 
 
 def test_control_is_given_back_as_it_was_found() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         rig.far.write_raw(MODE, Mode.BUS)
         assert rig.result(rig.drive.tune(Procedure.CALCULATE)).success
         assert rig.far.control_unit.mode == Mode.BUS
@@ -136,8 +132,7 @@ def test_control_is_given_back_as_it_was_found() -> None:
 
 
 def test_mode_inhibit_is_no_take_over_and_the_status_flows() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         future = begin(rig)
         assert rig.far.control_unit.mode == Mode.INHIBIT
         rig.pass_time(2.0)
@@ -150,8 +145,7 @@ def test_mode_inhibit_is_no_take_over_and_the_status_flows() -> None:
 
 
 def test_the_parameters_are_known_anew_and_not_changed_meanwhile() -> None:
-    with Rig() as rig:
-        rig.connect(parameters=True)
+    with Rig().connect(parameters=True) as rig:
         old = rig.drive.parameters.values['motor.r_stat']
         rig.notes.parameters.clear()
         future = begin(rig, Procedure.STATOR_RESISTANCE)
@@ -171,8 +165,7 @@ def test_the_parameters_are_known_anew_and_not_changed_meanwhile() -> None:
 
 @every_way
 def test_a_failure_is_said_in_the_words_of_the_drive(way: str) -> None:
-    with Rig(way, poll_rate=5.0) as rig:
-        rig.connect()
+    with Rig(way, poll_rate=5.0).connect() as rig:
         for code, text in ((16, '16 TunFailP'), (17, '17 TunFailM')):
             rig.far.control_unit.fail_tuning(code)
             result = rig.result(rig.drive.tune(Procedure.STATOR_RESISTANCE))
@@ -187,8 +180,7 @@ def test_a_failure_is_said_in_the_words_of_the_drive(way: str) -> None:
 
 @every_way
 def test_cancelling_stops_it(way: str) -> None:
-    with Rig(way) as rig:
-        rig.connect()
+    with Rig(way).connect() as rig:
         future = begin(rig)
         rig.answer(rig.drive.cancel_tuning())
         assert rig.far.control_unit.tuning is None
@@ -203,8 +195,7 @@ def test_cancelling_stops_it(way: str) -> None:
 
 @pytest.mark.parametrize('out', ['stop', 'quick_stop', 'deactivate', 'disconnect'])
 def test_every_way_out_ends_it(out: str) -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         future = begin(rig)
         if out == 'quick_stop':
             # MODE cannot be written meanwhile, so it ends as an ordinary stop does
@@ -218,8 +209,7 @@ def test_every_way_out_ends_it(out: str) -> None:
 
 
 def test_a_drive_that_takes_no_stop_meanwhile_is_reported() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         future = begin(rig)
         rig.spoil('refused', SCMD, times=9999)
         message = rig.answer(rig.drive.stop())
@@ -232,8 +222,7 @@ def test_a_drive_that_takes_no_stop_meanwhile_is_reported() -> None:
 
 
 def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         future = begin(rig)
         rig.far.control_unit.tuning.left = 3600.0
         rig.line.state = 'silent'
@@ -248,8 +237,7 @@ def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back() -> None:
 
 
 def test_not_two_at_a_time() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         future = begin(rig)
         assert 'is going on already' in rig.answer(rig.drive.tune(Procedure.BASIC))
         assert 'is going on already' in rig.answer(rig.drive.erase_error_log())
@@ -289,8 +277,7 @@ REFUSED: dict[str, tuple[Callable[[Rig], object], str]] = {
 
 @pytest.mark.parametrize('state', REFUSED)
 def test_refused(state: str) -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         lead, text = REFUSED[state]
         lead(rig)
         driven = rig.far.motor.driven, rig.drive.armed
@@ -301,8 +288,7 @@ def test_refused(state: str) -> None:
 
 
 def test_without_the_run_input_it_does_not_begin() -> None:
-    with Rig(options={'run_input': False}) as rig:
-        rig.connect()
+    with Rig(options={'run_input': False}).connect() as rig:
         result = rig.result(rig.drive.tune(Procedure.FULL))
         assert not result.success and 'RUN input' in said(result.how)
         assert rig.far.control_unit.mode == Mode.STOP
@@ -314,8 +300,7 @@ def test_refused_where_there_is_no_such_command() -> None:
         ('rtu, control word', {}, 'does not mix control methods'),
         ('optimal', {}, 'is not known of this model'),
     ):
-        with Rig(way, **settings) as rig:
-            rig.connect()
+        with Rig(way, **settings).connect() as rig:
             for command in (
                 rig.drive.tune(Procedure.FULL), rig.drive.reset_energy(),
                 rig.drive.erase_error_log(),
@@ -385,8 +370,7 @@ def busy_to_calculate(rig: Rig, times: int) -> list[float]:
 
 
 def test_a_busy_drive_is_asked_again_to_tune() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         busy = busy_to_calculate(rig, 4)
         assert '47 ParClcOK' in rig.answer(rig.drive.tune(Procedure.CALCULATE))
         assert len(busy) == 4
@@ -394,8 +378,7 @@ def test_a_busy_drive_is_asked_again_to_tune() -> None:
 
 
 def test_a_drive_that_stays_busy_does_not_tune() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         busy = busy_to_calculate(rig, 10_000)
         assert 'the drive is busy' in rig.answer(rig.drive.tune(Procedure.CALCULATE))
         assert 0.4 < busy[-1] - busy[0] < 0.6
@@ -405,8 +388,7 @@ def test_a_drive_that_stays_busy_does_not_tune() -> None:
 
 
 def test_a_drive_that_was_busy_is_not_asked_to_tune_after_a_stop() -> None:
-    with Rig() as rig:
-        rig.connect()
+    with Rig().connect() as rig:
         busy = busy_to_calculate(rig, 2)
         tuning = rig.drive.tune(Procedure.CALCULATE)
         rig.wait_until(lambda: busy)
