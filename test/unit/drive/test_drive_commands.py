@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 from support.rig import WAYS
 from support.rig import Rig
@@ -127,18 +125,14 @@ def test_enable_needs_an_active_drive() -> None:
         assert rig.answer(rig.drive.enable()) == 'the drive is not active'
 
 
-def test_two_at_a_time_cannot_enable() -> None:
+def test_two_at_a_time_cannot_enable_and_a_start_delay_of_the_drive_is_waited_for() -> None:
     with Rig(parameters={'control.run_dly': 5}).connect() as rig:
         first = rig.drive.enable()
         rig.pass_time(0.5)
         assert rig.answer(rig.drive.enable()) == 'it is being enabled already'
         rig.answer(rig.drive.stop())
         assert rig.answer(first) == 'it was stopped while it was being enabled'
-
-
-def test_start_delay_of_the_drive_is_waited_for() -> None:
-    # what follows the delay has as long as everything else
-    with Rig(parameters={'control.run_dly': 5}).connect() as rig:
+        # what follows the delay has as long as everything else
         rig.enable()
         assert rig.far.motor.driven
 
@@ -161,20 +155,6 @@ def test_run_input_is_missing() -> None:
         assert rig.far.control_unit.scmd == 0
         rig.far.set_run_input(True)
         rig.assert_only_enable_helps()
-
-
-def test_unexpected_control_mode() -> None:
-    for expected in ('Speed', 'PI-Reg'):
-        with Rig(expected_control_mode=expected).connect() as rig:
-            message = rig.answer(rig.drive.enable())
-            assert message.startswith(
-                f'the drive is in control mode Freque, expected is {expected}'
-            )
-            assert Scmd.FIELDBUS not in rig.written(SCMD)
-            rig.drive.settings = dataclasses.replace(
-                rig.drive.settings, expected_control_mode='Freque'
-            )
-            rig.enable()
 
 
 def test_drive_that_gives_control_to_none() -> None:

@@ -134,14 +134,15 @@ def test_telemetry_of_older_firmware() -> None:
         )} & asked
 
 
-def test_clean_exit() -> None:
-    with Rig(drive_timeout=20.0).turn() as rig:
+@pytest.mark.parametrize('way', ['rtu', 'optimal'])
+def test_clean_exit(way: str) -> None:
+    with Rig(way, drive_timeout=20.0 if way == 'rtu' else 0.0).turn() as rig:
         rig.send(None)
         answer = rig.answer(rig.drive.disconnect(4.0))
         assert answer == 'stopping: it ramps down; control released'
         assert not rig.far.motor.driven
-        assert rig.far.control_unit.mode is Mode.STOP
-        assert rig.far.control_unit.mode_ext_writes == 0
+        assert rig.written(MODE) == [Mode.BUS, Mode.STOP]
+        assert rig.far.control_unit.mode == Mode.STOP
         assert not rig.drive.armed and not rig.drive.snapshot.connected
         # silence from now on, and no fault comes of it
         asked = len(rig.asked)

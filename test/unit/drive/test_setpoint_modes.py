@@ -191,16 +191,6 @@ def test_the_newest_set_point_counts_and_what_is_no_number_is_none() -> None:
         assert not rig.notes.said(Cause.SETPOINT_LIMITED, Severity.WARNING)
 
 
-def test_neither_a_set_point_from_before_nor_one_in_the_drive_counts() -> None:
-    with Rig(parameters={'status.frq_set': 50.0}).connect() as rig:
-        rig.drive.set_setpoint(30.0)
-        rig.enable()
-        rig.pass_time(0.5)
-        assert rig.far.memory.raw('status.frq_set') == 0 == rig.far.motor.frequency
-        assert rig.drive.snapshot.setpoint == 0.0
-        assert math.isnan(rig.drive.snapshot.setpoint_age)
-
-
 def test_unchanged_set_point_is_written_every_five_seconds() -> None:
     with Rig().turn(10.0) as rig:
         before = len(rig.written('status.frq_set'))
@@ -314,6 +304,10 @@ def test_expected_control_mode_guards_enable(way: str) -> None:
 # --- the drive's own time-out ---------------------------------------------------------------------
 
 TOT, STOP = 'serial.sio_tot', 'serial.auto_stop'
+TIMED = [
+    name for name, way in WAYS.items()
+    if way.model == 'sinus_g2' and way.protocol not in ('canopen', 'telegram1')
+]
 
 
 def timeouts(rig: Rig) -> tuple[int, int]:
@@ -335,12 +329,6 @@ def test_drive_timeout_is_set() -> None:
         assert rig.far.writes == {TOT: 2, STOP: 1}
 
 
-def test_drive_timeout_may_be_left_as_it_is() -> None:
-    with Rig(parameters={TOT: 7.0}).connect() as rig:
-        assert rig.result(rig.drive.set_drive_timeout(0.0)) == ()
-        assert timeouts(rig) == (70, 0) and not rig.far.writes
-
-
 def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> None:
     with Rig(parameters={TOT: 1.2, STOP: True}).connect() as rig:
         assert rig.notes.said('SioTot 1.2 s) is less than lost_after + 0.5 s', Severity.WARNING)
@@ -352,6 +340,8 @@ def test_a_drive_timeout_that_is_not_taken_leaves_what_was_there(
 ) -> None:
     with Rig(parameters={TOT: 7.0}).connect() as rig:
         rig.spoil('refused', STOP)
+        # 0 leaves it as it is
+        assert rig.result(rig.drive.set_drive_timeout(0.0)) == () and not rig.far.writes
         assert 'exception 4' in rig.answer(rig.drive.set_drive_timeout(2.0))
         assert timeouts(rig) == (70, 0)
         store = rig.far._store
@@ -372,10 +362,8 @@ def test_drive_timeout_that_no_manual_allows() -> None:
         assert timeouts(rig) == (20, 1)
 
 
-@pytest.mark.parametrize('way', [way for way, one in WAYS.items() if one.model == 'sinus_g2'])
+@pytest.mark.parametrize('way', TIMED)
 def test_bus_is_never_silent_for_long(way: str) -> None:
-    if WAYS[way].protocol in ('canopen', 'telegram1'):
-        pytest.skip('its time-out is another')
     # polls are wanted less often than the drive must hear of us
     rare = {'poll_rate': 0.1, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
     with Rig(way, drive_timeout=2.5, **rare).connect() as rig:

@@ -99,15 +99,6 @@ def test_no_code_is_left_out() -> None:
 
 
 @both_models
-def test_mode_1_gives_control_back_when_the_motor_stands(way: str) -> None:
-    with Rig(way).turn() as rig:
-        rig.send(None)
-        assert rig.answer(rig.drive.disconnect(4.0)).endswith('; control released')
-        assert rig.written(MODE) == [Mode.BUS, 1]
-        assert (rig.far.motor.driven, rig.far.control_unit.mode) == (False, 1)
-
-
-@both_models
 def test_mode_2_is_read_from_the_terminals_and_never_written(way: str) -> None:
     with Rig(way).turn() as rig:
         rig.far.control_unit.press('ext')

@@ -39,7 +39,6 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Telemetry
 from nfo_sinus_driver.link import line_settings
 from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -59,10 +58,6 @@ class Listener(Notes):
     def on_snapshot(self, snapshot: Any) -> None:
         self.threads.add(threading.get_ident())
         super().on_snapshot(snapshot)
-
-    def on_telemetry(self, telemetry: Telemetry) -> None:
-        self.threads.add(threading.get_ident())
-        super().on_telemetry(telemetry)
 
     def on_event(self, event: Any) -> None:
         self.threads.add(threading.get_ident())
