@@ -170,31 +170,6 @@ def test_who_has_control_is_asked_now_and_then() -> None:
         assert not rig.drive.snapshot.enabled
 
 
-def test_a_stop_is_confirmed_by_a_frequency_that_falls() -> None:
-    with Bench() as rig:
-        rig.turn_at_40()
-        rig.bolt.step = 1
-        assert rig.result(rig.drive.stop()).cause is Cause.RAMPING
-        seen = rig.drive.inverter.seen
-        assert seen is not None and seen.runs and seen.driven and seen.frequency > 0
-        # all the way down it is not taken for a motor that runs unasked
-        rig.pass_time(2.5)
-        rig.bolt.step = 100
-        rig.pass_time(3.0)
-        assert rig.drive.snapshot.frequency == 0
-        assert not rig.notes.said(Cause.RUNS_UNASKED)
-        assert not rig.drive.snapshot.status.driven
-        assert rig.result(rig.drive.stop()).cause is Cause.STOPPED
-
-
-def test_a_motor_that_stands_is_not_driven_whatever_the_word_says() -> None:
-    with Bench().connect() as rig:
-        rig.enable()
-        seen = rig.result(rig.drive.read_status())
-        assert seen.runs and seen.frequency == 0
-        assert not seen.driven and not seen.keeps_running
-
-
 def falls(rig: Bench) -> None:
     """It falls before the stop, and no more after it."""
     rig.bolt.step = 5
@@ -232,20 +207,6 @@ def test_a_frequency_that_does_not_fall_after_the_stop_confirms_nothing(
         assert rig.bolt.registers[BITS] == 0
 
 
-def test_a_motor_that_runs_unasked_is_stopped() -> None:
-    with Bench() as rig:
-        rig.turn_at_40()
-        rig.answer(rig.drive.stop())
-        rig.pass_time(5.0)
-        assert rig.drive.snapshot.frequency == 0
-        before = dict(rig.bolt.registers)
-        rig.bolt.registers.update({BITS: RUN, SIZE: 3000})
-        rig.bolt.was_written(before)
-        rig.pass_time(5.0)
-        assert rig.notes.said(Cause.RUNS_UNASKED)
-        assert (rig.bolt.registers[BITS], rig.bolt.hertz) == (0, 0)
-
-
 def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
     with Bench() as rig:
         rig.turn_at_40()
@@ -262,35 +223,6 @@ def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
             'the bus keeps control: SOURCE is stored; set it to terminals at the keypad'
         )
         assert (rig.bolt.hertz, rig.bolt.registers[BITS], rig.bolt.registers[SOURCE]) == (0, 0, 1)
-
-
-def test_an_enable_that_is_not_possible_leaves_the_drive_as_it_was() -> None:
-    with Bench() as rig:
-        rig.bolt.registers[SOURCE] = 1
-        rig.connect()
-        rig.bolt.registers[INPUTS] = 1
-        begun = len(rig.bolt.writes)
-        answer = rig.answer(rig.drive.enable())
-        assert Cause.NOT_POSSIBLE in answer.causes
-        assert answer == 'terminal X1 is closed: open it'
-        assert rig.bolt.writes[begun:] == []
-        assert not rig.drive.stop_unconfirmed
-        rig.bolt.registers[INPUTS] = 0
-        rig.enable()
-
-
-def test_a_fault_that_is_there_at_the_start_waits_for_a_person() -> None:
-    with Bench() as rig:
-        rig.bolt.fault, rig.bolt.registers[SOURCE] = 145, 1
-        rig.connect()
-        assert rig.notes.said('fault 145 Bus')
-        begun = len(rig.bolt.writes)
-        with raises(Cause.FAULT_FORBIDS):
-            rig.result(rig.drive.enable())
-        assert rig.bolt.writes[begun:] == []
-        assert (BITS, RESET) not in rig.bolt.writes
-        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 145 Bus'
-        rig.enable()
 
 
 def test_a_time_out_that_always_stops_needs_nothing_else() -> None:
