@@ -54,7 +54,7 @@ PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
 WITHOUT_TIME = {'bus', 'drive', 'link'}
 ASKS_FOR_TIME = frozenset(
     f'link/{name}.py' for name in ('serial_port', 'socketcan', 'tcp_connection', 'url_port')
-) | {'drive/snapshot.py'}
+)
 
 #: What names a family in a file that is to know none: in an import, an identifier, a text.
 FAMILY = re.compile(
