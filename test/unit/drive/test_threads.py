@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+import contextlib
 import itertools
 import threading
 import time
@@ -121,46 +122,31 @@ def try_to(command: Callable[[], Any]) -> bool:
     return True
 
 
-class Hammer:
-    """Threads that do something again and again until the end of the block."""
+@contextlib.contextmanager
+def meanwhile(*actions: Callable[[], object]) -> Iterator[None]:
+    """Have threads do something again and again."""
+    ended = threading.Event()
 
-    def __init__(self, *actions: Callable[[], object]) -> None:
-        self._ended = threading.Event()
-        self._counts = [0] * len(actions)
-        self._pool = ThreadPoolExecutor(len(actions))
-        self._futures = [
-            self._pool.submit(self._work, *numbered) for numbered in enumerate(actions)
-        ]
-
-    def _work(self, number: int, action: Callable[[], object]) -> None:
-        while not self._ended.is_set():
+    def work(action: Callable[[], object]) -> None:
+        while not ended.is_set():
             action()
-            self._counts[number] += 1
             time.sleep(0.0005)
 
-    def strike(self) -> None:
-        """Wait until each has done it some times more."""
-        before = list(self._counts)
-        wait_until(
-            lambda: all(now > then + 3 for now, then in zip(self._counts, before, strict=True))
-            or any(future.done() for future in self._futures)
-        )
-
-    def __enter__(self) -> Hammer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._pool.shutdown()
-        for future in self._futures:
-            future.result()
+    with ThreadPoolExecutor(len(actions)) as pool:
+        futures = [pool.submit(work, action) for action in actions]
+        try:
+            yield
+        finally:
+            ended.set()
+    for future in futures:
+        future.result()
 
 
 def test_a_ride_and_all_is_reported_by_the_worker(real: Real) -> None:
     real.enable()
-    with Hammer(lambda: real.drive.set_setpoint(20.0)):
+    with meanwhile(lambda: real.drive.set_setpoint(20.0)):
         wait_until(lambda: abs(real.far.motor.frequency - 20.0) < 0.2)
-    real.drive.stop().result(PATIENCE)
+    wait_until(lambda: try_to(real.drive.stop))
     wait_until(lambda: not real.far.motor.driven)
     real.drive.disconnect(PATIENCE).result(PATIENCE)
     assert len(real.notes.threads) == 1
@@ -184,9 +170,8 @@ def test_the_newest_of_the_set_points_of_many_threads_is_followed(real: Real) ->
     def give() -> None:
         real.drive.set_setpoint(next(numbers) % 40)
 
-    with Hammer(give, give, give, give) as hammer:
-        for _ in range(10):
-            hammer.strike()
+    with meanwhile(give, give, give, give):
+        real.polls(20)
     real.drive.set_setpoint(12.0)
     wait_until(lambda: abs(real.far.motor.frequency - 12.0) < 0.2)
     # none of the others has piled up behind it
@@ -200,14 +185,13 @@ def test_a_stop_ends_what_others_do_at_the_same_time(real: Real) -> None:
         try_to(real.drive.enable)
 
     for _ in range(3):
-        with Hammer(enable, enable, lambda: real.drive.set_setpoint(20.0)) as hammer:
-            hammer.strike()
-        assert try_to(real.drive.stop)
+        with meanwhile(enable, enable, lambda: real.drive.set_setpoint(20.0)):
+            wait_until(lambda: real.far.motor.driven)
+        wait_until(lambda: try_to(real.drive.stop))
         # the set-points go on, and nothing turns
-        with Hammer(lambda: real.drive.set_setpoint(20.0)) as hammer:
+        with meanwhile(lambda: real.drive.set_setpoint(20.0)):
             wait_until(lambda: not real.far.motor.driven)
             real.polls(5)
-            hammer.strike()
             assert not real.drive.armed and not real.far.motor.driven
 
 
@@ -216,11 +200,11 @@ def test_after_the_last_stop_no_thread_can_enable(real: Real) -> None:
         real.drive.activate()
         try_to(real.drive.enable)
 
-    with Hammer(enable, enable, lambda: real.drive.set_setpoint(20.0)) as hammer:
-        hammer.strike()
+    with meanwhile(enable, enable, lambda: real.drive.set_setpoint(20.0)):
+        wait_until(lambda: real.far.motor.driven)
         real.drive.stop_for_good(PATIENCE).result(PATIENCE)
         wait_until(lambda: not real.far.motor.driven)
-        hammer.strike()
+        real.polls(10)
         assert not real.drive.armed and not real.far.motor.driven
     assert 'not active' in said(real.drive.enable().exception(PATIENCE))
 
