@@ -210,7 +210,7 @@ def test_an_optimal_has_none_that_is_documented() -> None:
 
 
 @pytest.mark.parametrize('way', [*G2, 'rtu, control word', 'monitor'])
-def test_the_entry_of_a_fault_is_told(way: str) -> None:
+def test_the_entry_of_a_fault_is_reported(way: str) -> None:
     monitor = {'control_method': 'monitor'} if way == 'monitor' else {}
     with Rig('rtu' if monitor else way, poll_rate=10.0, **monitor).connect() as rig:
         rig.pass_time(2.0)
@@ -265,7 +265,7 @@ def test_what_is_older_than_the_driver_is_no_news() -> None:
         assert not rig.notes.said('log', Severity.WARNING)
 
 
-def test_a_fault_that_stands_already_is_told_but_not_since_when() -> None:
+def test_a_fault_that_stands_already_is_reported_but_not_since_when() -> None:
     with Rig() as rig:
         rig.far.trip(5)
         rig.connect()
@@ -287,7 +287,7 @@ def test_faults_that_no_poll_saw() -> None:
         assert rig.notes.said('8 DC High at 1234.5 h', Severity.WARNING)
 
 
-def test_the_same_fault_twice_within_a_tick_is_told_twice() -> None:
+def test_the_same_fault_twice_within_a_tick_is_reported_twice() -> None:
     with Rig().connect() as rig:
         rig.pass_time(1.0)
         rig.far.trip(5)

@@ -55,7 +55,7 @@ class Bolt(FarEnd):
         #: By how much the frequency changes each time, 0.01 Hz; which fault is active.
         self.step = 100
         self.fault = 0
-        #: It goes on as it was told before, whatever is written.
+        #: It goes on as before, whatever is written.
         self.deaf = False
         #: By how much the frequency goes up and down while it does, 0.01 Hz.
         self.wobble = 0

@@ -54,7 +54,7 @@ class Acme(FarEnd):
     def __init__(self) -> None:
         super().__init__(dict.fromkeys((*range(100, 104), *range(200, 205), KIND), 0))
         self.registers[RAMP] = 50
-        #: What it was told to follow after each write, Hz; what to do after the next one.
+        #: What it follows after each write, Hz; what to do after the next one.
         self.followed: list[float] = []
         self.then: Callable[[], object] = lambda: None
         self.trip(0)
