@@ -59,7 +59,7 @@ from support.variants import ramps
 
 #: How far the clock goes at a time while nothing is due, s.
 SLICE = 0.02
-#: How often a program gives its set-point, s.
+#: How often a program gives its set-point, or does what else it does, s.
 _SENDING_PERIOD = 0.1
 #: How long a drive takes to refuse something, s.
 _TURN = 0.005
@@ -174,7 +174,8 @@ class Rig:
     :ivar meet: called with each request before it is sent, the parameter and what is written to it
         (``None``: it is read); what it returns goes wrong: ``refused``, ``busy``, ``unheard``,
         ``drop`` (carried out, not answered), ``damage``, ``double``, ``delay``, or ``ignored``.
-    :ivar asked: every request, as ``meet`` has it, and its drive.
+    :ivar asked: every request, as ``meet`` has it, and its drive; what is read before a write in
+        one piece stands as two.
     :ivar acknowledged: how often the test itself has a fault acknowledged.
     """
 
@@ -218,8 +219,8 @@ class Rig:
         self.asked: list[tuple[int, str, bytes | None]] = []
         self.acknowledged = 0
         self._broken: AssertionError | None = None
-        self._sent: Mapping[int, float] = {}
-        self._send_at = 0.0
+        self._program: Callable[[], None] | None = None
+        self._program_at = 0.0
         self.begin()
 
     def begin(self) -> None:
@@ -232,12 +233,14 @@ class Rig:
             for address, settings in self._settings.items()
         }
         self._keys = {address: self._places(drive) for address, drive in self.drives.items()}
-        for name, is_write in (('read', False), ('write', True), ('write_and_read', True)):
+        for name, is_write in (
+            ('read', False), ('write', True), ('write_and_read', True), ('read_then_write', False),
+        ):
             setattr(self.link, name, self._met(getattr(self.link, name), is_write))
 
     def kill(self) -> None:
         """End the driver without a word to the drive, as a power cut of the computer does."""
-        self._sent = {}
+        self._program = None
         self.bus.close()
 
     def close(self) -> None:
@@ -295,10 +298,9 @@ class Rig:
         end = self.clock.now + seconds
         self.judge(self.looked)
         while self.clock.now < end:
-            if self._sent and self.clock.now >= self._send_at:
-                self._send_at = self.clock.now + _SENDING_PERIOD
-                for address, value in self._sent.items():
-                    self.drives[address].set_setpoint(value)
+            if self._program is not None and self.clock.now >= self._program_at:
+                self._program_at = self.clock.now + _SENDING_PERIOD
+                self._program()
             until = min(self.bus.step(), end, self.clock.now + SLICE)
             self._require_consistent()
             if self._broken is not None:
@@ -326,8 +328,16 @@ class Rig:
     def send(self, value: float | None, *addresses: int) -> None:
         """Have a program give a set-point again and again from now on; ``None``: it ends."""
         chosen = addresses or tuple(self.drives)
-        self._sent = {} if value is None else dict.fromkeys(chosen, value)
-        self._send_at = self.clock.now
+
+        def give() -> None:
+            for address in chosen if value is not None else ():
+                self.drives[address].set_setpoint(value)
+
+        self.keep(give)
+
+    def keep(self, program: Callable[[], None]) -> None:
+        """Have a program do something again and again from now on."""
+        self._program, self._program_at = program, self.clock.now
 
     def judge(self, look: Callable[[], None]) -> None:
         """Keep what a look complains of until it can be raised."""
