@@ -428,6 +428,12 @@ class Rig:
             if unit == address and asked == key and data is not None
         ]
 
+    def number(self, data: bytes) -> int:
+        """Return what is written as one number, the first word in front as on Modbus."""
+        if self.way.protocol == 'canopen':
+            data = b''.join(data[at : at + 2][::-1] for at in range(0, len(data), 2))
+        return int.from_bytes(data, 'big')
+
     def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
         registers, keys = drive.registers, {}
         for key in registers.model:

@@ -246,10 +246,11 @@ class Line:
         if self.plc is not None:
             self.plc.advance_to(self.clock.now)
             return
-        # many drives need not be looked at whenever a byte comes
-        if len(self.drives) > 2 and self.clock.now < self._seldom_at:
+        # they need not be looked at whenever a byte comes, and many seldom: one that is asked
+        # something catches up at that moment
+        if self.clock.now < self._seldom_at:
             return
-        self._seldom_at = self.clock.now + 0.02
+        self._seldom_at = self.clock.now + (0.02 if len(self.drives) > 2 else 0.002)
         for far in self.drives.values():
             far.advance_to(self.clock.now)
 

@@ -28,8 +28,8 @@ import itertools
 import math
 from typing import Any
 
-from any_order_rig import Rig
 from any_order_shown import shown_by
+from support.rig import Rig
 
 #: How the driver is set.
 POLL_RATE = 5.0
@@ -51,8 +51,8 @@ class Command:
     name: str
     future: Future[Any]
     at: float
-    #: How many frames had been sent by then.
-    frames: int
+    #: How much had been asked by then.
+    asked: int
     #: The line was whole and the drive known when it was given, and has been since.
     undisturbed: bool
     #: A stop was on its way when it was given.
@@ -67,11 +67,10 @@ class History:
         self._far = rig.far
         self.shown = shown_by(rig)
         self.times = self.shown.times
-        self._method = rig.settings.method
-        self._follows = rig.settings.reference == 'fieldbus'
-        rig.gave = self.gave
+        self._method = rig.drive.settings.method
+        self._follows = rig.drive.settings.reference == 'fieldbus'
         self._commands: list[Command] = []
-        #: Somebody enabled it, and nothing has happened since that ends that.
+        #: It was enabled, and nothing has happened since that ends that.
         self.enabled_at: float | None = None
         #: When what made it stop happened last, and from when on it may not run.
         self.lost_at = self._no_run_from = rig.clock.now
@@ -95,7 +94,6 @@ class History:
         #: drive may end that fault by itself.
         self._faulted_at = -math.inf
         self._ended_by_fault: float | None = None
-        self._acknowledged = 0
         self._stop_due: int | None = None
         #: When a stop was last written, taken or refused.
         self._stop_tried_at = -math.inf
@@ -113,8 +111,8 @@ class History:
         undisturbed = self._steady
         stops = [one for one in self._commands if one.name in STOPS and not one.future.done()]
         overruled = any(not self._may_be_confirmed(one) for one in stops)
-        frames = len(self._rig.link.frames)
-        self._commands.append(Command(name, future, self.now, frames, undisturbed, overruled))
+        asked = len(self._rig.asked)
+        self._commands.append(Command(name, future, self.now, asked, undisturbed, overruled))
         if name == 'enable':
             if self.enabled_at is None and not overruled:
                 self.enabled_at = self.now
@@ -124,10 +122,10 @@ class History:
         elif name in STOPS:
             ours = self._steady and self.standing and not self._foreign
             if name != 'quick_stop' and ours and not self._refused_just_now:
-                self._stop_due = len(self._rig.link.frames)
+                self._stop_due = len(self._rig.asked)
             self.lose(self.times.carried_out)
         elif name == 'acknowledge':
-            self._acknowledged += 1
+            self._rig.acknowledged += 1
         if name in ('deactivate', 'disconnect', 'stop_for_good'):
             self.active = False
         if name == 'disconnect':
@@ -135,8 +133,8 @@ class History:
 
     def _may_be_confirmed(self, stop: Command) -> bool:
         """Tell whether the status was read since a stop was written that has no answer yet."""
-        sent = self.shown.requests_since(stop.frames)
-        after = itertools.dropwhile(lambda request: request.words is None, sent)
+        sent = ((key, data) for _, key, data in self._rig.asked[stop.asked :])
+        after = itertools.dropwhile(lambda request: request[1] is None, sent)
         return any(map(self.shown.reads_status, after))
 
     @property
@@ -167,7 +165,7 @@ class History:
         self.enabled_at = None
         self._ended_by_fault = None
         self.lost_at = self.now
-        later = NOISY if self._rig.link.noise else 0.0
+        later = NOISY if self._rig.line.noise else 0.0
         self._no_run_from = max(self._no_run_from, self.now + within + later)
 
     def disturbed(self) -> None:
@@ -255,10 +253,10 @@ class History:
     # --- what is seen -----------------------------------------------------------------------------
 
     def _watch_line(self) -> None:
-        if self._rig.link.passes and self._rig.link.noise and self._far.listening:
+        if self._rig.line.passes and self._rig.line.noise and self._far.listening:
             self._watch_noise()
             return
-        if self._rig.link.whole and self._far.listening:
+        if self._rig.line.whole and self._far.listening:
             if self._whole_since is None:
                 self._whole_since = self.now
                 self._broken_since = None
@@ -271,7 +269,7 @@ class History:
         if self._broken_since is None:
             self._broken_since = self.now
         lost = self.times.lost if self.active else self.times.lost_idle
-        for_good = self.now - self._broken_since > lost and not self._rig.link.losses
+        for_good = self.now - self._broken_since > lost and not self._rig.line.losses
         if for_good and (self.enabled_at is not None or self._ended_by_fault is not None):
             self.lose(self.times.taken_back)
         # nobody can stop it now

@@ -29,7 +29,7 @@ from any_order_history import SETPOINT_TIMEOUT
 from any_order_history import STOPS
 from any_order_history import Command
 from any_order_history import History
-from any_order_rig import Rig
+from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Severity
@@ -42,6 +42,8 @@ LONGEST_COMMAND = 12.0
 
 #: For so many transactions a motor may have current that an acknowledgement has let go.
 POWERED = 2
+#: How often is looked while nothing happens, s.
+_LOOKS = 0.004
 
 
 class Broken(AssertionError):
@@ -63,7 +65,10 @@ class Laws(History):
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
-        rig.looked, rig.wrote, rig.changed = self.look, self._wrote, self._answered
+        rig.looked, rig.meet, rig.line.passed = self.look, self._meet, self._passed
+        self._asked_at = self.now
+        self._looked: object = None
+        self._looked_at = self.now
         self._truth: dict[str, tuple[Any, float]] = {}
         self._seen: dict[str, Any] = {}
         #: When what is told of a fact was right last, if it is wrong now.
@@ -71,7 +76,7 @@ class Laws(History):
         self._compared = Compared({}, {}, [])
         self._last: Snapshot | None = None
         self._last_told: dict[str, Any] = {}
-        #: How many frames there had been when an acknowledgement let the motor go.
+        #: How much had been asked when an acknowledgement let the motor go.
         self._turned_from: int | None = None
 
     def killed(self) -> None:
@@ -80,6 +85,14 @@ class Laws(History):
         self._seen = {}
         self._agreed_at.clear()
         self._compared = Compared({}, {}, [])
+
+    def _passed(self) -> None:
+        """Look, unless a moment has passed in which nothing was sent or published."""
+        notes = self._rig.notes
+        seen = len(self._rig.line.frames), id(notes.snapshot), len(notes.events)
+        if self._looked != seen or self.now - self._looked_at >= _LOOKS:
+            self._looked, self._looked_at = seen, self.now
+            self._rig.judge(self.look)
 
     # --- the laws ---------------------------------------------------------------------------------
 
@@ -92,13 +105,6 @@ class Laws(History):
         self._judge_commands()
         self._judge_status()
         self._judge_silence()
-
-    def end(self) -> None:
-        """Judge everything that was on the line."""
-        found = self.shown.wrong_line()
-        acknowledging = [complaint for complaint in found if 'acknowledges' in complaint]
-        if len(acknowledging) > self._acknowledged or len(found) > len(acknowledging):
-            raise Broken(f'on the line: {found}')
 
     def _judge_running(self) -> None:
         running = self.running
@@ -134,15 +140,15 @@ class Laws(History):
         if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
             self._turned_from = None
             return
-        frames = len(self._rig.link.frames)
+        asked = len(self._rig.asked)
         if self._turned_from is None:
-            self._turned_from = frames
+            self._turned_from = asked
         if self._whole_since is None or self._whole_since > begun:
             return
         if not self.shown.powered_by_acknowledgement:
             if self.turning:
                 raise Broken('an acknowledgement turns the motor')
-        elif frames > self._turned_from + POWERED:
+        elif asked > self._turned_from + POWERED:
             raise Broken(f'an acknowledgement turns the motor for {POWERED} transactions')
 
     def _judge_standing(self) -> None:
@@ -203,10 +209,6 @@ class Laws(History):
             elif self.now > command.at + LONGEST_COMMAND:
                 raise Broken(f'{command.name} is never answered')
 
-    def _answered(self) -> bool:
-        """Tell whether a command has been answered that nobody has judged yet."""
-        return any(command.future.done() for command in self._commands)
-
     def _judge_answer(self, command: Command) -> None:
         error = command.future.exception()
         if error is not None and type(error).__name__ != 'DriveError':
@@ -238,30 +240,31 @@ class Laws(History):
 
     def _judge_silence(self) -> None:
         """Keep the drive's own time-out from striking."""
-        sio_tot = self._rig.settings.drive_timeout
+        sio_tot = self._rig.drive.settings.drive_timeout
         if not sio_tot or not self._steady or not self._connected:
             return
-        if self.now - self._rig.link.asked_at > sio_tot / 2:
+        if self.now - self._asked_at > sio_tot / 2:
             raise Broken('the bus was silent for longer than half the time-out of the drive')
 
     # --- what is written --------------------------------------------------------------------------
 
-    def _wrote(self, place: int, words: tuple[int, ...]) -> None:
-        if self._method == 'monitor':
-            raise Broken(f'monitor wrote {place:04X}h')
-        for complaint in self.shown.wrong(place, words):
-            raise Broken(complaint)
-        self._note_stop(place, words)
+    def _meet(self, key: str, data: bytes | None) -> None:
+        self._asked_at = self.now
+        if data is not None:
+            number = self._rig.number(data)
+            self._rig.judge(lambda: self._wrote(key, number))
 
-    def _note_stop(self, place: int, words: tuple[int, ...]) -> None:
-        """Let a stop go ahead of everything but what it has to read itself."""
+    def _wrote(self, key: str, number: int) -> None:
+        if self._method == 'monitor':
+            raise Broken(f'monitor wrote {key}')
+        for complaint in self.shown.wrong(key, number):
+            raise Broken(complaint)
+        # a stop goes ahead of everything but what it has to read itself
         due = self._stop_due
-        if self.shown.stops(place, words):
+        if self.shown.stops(key, number):
             self._stop_due = None
             self._stop_tried_at = self.now
-        if due is None:
-            return
-        before = len(self._rig.link.frames) - due
+        before = 0 if due is None else len(self._rig.asked) - 1 - due
         if before > self.shown.lead:
             raise Broken(f'{before} transactions went ahead of a stop')
 
@@ -333,7 +336,7 @@ class Laws(History):
             lost = self.times.lost if was_active else self.times.lost_idle
             # commands without a response go before the polls
             since = max(self._broken_since, self._commanded_at)
-            if self.now - since > lost and not self._rig.link.losses:
+            if self.now - since > lost and not self._rig.line.losses:
                 raise Broken('it is told as connected, and it is not')
         if self._whole_since is None or snapshot.connected:
             return

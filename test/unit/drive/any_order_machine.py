@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence
 import math
 from typing import Any
@@ -25,16 +26,14 @@ from any_order_history import POLL_RATE
 from any_order_history import SETPOINT_TIMEOUT
 from any_order_history import SHUTDOWN_TIMEOUT
 from any_order_laws import Laws
-from any_order_rig import Rig
-from framed_link import link_of
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine
 from hypothesis.stateful import precondition
 from hypothesis.stateful import rule
 import pytest
+from support.rig import Rig
+from support.rig import Way
 
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Refused as Refusal
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
@@ -46,7 +45,7 @@ BOOT_TIMES = st.runner().flatmap(lambda machine: st.sampled_from(machine.boot_ti
 #: What ends a ride, likewise.
 ENDERS = st.runner().flatmap(lambda machine: st.sampled_from(machine.enders))
 
-WHOLE = precondition(lambda self: self.rig.link.whole)
+WHOLE = precondition(lambda self: self.rig.line.whole)
 DRIVEN = precondition(lambda self: self.laws.watched)
 
 
@@ -54,11 +53,14 @@ class AnyOrder(RuleBasedStateMachine):
     """
     The rules for drives of any family; each ends with some time that passes.
 
+    :cvar line: how its line is, and ``protocol`` what is spoken there.
     :cvar faults: codes of some of its faults.
     :cvar boot_times: how long it may be silent after power-on, s.
     :cvar enders: what ends a ride, the names of methods that take the time to wait.
     """
 
+    protocol: ClassVar[str] = 'modbus_rtu'
+    line: ClassVar[Mapping[str, Any]] = {'response_timeout': 0.1}
     model: ClassVar[str]
     method: ClassVar[str]
     reference: ClassVar[str] = 'fieldbus'
@@ -71,22 +73,27 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig: Rig
         self.laws: Laws
 
-    def begin_with(self, far: SimulatedDrive, **settings: Any) -> None:
-        """Begin with a drive, and with these settings of the driver."""
+    def begin_with(
+        self,
+        parameters: Mapping[str, Any],
+        options: Mapping[str, Any],
+        left_behind: Mapping[str, int],
+        **settings: Any,
+    ) -> None:
+        """Begin with a drive in which something stands, and with these settings of the driver."""
         self.rig = Rig(
-            far,
-            DriveSettings(
-                model=self.model,
-                control_method=self.method,
-                reference=self.reference,
-                poll_rate=POLL_RATE,
-                telemetry_rate=1.0,
-                setpoint_timeout=SETPOINT_TIMEOUT,
-                shutdown_timeout=SHUTDOWN_TIMEOUT,
-                **settings,
-            ),
-            link_of(far),
+            Way(self.protocol, self.model, self.method, self.reference),
+            parameters=parameters,
+            options=options,
+            line=self.line,
+            poll_rate=POLL_RATE,
+            telemetry_rate=1.0,
+            setpoint_timeout=SETPOINT_TIMEOUT,
+            shutdown_timeout=SHUTDOWN_TIMEOUT,
+            **settings,
         )
+        for key, raw in left_behind.items():
+            self.rig.far.memory.put(key, raw)
         self.laws = Laws(self.rig)
         self.connect()
         self.activate()
@@ -104,10 +111,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         if hasattr(self, 'rig'):
-            try:
-                self.laws.end()
-            finally:
-                self.rig.close()
+            self.rig.close()
 
     def let(self, wait: float) -> None:
         """Let time pass, and judge."""
@@ -117,7 +121,7 @@ class AnyOrder(RuleBasedStateMachine):
     def until_noticed(self) -> None:
         """Let what has happened last be noticed, if it can be."""
         # a drive without power answers nobody, and is not seen before it has started
-        while not self.rig.far.listening and self.rig.link.whole:
+        while not self.rig.far.listening and self.rig.line.whole:
             self.rig.pass_time(0.1)
         self.rig.pass_time(self.laws.noticed)
 
@@ -162,7 +166,7 @@ class AnyOrder(RuleBasedStateMachine):
         """Put right what is in the way, enable it and send set-points."""
         rig, far = self.rig, self.rig.far
         rig.send(None)
-        rig.link.mend()
+        rig.line.mend()
         far.silence(0.0)
         far.motor.load = 0.3
         far.end_fault_causes()
@@ -308,16 +312,19 @@ class AnyOrder(RuleBasedStateMachine):
         for number in (math.nan, math.inf):
             with pytest.raises(ValueError, match='no number'):
                 self.rig.drive.set_setpoint(number)
+        self._set(value)
+        self.let(wait)
+
+    def _set(self, value: float) -> None:
         self.rig.drive.set_setpoint(value)
         self.laws.gave(value)
-        self.let(wait)
 
     @precondition(lambda self: self.reference == 'fieldbus')
     @rule(value=st.none() | SETPOINTS, wait=WAITS)
     def send(self, value: float | None = 20.0, wait: float = 1.0) -> None:
         """Let a program send set-points from now on, or no more."""
         if self.reference == 'fieldbus':
-            self.rig.send(value)
+            self.rig.keep(lambda: None if value is None else self._set(value))
         self.let(wait)
 
     # --- what the drive does ----------------------------------------------------------------------
@@ -334,7 +341,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.rig.far.end_fault_causes()
         self.let(wait)
 
-    @precondition(lambda self: self.rig.far.faults and self.rig.link.whole)
+    @precondition(lambda self: self.rig.far.faults and self.rig.line.whole)
     @rule(wait=WAITS)
     def end_fault(self, wait: float = 1.0) -> None:
         """Let the drive forget its fault, by its keypad or by itself."""
@@ -395,7 +402,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def stop_unheard(self, wait: float) -> None:
         """Stop while the next request is lost."""
-        self.rig.link.unheard = 1
+        self.rig.line.unheard = 1
         self.stop(wait)
 
     # --- what the line does -----------------------------------------------------------------------
@@ -403,7 +410,7 @@ class AnyOrder(RuleBasedStateMachine):
     @WHOLE
     @rule(state=st.sampled_from(('silent', 'deaf', 'noise', 'late', 'gone')), wait=WAITS)
     def break_line(self, state: str, wait: float = 1.0) -> None:
-        self.rig.link.state = state
+        self.rig.line.state = state
         self.let(wait)
 
     @rule(
@@ -425,23 +432,23 @@ class AnyOrder(RuleBasedStateMachine):
     def lose_line_for_long(self, state: str, wait: float) -> None:
         self.lose_line(state, '', 9.0, wait)
 
-    @precondition(lambda self: not self.rig.link.whole)
+    @precondition(lambda self: not self.rig.line.whole)
     @rule(wait=WAITS)
     def mend_line(self, wait: float = 1.0) -> None:
-        self.rig.link.mend()
+        self.rig.line.mend()
         self.let(wait)
 
     @WHOLE
     @rule(losses=st.integers(1, 3), wait=WAITS)
     def lose_answers(self, losses: int, wait: float = 0.4) -> None:
-        self.rig.link.losses = losses
+        self.rig.line.losses = losses
         self.let(wait)
 
     @WHOLE
     @rule(share=st.sampled_from((0.01, 0.03, 0.1)), seed=st.integers(0, 999), wait=WAITS)
     def noise(self, share: float = 0.1, seed: int = 0, wait: float = 1.0) -> None:
         """Damage or lose answers by chance, until the line is mended."""
-        self.rig.link.make_noise(share, seed)
+        self.rig.line.make_noise(share, seed)
         self.let(wait)
 
     @rule(

@@ -26,11 +26,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from any_order_rig import RESPONSE_TIMEOUT
-from any_order_rig import Rig
-from support import trace_laws
-from support.wire import Request
-from support.wire import understand
+from support.rig import Rig
 
 from nfo_sinus_driver.simulator.movitrac31.codes import Bit
 from nfo_sinus_driver.simulator.movitrac31.codes import Mode
@@ -43,12 +39,9 @@ from nfo_sinus_driver.simulator.sinus.control_unit import ALL
 from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
 
-#: ParameterAccess of one word or two [M0 §7], [M1].
-MODE, SCMD, CONTROL, MASK = 0x0294, 0x0298, 0x0254, 0x0250
-#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
-_SETPOINTS = (0x03FC, 0x025C, 0x0408, 0x0410)
-#: Where InvSt stands [M0 §7], [M1].
-_INV_ST = 0x02A5
+#: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.
+MODE, CONTROL, MASK = 'fieldbus.mode', 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
+SCMD = ('fieldbus.scmd', 'fieldbus.smode')
 MODE_STOP, MODE_BUS = 1, 3
 RUN_FIELDBUS = 0x101
 FORWARD, REVERSE = 1 << 3, 1 << 13
@@ -56,15 +49,17 @@ FORWARD, REVERSE = 1 << 3, 1 << 13
 SWITCH_ON = 1 << 0
 #: By these the bus has control.
 _BUS_SOURCES = (Source.SCMD, Source.CONTROL_WORD)
-
-#: Function bits, set-point, control mode and inverter status of a MOVITRAC [M4 §4].
-BITS, SIZE, P841, STATUS = 281, 223, 205, 284
-#: What else may be written of it, in these histories: the PC time-out.
-_TIMEOUT = 285
+#: Where a set-point is written, of whichever control mode ([M0 §8.2], [C11], [C12], [C53]).
+_SETPOINTS = (
+    *(f'status.{name}_set' for name in ('frq', 'spd', 'trq', 'reg')),
+    *(f'fieldbus.{name}' for name in ('setpoint', 'input_freq_setpoint', 'input_speed_setpoint')),
+)
 _DIRECTIONS = Bit.CW | Bit.CCW
 _RUNNING = (Number.ENABLE, Number.CHANGE_DIRECTION)
 
 Complaints = Iterator[str]
+#: A request: its parameter, and what is written to it; ``None``: it is read.
+Request = tuple[str, bytes | None]
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,7 @@ class Times:
     lost_idle: float = 4.0
     taken_back: float = 1.7
     found: float = 5.0
-    response_timeout: float = RESPONSE_TIMEOUT
+    response_timeout: float = 0.1
 
     def slowed(self, response_time: float) -> Times:
         """Return the same for a drive that answers so much later, s; a poll is 4 transactions."""
@@ -131,8 +126,7 @@ class Shown(abc.ABC):
         self._rig = rig
         self._far = rig.far
         self._unit: Any = rig.far.control_unit
-        self._method = rig.settings.method
-        self._protocol = rig.link.protocol.name
+        self._method = rig.drive.settings.method
 
     @property
     @abc.abstractmethod
@@ -176,28 +170,17 @@ class Shown(abc.ABC):
         """Return how much later than others a fact may be told, s."""
         return 0.0
 
-    def requests_since(self, frames: int) -> Iterator[Request]:
-        """Return what was asked since so many frames were sent."""
-        for frame in self._rig.link.frames[frames:]:
-            request = understand(bytes.fromhex(frame['hex']), self._protocol)
-            if request is not None:
-                yield request
-
     @abc.abstractmethod
     def reads_status(self, request: Request) -> bool:
         """Tell whether a request is the one that every status is read with."""
 
     @abc.abstractmethod
-    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
+    def wrong(self, key: str, number: int) -> Complaints:
         """Yield what is wrong with a write, before it is carried out."""
 
     @abc.abstractmethod
-    def stops(self, place: int, words: tuple[int, ...]) -> bool:
+    def stops(self, key: str, number: int) -> bool:
         """Tell whether a write stops the motor."""
-
-    def wrong_line(self) -> list[str]:
-        """Return what was wrong on the line, all in all; what acknowledges says so."""
-        return []
 
 
 class ShownSinus(Shown):
@@ -226,33 +209,27 @@ class ShownSinus(Shown):
         }
 
     def reads_status(self, request: Request) -> bool:
-        return request.words is None and request.place == _INV_ST
+        return request == ('fieldbus.inv_st', None)
 
-    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
-        word = words[-1] if place == MASK else words[0]
-        controls = place in (CONTROL, MASK)
-        if place == MODE and word not in (MODE_STOP, MODE_BUS):
-            yield f'MODE = {word}'
+    def wrong(self, key: str, number: int) -> Complaints:
+        controls = key in (CONTROL, MASK)
+        if key == MODE and number not in (MODE_STOP, MODE_BUS):
+            yield f'MODE = {number}'
         if controls and self._method != 'drive_control':
             yield 'a control word in mode_scmd'
-        if place == SCMD and self._method != 'mode_scmd':
+        if key in SCMD and self._method != 'mode_scmd':
             yield 'SCMD in drive_control'
-        if place == MODE and self._method == 'drive_control' and word != MODE_STOP:
+        if key == MODE and self._method == 'drive_control' and number != MODE_STOP:
             yield 'MODE = 3 in drive_control'
 
-    def stops(self, place: int, words: tuple[int, ...]) -> bool:
-        word = words[-1] if place == MASK else words[0]
+    def stops(self, key: str, number: int) -> bool:
         return (
-            (place == SCMD and word == 0)
-            or (place == MODE and word == MODE_STOP)
-            or (place in (CONTROL, MASK) and not word & SWITCH_ON)
+            (key in SCMD and number == 0)
+            or (key == MODE and number == MODE_STOP)
+            or (key in (CONTROL, MASK) and not number & SWITCH_ON)
             # a stop that a fault keeps the drive from taking goes on with the set-point
-            or (place in _SETPOINTS and not word and bool(self._far.faults))
+            or (key in _SETPOINTS and not number and bool(self._far.faults))
         )
-
-    def wrong_line(self) -> list[str]:
-        model = self._rig.settings.model
-        return trace_laws.violations(self._rig.link.frames, -float('inf'), model)
 
 
 class ShownG2(ShownSinus):
@@ -291,10 +268,9 @@ class ShownG2(ShownSinus):
         # it is not read with every poll
         return 1.0 if name == 'control mode' else 0.0
 
-    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
-        yield from super().wrong(place, words)
-        word = words[-1] if place == MASK else words[0]
-        if place in (CONTROL, MASK) and word & FORWARD and word & REVERSE:
+    def wrong(self, key: str, number: int) -> Complaints:
+        yield from super().wrong(key, number)
+        if key in (CONTROL, MASK) and number & FORWARD and number & REVERSE:
             yield 'both directions at once'
 
 
@@ -333,6 +309,7 @@ _MOVITRAC = Times(
     found=7.0,
     response_timeout=0.4,
 )
+
 
 class ShownMovitrac(Shown):
     """What a MOVITRAC shows; who enables it reads what all its terminals are for."""
@@ -393,17 +370,16 @@ class ShownMovitrac(Shown):
         return self.times.control_told if name in ('by bus', 'running') else 0.0
 
     def reads_status(self, request: Request) -> bool:
-        return request.words is None and request.place == STATUS
+        return request == ('fieldbus.inverter_status', None)
 
-    def wrong(self, place: int, words: tuple[int, ...]) -> Complaints:
-        value = words[0] << 16 | words[1]
-        if place not in (BITS, SIZE, P841, _TIMEOUT):
-            yield f'index {place} was written'
+    def wrong(self, key: str, number: int) -> Complaints:
+        if key not in (FUNCTION_BITS, SETPOINT, CONTROL_MODE, 'serial.pc_timeout'):
+            yield f'{key} was written'
         # Remote setpoint and Remote control, in packed decimal digits: 1.00 and 2.00
-        if place == P841 and value not in (0x00000100, 0x00000200):
-            yield f'P841 = {value:08X}'
-        if place == BITS:
-            yield from self._wrong_bits(Bit(value))
+        if key == CONTROL_MODE and number not in (0x00000100, 0x00000200):
+            yield f'P841 = {number:08X}'
+        if key == FUNCTION_BITS:
+            yield from self._wrong_bits(Bit(number))
 
     def _wrong_bits(self, bits: Bit) -> Complaints:
         before, size = self._bits, self._far.memory.raw(SETPOINT)
@@ -416,16 +392,10 @@ class ShownMovitrac(Shown):
         if changes and size and self._mode == Mode.REMOTE_CONTROL:
             yield 'a direction is given while the set-point is not 0'
 
-    def stops(self, place: int, words: tuple[int, ...]) -> bool:
-        no_direction = place == BITS and not words[1] & _DIRECTIONS
-        return no_direction or (place == SIZE and not any(words))
-
-    def wrong_line(self) -> list[str]:
-        return [
-            'a reset bit that acknowledges'
-            for request in self.requests_since(0)
-            if request.place == BITS and request.words is not None and request.words[1] & Bit.RESET
-        ]
+    def stops(self, key: str, number: int) -> bool:
+        return (key == FUNCTION_BITS and not number & _DIRECTIONS) or (
+            key == SETPOINT and not number
+        )
 
 
 _FAMILIES: Mapping[str, type[Shown]] = {
@@ -437,4 +407,4 @@ _FAMILIES: Mapping[str, type[Shown]] = {
 
 def shown_by(rig: Rig) -> Shown:
     """Return what the drive of a rig shows."""
-    return _FAMILIES[rig.settings.model](rig)
+    return _FAMILIES[rig.drive.settings.model](rig)
