@@ -139,6 +139,8 @@ class Line:
         self.settings = line_settings(
             self._protocol.name, baud_rate=end.timing.baud, response_timeout=response_timeout
         )
+        # a damaged frame of CAN is no frame
+        self._damage = 'drop' if protocol == 'canopen' else 'damage'
         self._seldom_at = 0.0
         self.passed: Callable[[], None] = lambda: None
         self.plan: Callable[[bytes], str | None] = lambda frame: None
@@ -215,8 +217,8 @@ class Line:
             self.doubled -= 1
             return 'double'
         if self.noise and self._random.random() < self.noise:
-            return 'damage' if self._random.random() < 0.5 else 'drop'
-        return {'noise': 'damage', 'late': 'delay'}.get(self.state)
+            return self._damage if self._random.random() < 0.5 else 'drop'
+        return {'noise': self._damage, 'late': 'delay'}.get(self.state)
 
     # --- time ---
 

@@ -188,9 +188,10 @@ class ShownSinus(Shown):
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
-        self.powered_by_acknowledgement = self._unit.variant.refuses_in_fault == ALL
-        refuses = self._unit.variant.refuses_in_fault != NOTHING
-        self.refuses_stop = refuses and self._method == 'mode_scmd'
+        # by Classic all is refused [M0 §6.1.5]
+        refused = self._unit.variant.refuses_in_fault if rig.way.protocol != 'classic' else ALL
+        self.powered_by_acknowledgement = refused == ALL
+        self.refuses_stop = refused != NOTHING and self._method == 'mode_scmd'
 
     @property
     def by_bus(self) -> bool:
