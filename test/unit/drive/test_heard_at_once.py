@@ -16,109 +16,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import contextlib
-import threading
-
-from drive_rig import PATIENCE
-from drive_rig import SCMD
-from drive_rig import Rig
-from drive_rig import wait_until
+from neighbour import neighbour
 import pytest
-from support.addresses import Words
-from support.addresses import register
+from support.rig import Rig
 
-from nfo_sinus_driver.bus import Priority
-
-_STATUS, _INV_ST, _CONTROL_MODE = 0x258, 0x2A5, 0x29C
-#: What the others ask for: FrqAct.
-_CHATTER = register(0x400)
+_STATUS, _INV_ST, _SCMD = 'fieldbus.drive_status', 'fieldbus.inv_st', 'fieldbus.scmd'
+#: What the others ask for.
+_CHATTER = 'status.frq_act'
 
 
-@contextlib.contextmanager
-def _crowd(rig: Rig) -> Iterator[None]:
+def crowd(rig: Rig) -> None:
     """Let others ask without end, as the polls of a long line do."""
-    ended = threading.Event()
-
-    async def chatter() -> None:
-        while not ended.is_set():
-            await rig.bus.read(1, _CHATTER, Priority.POLL)
-
-    talkers = [rig.bus.run(chatter()) for _ in range(4)]
-    try:
-        yield
-    finally:
-        ended.set()
-        for talker in talkers:
-            talker.result(PATIENCE)
+    for _ in range(4):
+        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address(_CHATTER)))
 
 
-def _happens_before_read_of(rig: Rig, register: int, *event: object) -> None:
-    """Let something happen just before the next read of a register."""
-
-    def before(asked: int, words: Words | None) -> None:
-        if (asked, words) == (register, None):
-            rig.tap.before = lambda *_: None
-            rig.simulator.inject(*event)
-
-    rig.tap.before = before
-
-
-def _asked(rig: Rig) -> list[int]:
-    """Which registers were asked for or written, in order."""
-    requests = [frame for frame in rig.trace() if frame['direction'] == 'request']
-    return [int(frame['hex'][4:8], 16) for frame in requests]
+def asked(rig: Rig) -> list[str]:
+    """Return what was asked for or written, in order."""
+    return [key for _, key, _ in rig.asked]
 
 
 @pytest.mark.parametrize(
-    ('told_by', 'event'),
+    ('shown_by', 'event'),
     [
         # of a lost RUN input the inverter status says no more than that the motor slows down
-        (_STATUS, ('run', False)),
-        (_STATUS, ('keypad', 'ext')),
-        (_STATUS, ('keypad', 'stop')),
-        (_INV_ST, ('keypad', 'ext')),
-        (_INV_ST, ('keypad', 'stop')),
+        (_STATUS, 'run input'),
+        (_STATUS, 'ext'),
+        (_STATUS, 'stop'),
+        (_INV_ST, 'ext'),
+        (_INV_ST, 'stop'),
     ],
 )
-def test_a_drive_that_stops_is_told_to_stop_before_anybody_else_talks(
-    rig: Rig, told_by: int, event: tuple[object, ...]
+def test_a_drive_that_stops_is_sent_the_stop_before_others_are_asked(
+    shown_by: str, event: str
 ) -> None:
-    rig.turn()
-    with _crowd(rig):
-        begun = len(_asked(rig))
-        _happens_before_read_of(rig, told_by, *event)
-        wait_until(lambda: not rig.drive.armed)
-        wait_until(lambda: SCMD in _asked(rig)[begun:])
-    asked = _asked(rig)
-    stop = asked.index(SCMD, begun)
-    # the half that told it, and the other half
-    order = [_STATUS, _INV_ST] if told_by == _STATUS else [_INV_ST, _STATUS]
-    assert asked[stop - 2 : stop] == order
+    with Rig(poll_rate=50.0) as rig:
+        rig.turn()
+        crowd(rig)
+        rig.pass_time(0.5)
+        begun = len(rig.asked)
+
+        def happen(key: str, data: bytes | None) -> None:
+            """Let it happen just before the next read of this."""
+            if (key, data) == (shown_by, None):
+                rig.meet = lambda key, data: None
+                if event == 'run input':
+                    rig.far.set_run_input(False)
+                else:
+                    rig.far.control_unit.press(event)
+
+        rig.meet = happen
+        rig.wait_until(lambda: _SCMD in asked(rig)[begun:], 5.0)
+        requests = asked(rig)
+        stop = requests.index(_SCMD, begun)
+        # the half that showed it, and the other half
+        order = [_STATUS, _INV_ST] if shown_by == _STATUS else [_INV_ST, _STATUS]
+        assert requests[stop - 2 : stop] == order
 
 
-def test_a_changed_control_mode_is_answered_before_anybody_else_talks(rig: Rig) -> None:
-    rig.connect()
-    rig.enable()
-    rig.next_snapshots()
-    with _crowd(rig):
-        begun = len(_asked(rig))
-        rig.simulator.inject('set', 'control.mode', 'Speed')
-        wait_until(lambda: not rig.drive.armed)
-        wait_until(lambda: SCMD in _asked(rig)[begun:])
-    asked = _asked(rig)
-    stop = asked.index(SCMD, begun)
-    assert asked[stop - 1] == _CONTROL_MODE
-    assert asked[begun:stop].count(_STATUS) <= 2
+def test_a_changed_control_mode_is_answered_before_others_are_asked() -> None:
+    with Rig(poll_rate=50.0) as rig:
+        rig.connect()
+        rig.enable()
+        crowd(rig)
+        rig.pass_time(0.5)
+        begun = len(rig.asked)
+        rig.far.set_from_keypad('control.mode', 'Speed')
+        rig.wait_until(lambda: _SCMD in asked(rig)[begun:], 5.0)
+        assert not rig.drive.armed
+        requests = asked(rig)
+        assert requests[requests.index(_SCMD, begun) - 1] == 'control.mode'
 
 
-def test_what_goes_on_as_it_did_has_no_claim_on_the_line(rig: Rig) -> None:
-    rig.turn()
-    with _crowd(rig):
-        rig.next_snapshots()
-        begun = len(_asked(rig))
-        rig.next_snapshots()
-        asked = _asked(rig)[begun:]
-    follows = [asked[number + 1 :][:1] for number, what in enumerate(asked) if what == _STATUS]
-    assert [_CHATTER.index] in follows
-    assert [_INV_ST] not in follows
+def test_what_goes_on_as_it_did_has_no_claim_on_the_line() -> None:
+    with Rig(poll_rate=50.0) as rig:
+        rig.turn()
+        crowd(rig)
+        rig.pass_time(0.5)
+        begun = len(rig.asked)
+        rig.pass_time(1.0)
+        requests = asked(rig)[begun:]
+        after = [requests[number + 1] for number, what in enumerate(requests[:-1])
+                 if what == _STATUS]
+        assert _CHATTER in after
+        assert _INV_ST not in after

@@ -16,9 +16,13 @@
 
 from __future__ import annotations
 
-from line_rig import LineRig
-from line_rig import MakeLine
+from collections import Counter
+from concurrent.futures import Future
+from typing import Any
+
 import pytest
+from support.rig import SLICE
+from support.rig import Rig
 
 #: What the neighbours keep of the rate that they would have alone on the line.
 _KEPT = 0.9
@@ -26,202 +30,209 @@ _KEPT = 0.9
 _SETTLED = 5.0
 #: How much longer than its reads alone the start of many drives may take.
 _START = 1.2
+_SLOW = {'baud': 19200}
 
 
-def _ride(rig: LineRig) -> None:
-    """Enable all drives, and have a program that keeps on sending set-points to each."""
-    rig.enable()
-    rig.keep(lambda: rig.give_all(20.0))
-    rig.pass_time(2.0)
+def made(drives: int, way: str = 'rtu', *, line: Any = _SLOW, **settings: Any) -> Rig:
+    """Return a rig whose drives are polled as fast as the line allows."""
+    return Rig(way, drives=drives, line=line, **{'poll_rate': 50.0, **settings})
 
 
-def _alone(
-    make_line: MakeLine, count: int, seconds: float, *, ride: bool = False, **settings: object
-) -> float:
-    """How many statuses of each drive come when they are alone on the line."""
-    rig = make_line(count, **settings)
+def polls(rig: Rig, seconds: float) -> Counter[int]:
+    """Let time pass; return how many statuses of each drive were published meanwhile."""
+    before = {address: len(notes.snapshots) for address, notes in rig.notes_of.items()}
+    rig.pass_time(seconds)
+    return Counter({
+        address: sum(one.connected for one in notes.snapshots[before[address] :])
+        for address, notes in rig.notes_of.items()
+    })
+
+
+def measured(rig: Rig) -> Counter[int]:
+    """Return how often each drive was measured."""
+    return Counter({address: len(notes.telemetry) for address, notes in rig.notes_of.items()})
+
+
+def start(rig: Rig, *addresses: int) -> float:
+    """
+    Connect to some drives or to all, one a little after the other, and read their settings.
+
+    Each is activated as it is done.
+
+    :returns: how long it took, s.
+    """
+    began = rig.clock.now
+    due = {address: began + 0.03 * n for n, address in enumerate(addresses or rig.fars)}
+    begun: dict[int, Future[Any]] = {}
+    while due or begun:
+        for address in [address for address, at in due.items() if at <= rig.clock.now]:
+            del due[address]
+            begun[address] = rig.drives[address].connect(parameters=True)
+        for address in [address for address, future in begun.items() if future.done()]:
+            begun.pop(address).result()
+            rig.drives[address].activate()
+        rig.pass_time(SLICE)
+    return rig.clock.now - began
+
+
+def rate_alone(drives: int, way: str, *, ride: bool) -> float:
+    """Return how often a second the status of each comes when they are alone on the line."""
+    with made(drives, way) as rig:
+        begin(rig, ride=ride)
+        return sum(polls(rig, 5.0).values()) / 5.0 / drives
+
+
+def begin(rig: Rig, *, ride: bool) -> None:
     rig.connect()
     if ride:
-        _ride(rig)
-    polls = rig.polls(seconds)
-    return sum(polls.values()) / count
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(2.0)
 
 
-@pytest.mark.parametrize('protocol', ['modbus_rtu', 'classic'])
-@pytest.mark.parametrize(('count', 'gone'), [(8, 2), (16, 4)])
+@pytest.mark.parametrize(('way', 'ride'), [('rtu', False), ('classic', False), ('rtu', True)])
 def test_neighbours_keep_their_rate_with_a_quarter_of_the_drives_unplugged(
-    make_line: MakeLine, protocol: str, count: int, gone: int
+    way: str, ride: bool
 ) -> None:
-    kept = _alone(make_line, count - gone, 20.0, protocol=protocol)
-    rig = make_line(count, protocol=protocol)
-    rig.connect()
-    missing = range(count - gone + 1, count + 1)
-    rig.line.unplugged.update(missing)
-    rig.pass_time(_SETTLED)
-    polls = rig.polls(30.0)
-    for address in range(1, count - gone + 1):
-        assert polls[address] / 30.0 >= _KEPT * kept / 20.0
-    assert not any(polls[address] for address in missing)
-    # and each of them is found again
-    rig.line.unplugged.clear()
-    rig.pass_time(10.0)
-    assert all(drive.snapshot.connected for drive in rig.drives.values())
+    kept = rate_alone(6, way, ride=ride)
+    with made(8, way) as rig:
+        begin(rig, ride=ride)
+        rig.line.unplug(7, 8)
+        rig.pass_time(_SETTLED)
+        seen = polls(rig, 10.0)
+        assert all(seen[address] / 10.0 >= _KEPT * kept for address in range(1, 7))
+        assert not seen[7] and not seen[8]
+        # their stops are not confirmed, and tried on: those that come back are stopped
+        for address, drive in rig.drives.items():
+            assert drive.armed == (ride and address < 7)
+            assert drive.stop_unconfirmed == (ride and address >= 7)
+        # and each of them is found again
+        rig.line.unplug()
+        rig.pass_time(10.0)
+        assert all(drive.snapshot.connected for drive in rig.drives.values())
+        assert not any(drive.stop_unconfirmed for drive in rig.drives.values())
 
 
-def test_drives_that_were_unplugged_while_they_ran_take_no_more(make_line: MakeLine) -> None:
-    kept = _alone(make_line, 6, 20.0, ride=True)
-    rig = make_line(8)
-    rig.connect()
-    _ride(rig)
-    rig.line.unplugged.update((7, 8))
-    rig.pass_time(_SETTLED)
-    polls = rig.polls(30.0)
-    assert all(polls[address] / 30.0 >= _KEPT * kept / 20.0 for address in range(1, 7))
-    assert all(rig.drives[address].armed for address in range(1, 7))
-    # their stops are not confirmed, and tried on: those that come back are stopped
-    assert all(rig.drives[address].stop_unconfirmed for address in (7, 8))
-    rig.line.unplugged.clear()
-    rig.pass_time(10.0)
-    assert not any(rig.drives[address].stop_unconfirmed for address in (7, 8))
+def test_a_limited_rate_is_kept_too() -> None:
+    with made(16, line={}, poll_rate=1.0, telemetry_rate=0.0) as rig:
+        rig.connect()
+        before = polls(rig, 10.0)
+        rig.line.unplug(13, 14, 15, 16)
+        rig.pass_time(_SETTLED)
+        seen = polls(rig, 10.0)
+        assert all(seen[address] >= _KEPT * before[address] for address in range(1, 13))
 
 
-def test_a_limited_rate_is_kept_too(make_line: MakeLine) -> None:
-    rig = make_line(16, poll_rate=2.0, telemetry_rate=0.0)
-    rig.connect()
-    before = rig.polls(20.0)
-    rig.line.unplugged.update((13, 14, 15, 16))
-    rig.pass_time(_SETTLED)
-    polls = rig.polls(20.0)
-    assert all(polls[address] >= _KEPT * before[address] for address in range(1, 13))
+def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once() -> None:
+    with made(8) as rig:
+        rig.connect()
+        rig.line.unplug(8)
+        rig.pass_time(10.0)
+        sent, asked_at = len(rig.line.frames), rig.clock.now
+        stop = rig.drives[8].stop()
+        rig.pass_time(0.5)
+        stops = [
+            one['last'] for one in rig.line.frames[sent:] if one['hex'].startswith('0806')
+        ]
+        # behind the transaction on the line, which may be one without a response
+        assert stops and stops[0] - asked_at < 0.3
+        assert 'NOT confirmed' in rig.answer(stop)
 
 
-def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once(make_line: MakeLine) -> None:
-    rig = make_line(8)
-    rig.connect()
-    rig.line.unplugged.add(8)
-    rig.pass_time(10.0)
-    sent = len(rig.line.frames)
-    asked_at = rig.clock.now
-    stop = rig.drives[8].stop()
-    rig.pass_time(0.5)
-    stops = [at for at, frame in rig.line.frames[sent:] if frame[0] == 8 and frame[1] == 6]
-    # behind the transaction on the line, which may be one without a response
-    assert stops and stops[0] - asked_at < 0.3
-    assert 'NOT confirmed' in rig.answer(stop)
+def test_a_drive_alone_on_its_line_is_asked_every_four_seconds_when_it_is_gone() -> None:
+    with made(1) as rig:
+        rig.connect()
+        rig.line.unplug(1)
+        rig.pass_time(8.0)
+        asked = len(rig.asked)
+        rig.pass_time(20.0)
+        # and the time without a response
+        assert len(rig.asked) - asked >= 4
 
 
-def test_a_drive_alone_on_its_line_is_asked_as_often_as_before(make_line: MakeLine) -> None:
-    rig = make_line(1)
-    rig.connect()
-    rig.line.unplugged.add(1)
-    rig.pass_time(8.0)
-    sent = len(rig.line.frames)
-    rig.pass_time(20.0)
-    # every four seconds, and the time without a response
-    assert len(rig.line.frames) - sent >= 4
+@pytest.mark.parametrize('way', ['rtu', 'classic', 'movitrac'])
+def test_many_drives_start_in_the_time_of_their_reads(way: str) -> None:
+    with made(1, way, line={}) as rig:
+        alone = start(rig)
+    with made(8, way, line={}) as rig:
+        assert start(rig) <= _START * 8 * alone
 
 
-@pytest.mark.parametrize(
-    ('protocol', 'baud'),
-    [('modbus_rtu', 57600), ('modbus_rtu', 19200), ('classic', 57600), ('movitrac', 9600)],
-)
-def test_32_drives_start_in_the_time_of_their_reads(
-    make_line: MakeLine, protocol: str, baud: int
-) -> None:
-    alone = make_line(1, protocol=protocol, baud=baud).start()
-    rig = make_line(32, protocol=protocol, baud=baud)
-    # nodes are made one after the other
-    assert rig.start(apart=0.03) <= _START * 32 * alone
+def test_drives_that_stand_are_polled_seldom_while_another_is_read_for_the_first_time() -> None:
+    with made(5, line={}) as rig:
+        start(rig, 1, 2, 3, 4)
+        rig.pass_time(_SETTLED)
+        before = measured(rig)
+        reading = rig.drives[5].connect(parameters=True)
+        seen = polls(rig, 0.8)
+        assert not reading.done()
+        # what had begun already comes to its end
+        assert all(seen[address] <= 2 for address in range(1, 5))
+        assert all(measured(rig)[address] - before[address] <= 1 for address in range(1, 5))
+        rig.answer(reading)
+        # and then as often as before
+        rig.pass_time(2.0)
+        before = measured(rig)
+        seen = polls(rig, 5.0)
+        assert all(seen[address] > 50 for address in range(1, 5))
+        assert all(measured(rig)[address] - before[address] > 1 for address in range(1, 5))
 
 
-def test_drives_that_stand_are_polled_seldom_while_another_is_read_for_the_first_time(
-    make_line: MakeLine,
-) -> None:
-    rig = make_line(5)
-    rig.start(1, 2, 3, 4)
-    rig.pass_time(_SETTLED)
-    measured = rig.measured()
-    reading = rig.drives[5].connect(parameters=True)
-    polls = rig.polls(0.8)
-    assert not reading.done()
-    # what had begun already comes to its end
-    assert all(polls[address] <= 2 for address in range(1, 5))
-    assert all(rig.measured()[address] - measured[address] <= 1 for address in range(1, 5))
-    rig.answer(reading)
-    # and then as often as before
-    rig.pass_time(2.0)
-    measured = rig.measured()
-    polls = rig.polls(5.0)
-    assert all(polls[address] > 50 for address in range(1, 5))
-    assert all(rig.measured()[address] - measured[address] > 1 for address in range(1, 5))
+def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_read() -> None:
+    with made(3) as rig:
+        start(rig, 1, 2)
+        rig.enable(1)
+        rig.send(20.0, 1)
+        rig.pass_time(_SETTLED)
+        before = measured(rig)
+        reading = rig.drives[3].connect(parameters=True)
+        seen = polls(rig, 1.5)
+        assert not reading.done()
+        assert seen[1] > 10
+        assert measured(rig)[1] - before[1] >= 2
+        assert seen[2] <= 2
+        # a stop is confirmed as always
+        asked_at = rig.clock.now
+        stop = rig.drives[1].stop()
+        rig.pass_time(0.5)
+        assert not reading.done()
+        assert 'stop' in rig.answer(stop, 2.0)
+        assert rig.clock.now - asked_at < 1.5
 
 
-def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_read(
-    make_line: MakeLine,
-) -> None:
-    rig = make_line(3, baud=19200)
-    rig.start(1, 2)
-    rig.enable(1)
-    rig.keep(lambda: rig.drives[1].set_setpoint(20.0))
-    rig.pass_time(_SETTLED)
-    measured = rig.measured()
-    reading = rig.drives[3].connect(parameters=True)
-    polls = rig.polls(1.5)
-    assert not reading.done()
-    assert polls[1] > 10
-    assert rig.measured()[1] - measured[1] >= 2
-    assert polls[2] <= 2
-    # a stop is confirmed and told as always
-    asked_at = rig.clock.now
-    stop = rig.drives[1].stop()
-    rig.polls(0.5)
-    assert not reading.done()
-    assert 'stop' in rig.answer(stop, 2.0)
-    assert rig.clock.now - asked_at < 1.5
+def test_a_drive_is_enabled_as_always_while_another_is_read_for_the_first_time() -> None:
+    with made(2, line={'baud': 1200}) as rig:
+        start(rig, 1)
+        reading = rig.drives[2].connect(parameters=True)
+        rig.pass_time(3.0)
+        rig.enable(1)
+        rig.send(20.0, 1)
+        seen = polls(rig, 5.0)
+        assert not reading.done()
+        # a poll takes three transactions, and a set-point goes between
+        assert seen[1] >= 5
+        assert rig.drives[1].snapshot.frequency > 0
 
 
-def test_a_drive_is_enabled_as_always_while_another_is_read_for_the_first_time(
-    make_line: MakeLine,
-) -> None:
-    rig = make_line(2, baud=1200)
-    rig.start(1)
-    reading = rig.drives[2].connect(parameters=True)
-    rig.pass_time(3.0)
-    rig.enable(1)
-    rig.keep(lambda: rig.drives[1].set_setpoint(20.0))
-    polls = rig.polls(5.0)
-    assert not reading.done()
-    # a poll takes three transactions, and a set-point goes between
-    assert polls[1] >= 5
-    assert rig.drives[1].snapshot.frequency > 0
+def test_settings_that_are_read_again_slow_no_other_drive() -> None:
+    with made(2) as rig:
+        start(rig)
+        rig.answer(rig.drives[2].disconnect(1.0))
+        rig.pass_time(_SETTLED)
+        reading = rig.drives[2].connect(parameters=True)
+        assert polls(rig, 1.0)[1] > 4
+        assert not reading.done()
 
 
-def test_settings_that_are_read_again_slow_nobody(make_line: MakeLine) -> None:
-    rig = make_line(2, baud=19200)
-    rig.start()
-    rig.answer(rig.drives[2].disconnect(1.0))
-    rig.pass_time(_SETTLED)
-    reading = rig.drives[2].connect(parameters=True)
-    polls = rig.polls(1.0)
-    assert not reading.done()
-    assert polls[1] > 4
-
-
-def test_a_drive_that_goes_silent_while_it_is_read_slows_nobody(make_line: MakeLine) -> None:
-    rig = make_line(2)
-    rig.start(1)
-    reading = rig.drives[2].connect(parameters=True)
-    rig.pass_time(0.5)
-    rig.line.unplugged.add(2)
-    rig.answer(reading)
-    rig.pass_time(_SETTLED)
-    assert rig.polls(5.0)[1] > 100
-
-
-def test_a_drive_that_nobody_finds_slows_nobody(make_line: MakeLine) -> None:
-    rig = make_line(2)
-    rig.start(1)
-    rig.line.unplugged.add(2)
-    rig.answer(rig.drives[2].connect(patient=False, parameters=True))
-    rig.pass_time(_SETTLED)
-    assert rig.polls(5.0)[1] > 100
+@pytest.mark.parametrize('patient', [True, False])
+def test_a_drive_that_is_silent_when_it_is_read_slows_no_other(patient: bool) -> None:
+    with made(2, line={}) as rig:
+        start(rig, 1)
+        if not patient:
+            rig.line.unplug(2)
+        reading = rig.drives[2].connect(patient=patient, parameters=True)
+        rig.pass_time(0.5)
+        rig.line.unplug(2)
+        rig.answer(reading)
+        rig.pass_time(_SETTLED)
+        assert polls(rig, 5.0)[1] > 100
