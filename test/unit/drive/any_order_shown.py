@@ -190,6 +190,8 @@ class ShownSinus(Shown):
         super().__init__(rig)
         # by Classic all is refused [M0 §6.1.5]
         refused = self._unit.variant.refuses_in_fault if rig.way.protocol != 'classic' else ALL
+        # and what a command reads there comes word by word
+        self.polls_wait = rig.way.protocol == 'classic'
         self.powered_by_acknowledgement = refused == ALL
         self.refuses_stop = refused != NOTHING and self._method == 'mode_scmd'
 
