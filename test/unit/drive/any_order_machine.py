@@ -54,6 +54,7 @@ class AnyOrder(RuleBasedStateMachine):
     The rules for drives of any family; each ends with some time that passes.
 
     :cvar line: how its line is, and ``protocol`` what is spoken there.
+    :cvar driver: other settings of the driver.
     :cvar faults: codes of some of its faults.
     :cvar boot_times: how long it may be silent after power-on, s.
     :cvar enders: what ends a ride, the names of methods that take the time to wait.
@@ -61,6 +62,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     protocol: ClassVar[str] = 'modbus_rtu'
     line: ClassVar[Mapping[str, Any]] = {'response_timeout': 0.1}
+    driver: ClassVar[Mapping[str, Any]] = {}
     model: ClassVar[str]
     method: ClassVar[str]
     reference: ClassVar[str] = 'fieldbus'
@@ -82,7 +84,7 @@ class AnyOrder(RuleBasedStateMachine):
     ) -> None:
         """Begin with a drive in which something stands, and with these settings of the driver."""
         self.rig = Rig(
-            Way(self.protocol, self.model, self.method, self.reference),
+            Way(self.protocol, self.model, self.method, self.reference, driver=self.driver),
             parameters=parameters,
             options=options,
             line=self.line,

@@ -50,7 +50,6 @@ from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 _CONTROL = 'fieldbus.drive_control'
-_CLASSIC = {'response_timeout': 0.1, 'baud': 57600}
 
 
 class SinusOrder(AnyOrder):
@@ -457,12 +456,12 @@ class OptimalDriveControl(SinusOrder):
 
 class Classic(SinusOrder):
     protocol = 'classic'
-    line = _CLASSIC
+    line: ClassVar[Mapping[str, Any]] = {'response_timeout': 0.1, 'baud': 57600}
+    # older firmware does not say who has control while a fault is active
+    driver: ClassVar[Mapping[str, Any]] = {'classic_dialect': 'v2.03'}
 
 
-class ClassicDriveControl(SinusOrder):
-    protocol = 'classic'
-    line = _CLASSIC
+class ClassicDriveControl(Classic):
     method = 'drive_control'
 
 
