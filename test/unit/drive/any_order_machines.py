@@ -50,6 +50,7 @@ from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 _CONTROL = 'fieldbus.drive_control'
+_SIO_ERR = b'\x04!E00AC\x05'.hex()
 
 
 class SinusOrder(AnyOrder):
@@ -459,6 +460,15 @@ class Classic(SinusOrder):
     line: ClassVar[Mapping[str, Any]] = {'response_timeout': 0.1, 'baud': 57600}
     # older firmware does not say who has control while a fault is active
     driver: ClassVar[Mapping[str, Any]] = {'classic_dialect': 'v2.03'}
+
+    def teardown(self) -> None:
+        # why it refused something is asked, which clears the serial fault that a refusal is
+        frames = [frame['hex'] for frame in self.rig.line.frames]
+        self.rig.acknowledged += sum(
+            frame == _SIO_ERR and any(one.endswith('15') for one in frames[number - 6 : number])
+            for number, frame in enumerate(frames)
+        )
+        super().teardown()
 
 
 class ClassicDriveControl(Classic):

@@ -27,8 +27,6 @@ from drive_rig import MODEST
 from drive_rig import MakeRig
 from drive_rig import Rig
 from drive_rig import patient
-from line_rig import LineRig
-from line_rig import MakeLine
 import pytest
 from virtual_rig import MakeVirtual
 from virtual_rig import VirtualRig
@@ -108,24 +106,6 @@ def make_virtual() -> Iterator[MakeVirtual]:
     ) -> VirtualRig:
         end()
         rigs.append(VirtualRig(parameters, variant, **settings))
-        return rigs[-1]
-
-    yield make
-    end()
-
-
-@pytest.fixture
-def make_line() -> Iterator[MakeLine]:
-    """Makes a line of several drives, as often as it is asked for; the one before ends."""
-    rigs: list[LineRig] = []
-
-    def end() -> None:
-        while rigs:
-            rigs.pop().close()
-
-    def make(count: int, **settings: Any) -> LineRig:
-        end()
-        rigs.append(LineRig(count, **settings))
         return rigs[-1]
 
     yield make
