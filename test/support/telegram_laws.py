@@ -50,7 +50,9 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
     asked: dict[bytes, tuple[bool, Exchange | None]] = {}
     for frame in frames:
         data = bytes.fromhex(frame['hex'])
-        if len(data) < 8 or data[6] != unit:
+        # what was lost on its way was written nowhere
+        unheard = frame['direction'] == 'request' and frame.get('note') == 'lost'
+        if len(data) < 8 or data[6] != unit or unheard:
             continue
         number, function = data[:2], data[7]
         if frame['direction'] == 'request':

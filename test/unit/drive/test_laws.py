@@ -23,6 +23,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+import dataclasses
+import itertools
 import math
 from typing import Any
 
@@ -30,14 +32,17 @@ import pytest
 from support.drives import DRIVES
 from support.rig import WAYS
 from support.rig import Rig
+from support.variants import ramps
 
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.drive import Severity
 
-#: How soon a loss has to be noticed and the motor has to be told to stop, beyond lost_after, s.
+#: How soon a loss has to be noticed and the motor has to be stopped, beyond lost_after, s.
 _SOON = 1.5
-#: What may have to be waited until a drive that was away is known again, s.
-_BACK = 6.0
+#: The set-point of a ride, Hz.
+_SPEED = 20.0
 
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
@@ -48,25 +53,41 @@ STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
 }
 every_way = pytest.mark.parametrize('way', WAYS)
 every_stop = pytest.mark.parametrize('stop', STOPS)
+#: Where the motor follows set-points of the bus.
+following = pytest.mark.parametrize(
+    'way', [name for name, way in WAYS.items() if way.reference == 'fieldbus']
+)
+#: Where the drive has a time-out of its own that is counted in frames of the driver.
+timed = pytest.mark.parametrize(
+    'way',
+    [
+        name for name, way in WAYS.items()
+        if way.protocol not in ('telegram1', 'canopen') and way.model != 'sinus_optimal'
+    ],
+)
 
 
-def follows(way: str) -> bool:
-    """Tell whether a motor that is commanded this way follows set-points."""
-    return WAYS[way].reference == 'fieldbus'
-
-
-def overload(way: str) -> int:
+def overload(rig: Rig) -> int:
     """Return the code of a fault that every drive of this way can have."""
-    found = WAYS[way]
-    return (DRIVES.get(f'{found.model} {found.method}') or DRIVES[found.model]).overload.code
+    way = rig.way
+    return (DRIVES.get(f'{way.model} {way.method}') or DRIVES[way.model]).overload.code
 
 
-def settings_of(rig: Rig) -> dict[str, int]:
-    """Return how often each setting of the drive was written."""
-    return dict(rig.far.writes)
+def give_setpoints(rig: Rig) -> None:
+    """Have a program give set-points, where they count."""
+    rig.send(_SPEED if rig.drive.settings.follows_setpoints else None)
 
 
-# --- 1 and 4: what only looks writes nothing ------------------------------------------------------
+def assert_only_enable_helps(rig: Rig) -> None:
+    """Nothing turns although set-points arrive, until it is enabled."""
+    give_setpoints(rig)
+    rig.pass_time(1.5)
+    assert not rig.drive.armed and not rig.turns
+    rig.enable()
+    rig.wait_until(lambda: abs(rig.far.motor.frequency) > 0.5 * _SPEED, 5.0)
+
+
+# --- 1: what only looks writes nothing ------------------------------------------------------------
 
 
 @every_way
@@ -80,45 +101,25 @@ def test_1_polling_writes_nothing(way: str) -> None:
         assert not rig.far.writes and not rig.turns
 
 
-@every_way
-def test_4_a_ride_writes_no_setting_but_what_control_needs(way: str) -> None:
-    with Rig(way) as rig:
-        rig.turn()
-        rig.result(rig.drive.disconnect(4.0))
-        first = settings_of(rig)
-        rig.connect()
-        rig.enable()
-        rig.pass_time(1.0)
-        rig.result(rig.drive.disconnect(4.0))
-        # what stands so already is not written again
-        assert settings_of(rig) == first
-        assert len(first) <= 1
-
-
 # --- 2: the motor turns only when it was enabled since, and a fresh set-point came after that -----
 
 
-@every_way
+@following
 def test_2_a_set_point_from_before_enable_is_not_taken_over(way: str) -> None:
     with Rig(way) as rig:
         rig.connect()
-        if follows(way):
-            rig.drive.set_setpoint(20.0)
-        else:
-            pytest.skip('it follows no set-points')
+        rig.drive.set_setpoint(_SPEED)
         rig.enable()
         rig.pass_time(1.5)
         assert rig.drive.armed
         assert rig.far.motor.demand == 0 or not rig.far.motor.driven
 
 
-@every_way
+@following
 def test_2_without_enable_set_points_turn_nothing(way: str) -> None:
-    if not follows(way):
-        pytest.skip('it follows no set-points')
     with Rig(way) as rig:
         rig.connect()
-        rig.send(20.0)
+        rig.send(_SPEED)
         rig.pass_time(2.0)
         assert not rig.turns and not rig.drive.armed
 
@@ -140,45 +141,87 @@ def lose_power(rig: Rig) -> None:
     rig.pass_time(3.0)
 
 
+def blink(rig: Rig) -> None:
+    """Take the mains away for less than lost_after; a brake holds the motor, the ramp is slow."""
+    rig.far.set_from_keypad(next(iter(ramps(rig.way.model, 0.3, 0.3))), 5.0)
+    rig.far.power_cycle(boot_time=0.5)
+    rig.far.motor.rotor = 0.0
+    rig.pass_time(1.5)
+
+
 def restart_driver(rig: Rig) -> None:
+    """End the driver without a stop: the next one finds a motor that runs."""
     rig.kill()
     rig.pass_time(0.3)
     rig.begin()
     rig.connect()
 
 
+def open_run_input(rig: Rig) -> None:
+    """Open the input, and close it before the motor stands."""
+    rig.far.set_run_input(False)
+    rig.wait_until(lambda: not rig.drive.armed, 1.0)
+    rig.far.set_run_input(True)
+
+
+def acknowledge_beside(rig: Rig) -> None:
+    """Have another master acknowledge a fault, while the run command may stand."""
+    rig.far.trip(overload(rig))
+    rig.pass_time(0.5)
+    rig.far.faults.acknowledge()
+    rig.far._settle()
+
+
+def fail_to_listen(rig: Rig) -> None:
+    """Have what listens to the driver fail for a while."""
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    rig.notes.on_snapshot = rig.notes.on_event = fail  # type: ignore[method-assign]
+    rig.pass_time(rig.drive.settings.lost_after + _SOON)
+    assert not rig.turns
+    del rig.notes.on_snapshot, rig.notes.on_event
+    rig.pass_time(1.0)
+    rig.notes.events.clear()
+
+
 LOSSES = {
-    'line': lose_line, 'port': lose_port, 'power': lose_power, 'driver': restart_driver,
+    'line': lose_line, 'port': lose_port, 'power': lose_power, 'mains for a moment': blink,
+    'driver': restart_driver, 'run input': open_run_input, 'fault': acknowledge_beside,
+    'listener': fail_to_listen,
 }
 
 
-@every_way
-@pytest.mark.parametrize('loss', LOSSES)
+@pytest.mark.parametrize(
+    ('way', 'loss'),
+    [
+        (way, loss) for way, loss in itertools.product(WAYS, LOSSES)
+        # there the PLC, or the bit of the bus, enables in place of an input
+        if loss != 'run input' or way not in ('telegram1 sinus_h', 'movitrac')
+    ],
+)
 def test_2_after_a_loss_nothing_turns_until_it_is_enabled_again(way: str, loss: str) -> None:
     with Rig(way) as rig:
         rig.turn()
         LOSSES[loss](rig)
-        rig.pass_time(_BACK)
-        rig.send(20.0 if follows(way) else None)
-        rig.pass_time(2.0)
-        assert not rig.drive.armed and not rig.turns
-        rig.enable()
-        rig.send(20.0 if follows(way) else None)
-        rig.pass_time(2.0)
-        assert rig.turns
+        rig.wait_until(
+            lambda: rig.drive.snapshot.connected and not rig.drive.stop_unconfirmed, 10.0
+        )
+        assert_only_enable_helps(rig)
 
 
 @every_way
 def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
-        rig.far.trip(overload(way))
+        rig.far.trip(overload(rig))
         rig.pass_time(1.0)
         assert not rig.drive.armed
+        assert rig.notes.snapshot.kind is Kind.FAULT
         rig.acknowledged += 1
-        rig.answer(rig.drive.acknowledge())
-        rig.pass_time(3.0)
-        assert not rig.turns and not rig.drive.armed
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        assert_only_enable_helps(rig)
 
 
 @every_way
@@ -190,10 +233,49 @@ def test_2_a_stop_ends_an_enable_that_was_asked_for_before(way: str, stop: str) 
         stopped = STOPS[stop](rig.drive)
         rig.answer(enable)
         rig.answer(stopped)
-        if follows(way) and stop not in ('disconnect', 'exit'):
-            rig.send(20.0)
+        if stop not in ('disconnect', 'exit'):
+            give_setpoints(rig)
         rig.pass_time(1.0)
         assert not rig.turns and not rig.drive.armed
+
+
+@every_way
+def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
+    with Rig(way, poll_rate=2.0, telemetry_rate=0.0) as rig:
+        rig.connect()
+        give_setpoints(rig)
+        for moment in itertools.count():
+            requests, stops = itertools.count(), []
+
+            def meet(key: str, data: bytes | None) -> None:
+                if next(requests) == moment:  # noqa: B023  # it is set anew for each
+                    stops.append(rig.drive.stop())  # noqa: B023
+
+            rig.meet = meet
+            enable = rig.drive.enable()
+            rig.wait_until(enable.done)
+            rig.meet = lambda key, data: None
+            if not stops:
+                break
+            rig.answer(stops[0])
+            assert not rig.drive.armed and not rig.drive.stop_unconfirmed, moment
+            rig.pass_time(0.3)
+            assert not rig.turns, moment
+        assert moment >= 2, 'enabling takes more requests than that'
+        assert rig.drive.armed
+
+
+@every_way
+def test_2_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(way: str) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        asked_at = rig.clock.now
+        stops, enable = rig.drive.stop(), rig.drive.enable()
+        assert 'a stop is on its way' in rig.answer(enable)
+        rig.answer(stops)
+        # it was not asked for after the stop, although it arrives there
+        assert 'a stop was confirmed after' in rig.answer(rig.drive.enable(asked_at))
+        assert_only_enable_helps(rig)
 
 
 # --- 3: every way out stops the motor, and no success is reported that was not confirmed ----------
@@ -204,55 +286,139 @@ def test_2_a_stop_ends_an_enable_that_was_asked_for_before(way: str, stop: str) 
 def test_3_every_way_out_stops_the_motor(way: str, stop: str) -> None:
     with Rig(way) as rig:
         rig.turn()
+        begun = len(rig.asked)
         future = STOPS[stop](rig.drive)
         rig.answer(future)
+        # ahead of polls and set-points
+        assert any(data is not None for _, _, data in rig.asked[begun : begun + 2])
+        assert not rig.turns and not rig.drive.armed and not rig.drive.stop_unconfirmed
         rig.pass_time(1.0)
-        assert not rig.turns and not rig.drive.armed
-
-
-@every_way
-def test_3_a_stop_on_a_dead_line_is_said_and_carried_out_when_it_is_back(way: str) -> None:
-    with Rig(way) as rig:
-        rig.turn()
-        rig.line.state = 'silent'
-        answer = rig.answer(rig.drive.stop())
-        assert 'stopped' not in answer, answer
-        rig.pass_time(4.0)
-        assert any(one.severity is Severity.ERROR for one in rig.notes.events)
-        rig.line.mend()
-        rig.pass_time(_BACK)
         assert not rig.turns
 
 
 @every_way
+@every_stop
+def test_3_a_stop_on_a_dead_line_is_said_and_carried_out_when_it_is_back(
+    way: str, stop: str
+) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        rig.line.state = 'silent'
+        answer = rig.answer(STOPS[stop](rig.drive))
+        assert 'NOT confirmed' in answer, answer
+        rig.pass_time(2.0)
+        assert rig.drive.stop_unconfirmed
+        assert rig.notes.said(Cause.CANNOT_STOP, Severity.ERROR)
+        assert rig.notes.said('emergency stop')
+        rig.line.mend()
+        rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 10.0)
+        assert not rig.turns and not rig.drive.armed
+
+
+@following
 def test_3_without_fresh_set_points_it_stops(way: str) -> None:
-    if not follows(way):
-        pytest.skip('it follows no set-points')
     with Rig(way, setpoint_timeout=1.0) as rig:
         rig.turn()
         rig.send(None)
-        rig.pass_time(4.0)
+        rig.pass_time(3.0)
+        assert rig.notes.said(Cause.SETPOINT_TIMED_OUT, Severity.WARNING)
         assert not rig.turns and not rig.far.motor.turning
+
+
+# --- 4 to 6: settings are written on change alone, and one control method commands a drive --------
+
+
+@every_way
+def test_4_a_ride_writes_no_setting_but_what_control_needs(way: str) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        rig.result(rig.drive.disconnect(4.0))
+        first = dict(rig.far.writes)
+        rig.connect()
+        rig.enable()
+        rig.pass_time(1.0)
+        rig.result(rig.drive.disconnect(4.0))
+        # what stands so already is not written again
+        assert dict(rig.far.writes) == first
+        assert len(first) <= 1
+
+
+@every_way
+def test_6_the_control_method_of_a_session_never_changes(way: str) -> None:
+    with Rig(way) as rig:
+        for changed in ({'control_method': 'monitor'}, {'address': 2}):
+            with pytest.raises(ValueError, match='cannot change within a session'):
+                rig.drive.settings = dataclasses.replace(rig.drive.settings, **changed)
 
 
 # --- 7 and 8: what is reported is true ------------------------------------------------------------
 
 
 @every_way
-def test_8_noise_makes_no_false_reading(way: str) -> None:
+def test_7_what_is_not_known_any_more_is_shown_as_such(way: str) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        assert rig.notes.snapshot.connected and not math.isnan(rig.notes.snapshot.frequency)
+        rig.line.state = 'silent'
+        rig.pass_time(rig.drive.settings.lost_after + _SOON)
+        lost = rig.notes.snapshot
+        assert not lost.connected and lost.status is None
+        assert math.isnan(lost.frequency) and math.isnan(lost.speed)
+
+
+@every_way
+@pytest.mark.parametrize('trouble', ['noise', 'late', 'double'])
+def test_8_a_bad_line_makes_no_false_reading(way: str, trouble: str) -> None:
     with Rig(way) as rig:
         rig.turn()
         before = len(rig.notes.snapshots)
         frequency = rig.far.motor.frequency
-        rig.line.make_noise(0.15, seed=3)
-        rig.pass_time(10.0)
+        if trouble == 'noise':
+            rig.line.make_noise(0.15, seed=3)
+            rig.pass_time(8.0)
+        else:
+            for _ in range(8):
+                rig.line.spoil({'late': 'delay'}.get(trouble, trouble))
+                rig.pass_time(0.5)
         found = [one.frequency for one in rig.notes.snapshots[before:]]
-        wrong = [one for one in found if not math.isnan(one) and abs(one - frequency) > 1.0]
-        assert not wrong
+        assert len(found) > 10
+        assert [one for one in found if abs(one - frequency) > 1.0] == []
         assert rig.drive.armed
 
 
 # --- 9 and 10: the line is kept alive; a motor is not stopped without a reason --------------------
+
+
+@timed
+def test_9_a_drive_that_is_polled_seldom_hears_the_driver_in_time(way: str) -> None:
+    with Rig(way, poll_rate=0.05, telemetry_rate=0.0, drive_timeout=2.0) as rig:
+        rig.connect()
+        rig.enable()
+        rig.line.make_noise(0.15, seed=1)
+        begun = rig.clock.now
+        rig.pass_time(12.0)
+        sent = [
+            one['first'] for one in rig.line.frames
+            if one['direction'] == 'request' and one['first'] > begun
+        ]
+        # half the time-out of the drive
+        assert max(two - one for one, two in itertools.pairwise(sent)) <= 1.0
+        assert rig.drive.armed and not rig.far.faults
+        rig.line.mend()
+        # a clean exit leaves no fault behind
+        rig.answer(rig.drive.disconnect(4.0))
+        rig.kill()
+        rig.pass_time(6.0)
+        assert not rig.far.faults
+
+
+@timed
+def test_9_without_the_driver_the_drive_stops_by_itself(way: str) -> None:
+    with Rig(way, drive_timeout=2.0) as rig:
+        rig.turn()
+        rig.kill()
+        rig.pass_time(4.0)
+        assert not rig.turns
 
 
 @every_way
@@ -261,7 +427,7 @@ def test_10_a_few_lost_answers_stop_nothing_and_a_silence_does(way: str) -> None
         rig.turn()
         for what in ('unheard', 'drop', 'damage', 'double'):
             rig.line.spoil(what)
-            rig.pass_time(1.5)
+            rig.pass_time(1.0)
             assert rig.drive.armed, what
         rig.line.state = 'silent'
         rig.pass_time(rig.drive.settings.lost_after + _SOON)
