@@ -244,12 +244,13 @@ def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
     with Rig(way, poll_rate=2.0, telemetry_rate=0.0) as rig:
         rig.connect()
         give_setpoints(rig)
+        kinds = ('stop', 'quick stop', 'deactivate')
         for moment in itertools.count():
             requests, stops = itertools.count(), []
 
             def meet(key: str, data: bytes | None) -> None:
                 if next(requests) == moment:  # noqa: B023  # it is set anew for each
-                    stops.append(rig.drive.stop())  # noqa: B023
+                    stops.append(STOPS[kinds[moment % 3]](rig.drive))  # noqa: B023
 
             rig.meet = meet
             enable = rig.drive.enable()
@@ -261,6 +262,7 @@ def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
             assert not rig.drive.armed and not rig.drive.stop_unconfirmed, moment
             rig.pass_time(0.3)
             assert not rig.turns, moment
+            rig.drive.activate()
         assert moment >= 2, 'enabling takes more requests than that'
         assert rig.drive.armed
 
@@ -413,12 +415,17 @@ def test_9_a_drive_that_is_polled_seldom_hears_the_driver_in_time(way: str) -> N
 
 
 @timed
-def test_9_without_the_driver_the_drive_stops_by_itself(way: str) -> None:
+def test_9_on_a_dead_line_the_drive_stops_by_itself_and_wants_acknowledging(way: str) -> None:
     with Rig(way, drive_timeout=2.0) as rig:
         rig.turn()
-        rig.kill()
+        rig.line.state = 'silent'
         rig.pass_time(4.0)
         assert not rig.turns
+        rig.line.mend()
+        rig.wait_until(lambda: rig.drive.snapshot.connected)
+        rig.acknowledged += 1
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        assert_only_enable_helps(rig)
 
 
 @every_way
