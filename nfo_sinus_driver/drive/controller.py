@@ -485,10 +485,10 @@ class Controller:
 
     def close(self) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
-        may_run = self.may_run
-        self._happened(ControlEvent.CLOSE)
-        if may_run:
+        # first, for another thread may look in between, and no stop would be pending
+        if self.may_run:
             self._sequence.request()
+        self._happened(ControlEvent.CLOSE)
 
     # --- what happens by itself ---------------------------------------------------------------
 
