@@ -25,6 +25,7 @@ from mutant import DRIVE
 from mutant import G2
 from mutant import G2_CONTROL
 from mutant import G2_SCMD
+from mutant import LAW_2
 from mutant import MAIN
 from mutant import NO_STOP_FORGOTTEN
 from mutant import NO_TURN
@@ -241,7 +242,7 @@ HISTORIES = (
         TABLE,
         'ENABLE        .         ENABLING  .        .        .         .        .     ',
         'ENABLE        .         ENABLING  .        .        .         .        ENABLING',
-        STOP_CONFIRMED,
+        LAW_2,
     ),
     Mutant(
         3,
