@@ -12,118 +12,109 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What reading the controller found: a stop that nobody carried out, or an enable beside one."""
+"""What reading the controller found: a stop that is not carried out, or an enable beside one."""
 
 from __future__ import annotations
 
-from virtual_rig import MakeVirtual
+from support.rig import Rig
 
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.drive.events import Report
 
 
-def test_a_drive_that_is_left_alone_while_it_runs_is_stopped(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual()
-    rig.drive.activate()
-    connecting = rig.drive.connect(parameters=True)
-
-    def answered() -> bool:
-        return rig.drive.inverter.connected
-
-    while not answered():
-        rig.pass_time(0.01)
-    # nobody waits for the end of the reading
-    rig.drive.enable()
-    while not rig.drive.armed:
-        rig.pass_time(0.01)
-    rig.send(20.0)
-    rig.pass_time(0.2)
-    assert rig.far.motor.driven and not connecting.done()
-    rig.link.state = 'silent'
-    rig.answer(connecting)
-    assert connecting.exception() is not None
-    assert rig.drive.stop_unconfirmed
-    rig.link.mend()
-    rig.pass_time(3.0)
-    assert not rig.far.motor.driven and not rig.drive.stop_unconfirmed
-    # and it is of use again
-    rig.send(None)
-    rig.ride()
+def test_a_drive_that_is_left_alone_while_it_runs_is_stopped() -> None:
+    with Rig() as rig:
+        rig.drive.activate()
+        connecting = rig.drive.connect(parameters=True)
+        rig.wait_until(lambda: rig.drive.inverter.connected)
+        # an enable need not wait for the end of the reading
+        rig.drive.enable()
+        rig.wait_until(lambda: rig.drive.armed)
+        rig.send(20.0)
+        rig.pass_time(0.2)
+        assert rig.far.motor.driven and not connecting.done()
+        rig.line.state = 'silent'
+        rig.answer(connecting)
+        assert connecting.exception() is not None
+        assert rig.drive.stop_unconfirmed
+        rig.line.mend()
+        rig.pass_time(3.0)
+        assert not rig.far.motor.driven and not rig.drive.stop_unconfirmed
+        # and it is of use again
+        rig.send(None)
+        rig.turn()
 
 
-def test_nobody_enables_a_drive_that_is_being_left(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual(parameters={'control.retard': 8.0})
-    rig.ride(40.0)
-    leaving = rig.drive.disconnect(2.0)
-    rig.pass_time(0.3)
-    rig.drive.activate()
-    enabled = rig.drive.enable()
-    rig.answer(enabled)
-    assert enabled.exception() is not None
-    rig.answer(leaving)
-    rig.pass_time(10.0)
-    assert not rig.far.motor.driven
+def test_a_drive_that_is_being_left_is_not_enabled() -> None:
+    with Rig(parameters={'control.retard': 8.0}) as rig:
+        rig.turn(40.0)
+        leaving = rig.drive.disconnect(1.0)
+        rig.pass_time(0.3)
+        assert not leaving.done()
+        assert 'not active' in rig.answer(rig.drive.enable())
+        rig.drive.activate()
+        enabled = rig.drive.enable()
+        rig.answer(enabled)
+        assert enabled.exception() is not None
+        assert 'left to its ramp' in rig.answer(leaving)
+        rig.pass_time(10.0)
+        assert not rig.drive.armed and not rig.far.motor.driven
 
 
-def test_an_attempt_that_fails_at_once_confirms_nothing(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual()
-    rig.ride()
-    controller = rig.drive._controller
-    assert controller is not None
-    stop, left = controller.method.stop, [7]
+def test_an_attempt_that_fails_at_once_confirms_nothing() -> None:
+    with Rig() as rig:
+        rig.turn()
+        controller = rig.drive._controller
+        stop, left = controller.method.stop, [7]
 
-    async def fail(control_mode: str) -> None:
-        if left[0]:
-            left[0] -= 1
+        async def fail(control_mode: str) -> None:
+            if left[0]:
+                left[0] -= 1
+                raise ValueError('a mistake')
+            await stop(control_mode)
+
+        controller.method.stop = fail  # type: ignore[method-assign]
+        answer = rig.drive.stop()
+        rig.pass_time(0.05)
+        assert controller.state is ControlState.STOPPING
+        enabled = rig.drive.enable()
+        rig.answer(enabled)
+        assert enabled.exception() is not None
+        rig.answer(answer)
+        rig.pass_time(2.0)
+        assert not rig.far.motor.driven
+        rig.notes.events.clear()
+
+
+def test_a_mistake_in_a_quick_stop_ends_in_a_stop() -> None:
+    with Rig() as rig:
+        rig.turn()
+        controller = rig.drive._controller
+
+        async def fail(control_mode: str) -> None:
             raise ValueError('a mistake')
-        await stop(control_mode)
 
-    controller.method.stop = fail  # type: ignore[method-assign]
-    answer = rig.drive.stop()
-    rig.pass_time(0.05)
-    assert controller.state is ControlState.STOPPING
-    enabled = rig.drive.enable()
-    rig.answer(enabled)
-    assert enabled.exception() is not None
-    rig.answer(answer)
-    rig.pass_time(2.0)
-    assert not rig.far.motor.driven
+        controller.method.quick_stop = fail  # type: ignore[method-assign]
+        answer = rig.drive.quick_stop()
+        rig.answer(answer)
+        assert answer.exception() is not None
+        rig.pass_time(3.0)
+        assert not rig.far.motor.driven and controller.state is ControlState.IDLE
+        # not only because a poll has found it running
+        assert not rig.notes.said(Cause.STOPPED_BECAUSE)
+        rig.notes.events.clear()
 
 
-def test_a_mistake_in_a_quick_stop_ends_in_a_stop(make_virtual: MakeVirtual) -> None:
-    rig = make_virtual()
-    rig.ride()
-    controller = rig.drive._controller
-    assert controller is not None
-
-    async def fail(control_mode: str) -> None:
-        raise ValueError('a mistake')
-
-    controller.method.quick_stop = fail  # type: ignore[method-assign]
-    answer = rig.drive.quick_stop()
-    rig.answer(answer)
-    assert answer.exception() is not None
-    rig.pass_time(3.0)
-    assert not rig.far.motor.driven and controller.state is ControlState.IDLE
-    # not only because a poll has found it running
-    assert not rig.said(Cause.STOPPED_BECAUSE)
-
-
-def test_a_refused_set_point_and_a_loss_leave_no_stop_that_is_not_shown(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual()
-    rig.ride()
-    controller = rig.drive._controller
-    assert controller is not None
-    judge = controller.judge
-    controller.judge = lambda seen: False  # type: ignore[method-assign]
-    controller.refused(Report(Cause.NO_ANSWER_YET))
-    rig.pass_time(0.3)
-    assert controller.state is ControlState.IDLE
-    rig.link.state = 'silent'
-    rig.pass_time(4.0)
-    assert controller.stopping
-    assert controller.state is ControlState.STOPPING
-    controller.judge = judge  # type: ignore[method-assign]
+def test_a_refused_set_point_and_a_loss_leave_no_stop_that_is_not_shown() -> None:
+    with Rig() as rig:
+        rig.turn()
+        controller = rig.drive._controller
+        controller.judge = lambda seen: False  # type: ignore[method-assign]
+        controller.refused(Report(Cause.NO_ANSWER_YET))
+        rig.pass_time(0.3)
+        assert controller.state is ControlState.IDLE
+        rig.line.state = 'silent'
+        rig.pass_time(4.0)
+        assert controller.stopping
+        assert controller.state is ControlState.STOPPING
