@@ -1,0 +1,293 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated Optimal and G2 on a fieldbus: telegram 1 by their manuals ([M1], [M0 §7])."""
+
+from hypothesis import given
+from hypothesis import settings as examples_of
+from hypothesis import strategies as st
+import pytest
+from support.examples import examples
+from telegram_bench import TelegramBench as Bench
+
+# Optimal: bits of STW1 and ZSW1, copied from [M1]
+SWITCH_ON, ENABLE, ACK, PLC = 1 << 0, 1 << 3, 1 << 7, 1 << 10
+READY, OPERATING, ENABLED, FAULT = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+DISABLED, CONTROLLED, REACHED, REVERSE, STOPPING = 1 << 6, 1 << 9, 1 << 10, 1 << 14, 1 << 15
+FULL = 8192
+
+# G2: DriveControl [M0 table 14] and the masks of [M0 table 16]
+G2_CONTROLLED = 0xC000 | 0x70
+G2_STANDBY = G2_CONTROLLED | 0x06
+G2_ON = G2_STANDBY | 0x01
+G2_FORWARD, G2_REVERSE = G2_ON | 0x08, G2_ON | 0x2000
+
+
+def running_optimal(setpoint=FULL // 2, seconds=6.0, **settings):
+    bench = Bench('sinus_optimal', settings)
+    bench.step(PLC)
+    bench.step(PLC | ENABLE)
+    bench.step(PLC | ENABLE | SWITCH_ON, setpoint)
+    bench.wait(seconds)
+    return bench
+
+
+# --- Optimal: the sequence of its manual ---
+
+
+def test_each_bit_is_confirmed_before_the_next():
+    bench = Bench('sinus_optimal')
+    bench.send(0)
+    assert bench.zsw1 & (READY | CONTROLLED | ENABLED | OPERATING) == READY
+    bench.send(PLC)
+    assert not bench.zsw1 & CONTROLLED, 'it takes its time'
+    assert bench.step(PLC) & (CONTROLLED | ENABLED | OPERATING) == CONTROLLED
+    assert bench.step(PLC | ENABLE) & (CONTROLLED | ENABLED | OPERATING) == CONTROLLED | ENABLED
+    assert bench.step(PLC | ENABLE | SWITCH_ON, FULL) & OPERATING
+
+
+def test_a_bit_that_comes_too_early_does_nothing():
+    for words in (
+        (PLC | ENABLE,),
+        (PLC | ENABLE | SWITCH_ON,),
+        (PLC, PLC | SWITCH_ON),
+        (PLC, PLC | ENABLE | SWITCH_ON),
+        (ENABLE, ENABLE | SWITCH_ON),
+        (SWITCH_ON,),
+    ):
+        bench = Bench('sinus_optimal')
+        for word in words:
+            bench.step(word, FULL)
+        bench.wait(3.0)
+        assert not bench.zsw1 & OPERATING and not bench.motor.driven, words
+
+
+def test_a_bit_that_is_taken_away_ends_the_run():
+    for word in (PLC | ENABLE, PLC, PLC | SWITCH_ON, 0, ENABLE | SWITCH_ON):
+        bench = running_optimal()
+        bench.send(word)
+        bench.wait(0.2)
+        assert bench.zsw1 & STOPPING and bench.zsw1 & OPERATING, word
+        bench.wait(6.0)
+        assert not bench.motor.driven and not bench.zsw1 & (STOPPING | OPERATING), word
+        if word == PLC | ENABLE:
+            assert bench.step(PLC | ENABLE | SWITCH_ON) & OPERATING
+
+
+def test_bits_1_and_2_are_echoes():
+    bench = Bench('sinus_optimal')
+    for sent, shown in ((1 << 1, 1 << 4), (1 << 2, 1 << 5), (0x6, 0x30), (0, 0)):
+        bench.step(PLC | sent)
+        assert bench.zsw1 & 0x30 == shown
+
+
+def test_setpoint_is_a_share_of_nominal_frequency_or_speed():
+    bench = running_optimal(0, 0.0, **{'control.accel': 1.0, 'control.retard': 1.0})
+    for setpoint, frequency in (
+        (FULL, 50), (-FULL, -50), (FULL // 2, 25), (1, 50 / FULL), (24576, 150), (32767, 150)
+    ):
+        bench.send(bench.word, setpoint)
+        bench.wait(4.0)
+        assert bench.motor.demand == pytest.approx(frequency, rel=1e-6)
+        if abs(frequency) <= 50:
+            assert bench.actual == pytest.approx(setpoint, abs=2)
+            assert bench.zsw1 & REACHED
+        assert bool(bench.zsw1 & REVERSE) == (setpoint < 0)
+    bench = running_optimal(FULL, **{'control.mode': 'Speed'})
+    bench.wait(3.0)
+    assert bench.motor.speed == pytest.approx(1500, abs=3)
+    assert bench.actual == pytest.approx(FULL, abs=20)
+
+
+def test_fault_and_its_acknowledgement_by_an_edge():
+    bench = running_optimal()
+    bench.drive.trip(12)
+    bench.wait(0.1)
+    assert bench.zsw1 & FAULT and not bench.motor.driven
+    bench.step(PLC)
+    bench.step(PLC | ACK)
+    assert not bench.zsw1 & FAULT
+    bench.drive.trip(12)
+    bench.wait(0.1)
+    assert bench.zsw1 & FAULT, 'a bit that still stands is no edge'
+
+
+def test_who_takes_control_at_the_drive_keeps_it():
+    for key in ('stop', 'ext', 'run input'):
+        bench = running_optimal()
+        bench.drive.set_run_input(key == 'stop')
+        if key != 'run input':
+            bench.drive.control_unit.press(key)
+        bench.wait(6.0)
+        assert not bench.motor.driven, key
+        assert bool(bench.zsw1 & CONTROLLED) == (key == 'run input')
+        assert bool(bench.zsw1 & DISABLED) == (key != 'stop')
+
+
+def test_after_a_power_cycle_a_standing_word_does_nothing():
+    for bench in (running_optimal(), running_g2()):
+        bench.drive.power_cycle(0.5)
+        bench.drive.advance(0.5)
+        bench.wait(3.0)
+        assert not bench.motor.driven
+
+
+def test_lost_fieldbus_goes_by_auto_stop():
+    for run in (running_optimal, running_g2):
+        for auto_stop in (False, True):
+            bench = run(**{'serial.auto_stop': auto_stop})
+            bench.wait(0.1, telegrams=False)
+            assert bench.motor.driven
+            bench.wait(3.0, telegrams=False)
+            assert bench.motor.driven == (not auto_stop)
+            assert bench.drive.faults.codes == ([15] if auto_stop else [])
+            bench.wait(3.0)
+            assert bench.motor.driven == (not auto_stop), 'what stood does not start it again'
+
+
+# --- G2 ---
+
+
+def running_g2(word=G2_FORWARD, setpoint=200, **settings):
+    bench = Bench('sinus_g2', settings, telegram_words='drivecontrol')
+    bench.step(G2_STANDBY)
+    bench.step(G2_ON)
+    bench.step(word, setpoint)
+    bench.wait(6.0)
+    return bench
+
+
+def test_g2_goes_through_its_states_by_drive_control():
+    bench = Bench('sinus_g2', telegram_words='drivecontrol')
+    assert bench.step(0) & 0xC04F == 0x0040
+    assert bench.step(G2_STANDBY) & 0xC06F == 0x0021
+    assert bench.step(G2_ON) & 0xC06F == 0x0023
+    assert bench.step(G2_FORWARD, 100) & 0xC06F == 0x0027
+    assert bench.zsw1 & 0x0300 == 0x0300, 'control and reference from the net'
+    bench.wait(4.0)
+    assert bench.actual == 100
+    assert bench.motor.frequency == pytest.approx(10.0)
+    assert bench.step(G2_STANDBY) & 0xC06F == 0x8027, 'SHUTDOWN'
+    bench.wait(3.0)
+    assert bench.zsw1 & 0xC06F == 0x0021
+    bench = running_g2(G2_REVERSE)
+    assert (bench.zsw1 & 0xC06F, bench.actual) == (0x4023, -200)
+
+
+def test_g2_needs_a_positive_edge_of_bit_0():
+    for words, run in (('drivecontrol', G2_FORWARD), ('profidrive', 0x047F)):
+        bench = Bench('sinus_g2', telegram_words=words)
+        bench.step(run, 200)
+        bench.wait(3.0)
+        assert not bench.motor.driven and bench.zsw1 & 0x40, words
+
+
+def test_g2_values_are_those_of_its_setpoint_registers():
+    for mode, setpoint in (('Freque', 200), ('Speed', 600)):
+        bench = running_g2(setpoint=setpoint, **{'control.mode': mode})
+        turned = bench.motor.frequency * 10 if mode == 'Freque' else bench.motor.speed
+        assert bench.actual == pytest.approx(setpoint, abs=2), mode
+        assert turned == pytest.approx(setpoint, abs=2), mode
+
+
+def test_g2_quick_stop_coasts():
+    for missing in (0x02, 0x04):
+        bench = running_g2()
+        bench.send(G2_FORWARD & ~missing)
+        bench.wait(0.02)
+        assert bench.motor.turning and not bench.motor.driven
+
+
+def test_g2_fault_and_its_acknowledgement():
+    bench = running_g2()
+    bench.drive.trip(5)
+    bench.wait(1.0)
+    assert bench.zsw1 & 0xC04F == 0x0008
+    bench.step(G2_STANDBY)
+    bench.step(G2_STANDBY | 0x80)
+    assert bench.zsw1 & 0xC06F == 0x0021
+    bench.wait(2.0)
+    assert not bench.motor.driven
+
+
+def test_g2_speaks_profidrive():
+    # standard telegram 1: STW1 0476h, 0477h, 047Fh lead through S1 to S4 [C111]
+    bench = Bench('sinus_g2')
+    assert bench.step(0) & 0x047 == 0x40
+    assert bench.step(0x0476) & 0x277 == 0x231
+    assert bench.step(0x0477) & 0x047 == 0x03
+    assert bench.step(0x047F, 100) & 0x8047 == 0x8007, 'bit 15: pulses enabled'
+    bench.wait(4.0)
+    assert bench.actual == 100 and bench.zsw1 & 0x100
+    bench.step(0, 0)
+    bench.wait(2.0)
+    assert bench.actual == 100 and bench.motor.driven, 'without control by PLC nothing counts'
+    bench.step(0x047F, -100)
+    bench.wait(6.0)
+    assert bench.actual == -100, 'the sign reverses'
+    # OFF1 goes down the ramp, S5
+    assert bench.step(0x047E) & 0x8007 == 0x8003 and bench.motor.driven
+    bench.wait(4.0)
+    assert bench.zsw1 & 0x8047 == 0x0001 and not bench.motor.driven
+
+
+def test_commands_count_by_level_where_that_is_chosen():
+    for model, word in (
+        ('sinus_optimal', PLC | ENABLE | SWITCH_ON), ('sinus_g2', 0x047F), ('sinus_h', 0x047F)
+    ):
+        option = {'unlisted_exits': 'levels'} if model == 'sinus_h' else {'commands': 'levels'}
+        bench = Bench(model, **option)
+        bench.wait(0.2)
+        bench.step(word, 1000)
+        bench.wait(2.0)
+        assert bench.motor.driven, model
+
+
+# --- in any order ---
+
+OPTIMALS = (0, PLC, PLC | ENABLE, PLC | ENABLE | SWITCH_ON, PLC | ACK)
+WORDS = (*OPTIMALS, G2_STANDBY, G2_ON, G2_FORWARD, G2_REVERSE, G2_STANDBY | 0x80, 0xFFFF)
+
+
+@examples_of(max_examples=examples(100))
+@given(
+    st.sampled_from(['sinus_optimal', 'sinus_g2']),
+    st.lists(
+        st.tuples(
+            st.sampled_from(['word', 'word', 'word', 'fault', 'stop', 'power', 'silence', 'run']),
+            st.sampled_from(WORDS),
+            st.integers(-0x8000, 0x7FFF),
+            st.sampled_from([0.0, 0.02, 0.1, 1.0]),
+        ),
+        max_size=20,
+    ),
+)
+def test_in_any_order_a_word_alone_starts_the_motor(model, steps):
+    bench = Bench(model)
+    for what, word, setpoint, seconds in steps:
+        if what == 'word':
+            bench.send(word, setpoint)
+        elif what == 'fault':
+            bench.drive.trip(3)
+        elif what == 'stop':
+            bench.drive.control_unit.press('stop')
+        elif what == 'power':
+            bench.drive.power_cycle(0.0)
+        elif what == 'run':
+            bench.drive.set_run_input(bool(setpoint & 1))
+        bench.wait(seconds, telegrams=what != 'silence')
+        if what in ('fault', 'stop', 'power') or bench.drive.faults:
+            assert not bench.motor.driven
+        assert -0x8000 <= bench.actual <= 0x7FFF
+        assert 0 <= bench.zsw1 <= 0xFFFF
