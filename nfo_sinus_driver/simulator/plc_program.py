@@ -15,9 +15,8 @@
 """
 The program of the PLC between ROS and the drives, the same as ``config/telegram1/`` has it.
 
-What is shipped is Structured Text; a test compares it with this file statement by statement. So
-the body of :class:`RosTelegram1` is written as that language can say it: assignments, IF, calls of
-timers, and nothing else. It knows no clock of its own: a PLC tells it the time.
+What is shipped is Structured Text; a test runs both programs over the same cycles and compares what
+they do. It knows no clock of its own: a PLC gives it the time.
 """
 
 from __future__ import annotations

@@ -13,40 +13,25 @@
 # limitations under the License.
 
 """
-Structured Text (IEC 61131-3) as far as the function block of config/telegram1/ goes, and Python.
+The function block of config/telegram1/ as it is shipped, run in time that passes when it is given.
 
-Both become the same plain tuples, so that one can be compared with the other statement by
-statement.
+Structured Text (IEC 61131-3) becomes Python word by word, as far as this file goes: it has
+assignments, IF, calls of timers, AND, OR, NOT and comparisons. No line is understood but those.
 """
 
-from __future__ import annotations
-
-import ast
-from dataclasses import dataclass
-from dataclasses import field
+from functools import cache
+from pathlib import Path
 import re
+from types import SimpleNamespace
 
-_TOKEN = re.compile(
-    r"""\s+ | \(\*.*?\*\) |
-    (?P<number>T\#\w+|16\#[0-9A-Fa-f]+|\d+) |
-    (?P<name>[A-Za-z_][\w.]*) |
-    (?P<sign>:=|<>|=>|\.\.|[-+*/=<>();:,\[\]])""",
-    re.VERBOSE | re.DOTALL,
-)
-#: What binds looser first; all that is compared or added binds tighter.
-_LEVELS = (('OR',), ('AND',), ('=', '<>'), ('+', '-'))
-_OPERATORS = {
-    ast.BitOr: 'OR',
-    ast.Or: 'OR',
-    ast.BitAnd: 'AND',
-    ast.And: 'AND',
-    ast.Invert: 'NOT',
-    ast.Not: 'NOT',
-    ast.Eq: '=',
-    ast.NotEq: '<>',
-    ast.Add: '+',
-    ast.Sub: '-',
+from nfo_sinus_driver.simulator.plc_program import Ton
+
+SHIPPED = Path(__file__).parents[3] / 'config' / 'telegram1' / 'ros_telegram1.st'
+_WORDS = {
+    ':=': '=', '=': '==', '<>': '!=', 'AND': '&', 'OR': '|', 'NOT': '~', 'TRUE': 'Bool(1)',
+    'FALSE': 'Bool(0)',
 }
+_SECONDS = {'s': 1, 'ms': 1000}
 
 
 def snake(name):
@@ -54,190 +39,98 @@ def snake(name):
     return re.sub(r'(?<=[a-z0-9])(?=[A-Z])', '_', name).lower()
 
 
-def seconds(text):
-    """Return what a literal such as T#500ms is (s)."""
-    number, unit = re.fullmatch(r'T#(\d+)(ms|s)', text).groups()
-    return int(number) / {'s': 1, 'ms': 1000}[unit]
+class Bool(int):
+    """A truth, whose NOT is one, too; words have another."""
+
+    def __invert__(self):
+        return Bool(not self)
+
+    def __and__(self, other):
+        return Bool(int(self) & int(other))
+
+    def __or__(self, other):
+        return Bool(int(self) | int(other))
 
 
-@dataclass
-class Variable:
-    name: str
-    type: str
-    initial: object = None
+def _text():
+    return re.sub(r'\(\*.*?\*\)', '', SHIPPED.read_text(), flags=re.DOTALL)
 
 
-@dataclass
-class Unit:
-    """A function block, program or structure: its variables by section, and its statements."""
-
-    name: str
-    variables: dict[str, list[Variable]] = field(default_factory=dict)
-    body: list = field(default_factory=list)
-
-
-class Parser:
-    """Reads a file of Structured Text into its units, by name."""
-
-    def __init__(self, text):
-        self.tokens = []
-        at = 0
-        while at < len(text):
-            match = _TOKEN.match(text, at)
-            assert match, f'not understood: {text[at:at + 40]!r}'
-            if match.lastgroup:
-                self.tokens.append(match[match.lastgroup])
-            at = match.end()
-        self.at = 0
-
-    @property
-    def next(self):
-        return self.tokens[self.at] if self.at < len(self.tokens) else ''
-
-    def take(self, *expected):
-        token = self.next
-        assert not expected or token in expected, f'{token} in place of {expected}'
-        self.at += 1
-        return token
-
-    def taken(self, token):
-        if self.next == token:
-            self.at += 1
-            return True
-        return False
-
-    def units(self):
-        found = {}
-        while self.next:
-            kind = self.take('TYPE', 'FUNCTION_BLOCK', 'PROGRAM')
-            unit = Unit(self.take())
-            if kind == 'TYPE':
-                self.take(':')
-                self.take('STRUCT')
-                unit.variables['STRUCT'] = self.declarations('END_STRUCT')
-                self.take(';')
-            while self.next.startswith('VAR'):
-                section = self.take()
-                unit.variables[section] = self.declarations('END_VAR')
-            unit.body = self.statements(f'END_{kind}')
-            self.take(f'END_{kind}')
-            found[unit.name] = unit
-        return found
-
-    def declarations(self, end):
-        found = []
-        while not self.taken(end):
-            name = self.take()
-            self.take(':')
-            type_ = ''
-            while self.next not in (':=', ';'):
-                type_ += self.take()
-            initial = self.expression() if self.taken(':=') else None
-            self.take(';')
-            found.append(Variable(name, type_, initial))
-        return found
-
-    def statements(self, *ends):
-        found = []
-        while self.next not in ends:
-            if self.taken('IF'):
-                found.append(self.branches())
-            else:
-                found.append(self.simple())
-            self.take(';')
-        return found
-
-    def branches(self):
-        condition = self.expression()
-        self.take('THEN')
-        body = self.statements('ELSIF', 'ELSE', 'END_IF')
-        word = self.take()
-        if word == 'ELSIF':
-            return 'IF', condition, body, [self.branches()]
-        other = []
-        if word == 'ELSE':
-            other = self.statements('END_IF')
-            self.take('END_IF')
-        return 'IF', condition, body, other
-
-    def simple(self):
-        name = self.take()
-        if self.taken(':='):
-            return 'SET', self.variable(name), self.expression()
-        self.take('(')
-        arguments = {}
-        while not self.taken(')'):
-            key = self.take()
-            self.take(':=')
-            arguments[key] = self.expression()
-            self.taken(',')
-        return 'CALL', self.variable(name), arguments
-
-    def expression(self, level=0):
-        if level == len(_LEVELS):
-            return self.operand()
-        left = self.expression(level + 1)
-        while self.next in _LEVELS[level]:
-            left = (self.take(), left, self.expression(level + 1))
-        return left
-
-    def operand(self):
-        token = self.take()
-        if token == '(':
-            inside = self.expression()
-            self.take(')')
-            return inside
-        if token == 'NOT':
-            return 'NOT', self.operand()
-        if token in ('TRUE', 'FALSE'):
-            return token == 'TRUE'
-        if token.startswith('T#'):
-            return seconds(token)
-        if token.startswith('16#'):
-            return int(token[3:], 16)
-        return int(token) if token.isdigit() else self.variable(token)
-
-    @staticmethod
-    def variable(name):
-        return 'NAME', '.'.join(map(snake, name.split('.')))
-
-
-def python_statements(nodes):
-    """Return statements of Python as the same tuples; a docstring is none."""
-    found = []
-    for node in nodes:
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            continue
-        if isinstance(node, ast.If):
-            body, other = python_statements(node.body), python_statements(node.orelse)
-            found.append(('IF', python_expression(node.test), body, other))
-        elif isinstance(node, ast.Assign):
-            (target,) = node.targets
-            found.append(('SET', python_expression(target), python_expression(node.value)))
-        else:
-            assert isinstance(node, ast.Expr), ast.dump(node)
-            assert isinstance(node.value, ast.Call), ast.dump(node)
-            input_, preset = map(python_expression, node.value.args)
-            called = python_expression(node.value.func)
-            found.append(('CALL', called, {'IN': input_, 'PT': preset}))
+@cache
+def declared():
+    """Return name, type and beginning of the variables of each section, the structure's too."""
+    found = {}
+    for kind, body in re.findall(r'^ *(VAR\w*|STRUCT)$(.*?)END_', _text(), re.DOTALL | re.M):
+        lines = re.findall(r'(\w+)\s*:\s*([^;:]+?)\s*(?::=\s*([^;]+))?;', body)
+        found[kind] = [(snake(name), type_, value) for name, type_, value in lines]
     return found
 
 
-def python_expression(node):
-    if isinstance(node, ast.Constant):
-        return node.value
-    if isinstance(node, ast.Name):
-        return 'NAME', node.id
-    if isinstance(node, ast.Attribute):
-        return 'NAME', ast.unparse(node).removeprefix('self.')
-    if isinstance(node, ast.UnaryOp):
-        return _OPERATORS[type(node.op)], python_expression(node.operand)
-    if isinstance(node, ast.BinOp):
-        left, right = python_expression(node.left), python_expression(node.right)
-        return _OPERATORS[type(node.op)], left, right
-    if isinstance(node, ast.BoolOp):
-        left, right = map(python_expression, node.values)
-        return _OPERATORS[type(node.op)], left, right
-    assert isinstance(node, ast.Compare), ast.dump(node)
-    (operator,), (right,) = node.ops, node.comparators
-    return _OPERATORS[type(operator)], python_expression(node.left), python_expression(right)
+def _literal(text):
+    if time := re.fullmatch(r'T#(\d+)(ms|s)', text):
+        return int(time[1]) / _SECONDS[time[2]]
+    return int(text.removeprefix('16#'), 16 if text.startswith('16#') else 10)
+
+
+def _expression(text):
+    text = re.sub(r'16#(\w+)', r'0x\1', text)
+    text = re.sub(r'<>|:=|=|\b(?:AND|OR|NOT|TRUE|FALSE)\b', lambda one: _WORDS[one[0]], text)
+    return re.sub(
+        r'\b[A-Z]\w*(?:\.\w+)*',
+        lambda one: one[0] if one[0] == 'Bool' else 'v.' + '.'.join(map(snake, one[0].split('.'))),
+        text,
+    )
+
+
+@cache
+def _python():
+    body = re.search(r'END_VAR\s+((?:(?!VAR).)*)END_FUNCTION_BLOCK', _text(), re.DOTALL)[1]
+    lines, depth = [], 0
+    for one in filter(None, map(str.strip, body.splitlines())):
+        if match := re.fullmatch(r'(IF|ELSIF) (.*) THEN', one):
+            depth -= match[1] == 'ELSIF'
+            line = f'{"if" if match[1] == "IF" else "elif"} {_expression(match[2])}:'
+        elif one == 'ELSE':
+            depth -= 1
+            line = 'else:'
+        elif one == 'END_IF;':
+            depth -= 1
+            continue
+        elif match := re.fullmatch(r'(\w+)\(IN := (.*), PT := (\w+)\);', one):
+            line = f'v.{snake(match[1])}(bool({_expression(match[2])}), v.{snake(match[3])})'
+        else:
+            target, value = re.fullmatch(r'([\w.]+) := (.*);', one).groups()
+            line = f'{_expression(target)} = {_expression(value)}'
+        lines.append('    ' * depth + line)
+        depth += line.endswith(':')
+    return compile('\n'.join(lines), str(SHIPPED), 'exec')
+
+
+class StRosTelegram1:
+    """The function block, with the inputs and outputs of the program in Python."""
+
+    def __init__(self, clock, **inputs):
+        self._code = _python()
+        self.v = SimpleNamespace()
+        for section in ('VAR_INPUT', 'VAR_OUTPUT', 'VAR'):
+            for name, type_, value in declared()[section]:
+                usual = _literal(value) if value else Bool(0) if type_ == 'BOOL' else 0
+                setattr(self.v, name, _Timer(clock) if type_ == 'TON' else usual)
+        vars(self.v).update(inputs)
+
+    def __call__(self, block, zsw1, actual, exchanged, release):
+        given = {'exchanged': Bool(exchanged), 'release': Bool(release)}
+        vars(self.v).update(block=block, zsw1=zsw1, actual=actual, **given)
+        exec(self._code, {'v': self.v, 'Bool': Bool, 'bool': bool})
+        block.stw1 &= 0xFFFF
+
+    def __getattr__(self, name):
+        return getattr(self.v, name)
+
+
+class _Timer(Ton):
+    """A timer whose output is a truth of Structured Text."""
+
+    def __call__(self, input_, preset):
+        super().__call__(input_, preset)
+        self.q = Bool(self.q)
