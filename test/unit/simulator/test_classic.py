@@ -1,0 +1,546 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A simulated drive on Classic: messages byte by byte, values, refusals, and older firmware."""
+
+from classic_bench import ACK
+from classic_bench import NAK
+from classic_bench import RUN
+from classic_bench import SIO_FAIL
+from classic_bench import ClassicBench
+from classic_bench import bcc
+from classic_bench import enquiry
+from classic_bench import reply
+from classic_bench import select
+from hypothesis import given
+from hypothesis import settings
+from hypothesis import strategies as st
+import pytest
+from support.addresses import packed
+from support.examples import examples
+
+from nfo_sinus_driver.simulator import classic_frames
+from nfo_sinus_driver.simulator.classic import Classic
+from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.classic_frames import Message
+from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.line import Receiver
+from nfo_sinus_driver.simulator.modbus import server
+
+#: "A SELECT message to address 1 which gives parameter 25 the value of 100" ([M0 §6.1.3], [M2 §5]).
+EXAMPLE = bytes.fromhex('04 21 02 45 30 30 31 39 3D 30 30 36 34 03 71')
+BLOCKED, CHECK_SUM, STRUCTURE, TIMEOUT, PREFIX = 0x1, 0x4, 0x8, 0x10, 0x20
+NOT_PERMITTED, UNKNOWN, UNREADABLE, UNWRITABLE, OUT_OF_RANGE = 0x40, 0x80, 0x100, 0x200, 0x400
+DAMAGED = select('E0029', 3)[:-1] + b'\x00'
+
+both = pytest.mark.parametrize('dialect', ['2.03', '5.0'])
+
+
+def benches(**options):
+    """One drive with newer firmware, one with older."""
+    return ClassicBench('2.03', **options), ClassicBench('5.0', **options)
+
+
+# ---- messages ----
+
+
+def test_messages_of_the_manuals():
+    assert classic_frames.parse(EXAMPLE) == Message(id=0x19, value=100)
+    assert select('E0019', 100) == EXAMPLE
+    assert reply('E0019', 100) == bytes.fromhex('21 02') + EXAMPLE[3:]
+    asked = bytes.fromhex('04 7E 45 30 30 45 39 05')
+    assert asked == enquiry('E00E9', 94)
+    assert (classic_frames.address(EXAMPLE), classic_frames.address(asked)) == (1, 94)
+    assert classic_frames.parse(asked) == Message(id=0xE9)
+    # 21 02 E0019=0064 03 71
+    assert classic_frames.reply(1, 0x19, 100, small_letters=False) == b'!\x02E0019=0064\x03q'
+    assert classic_frames.reply(94, 0xAC, 0xABCD, small_letters=True) == b'~\x02E00ac=abcd\x03' + (
+        bcc(b'E00ac=abcd\x03')
+    )
+    assert classic_frames.acknowledge(0, True) == b' \x06'
+    assert classic_frames.acknowledge(1, False) == b'!\x15'
+
+
+def test_what_is_wrong_with_a_message():
+    for frame, wrong in (
+        (EXAMPLE[:-1] + b'\x72', LineError.CHECK_SUM),
+        (EXAMPLE.replace(b'0064', b'0065'), LineError.CHECK_SUM),
+        (EXAMPLE.replace(b'=', b'-'), LineError.STRUCTURE),
+        (EXAMPLE.replace(b'\x03', b'\x17'), LineError.STRUCTURE),
+        (EXAMPLE.replace(b'0064', b'00G4'), LineError.STRUCTURE),
+        (EXAMPLE[:-2], LineError.STRUCTURE),
+        (b'\x04!E0019\x06', LineError.STRUCTURE),
+        (b'\x04!E001\x05', LineError.STRUCTURE),
+        (b'\x04!F0019\x05', LineError.PREFIX),
+        (b'\x04!\x02F0019=0064\x03' + bcc(b'F0019=0064\x03'), LineError.PREFIX),
+    ):
+        assert classic_frames.parse(frame).wrong is wrong, frame
+    for frame in (b'', b'\x04', b'\x04\x1f', b'\x04\x80', b'!E0019\x05'):
+        assert classic_frames.address(frame) is None, 'to no drive'
+        assert Classic.unwrap(frame) is None
+
+
+@given(st.integers(0, 0xFFFF), st.integers(0, 0xFFFF), st.data())
+def test_a_flipped_bit_is_noticed(id_, value, data):
+    frame = bytearray(select(f'E{id_:04X}', value))
+    # a letter's case apart (bit 5), which the BCC does notice
+    bit = data.draw(st.integers(8 * 3, 8 * len(frame) - 1))
+    frame[bit // 8] ^= 1 << bit % 8
+    assert classic_frames.parse(bytes(frame)).wrong
+
+
+def arrived(*chunks, pause=0.001):
+    """What the receiver makes of bytes that come in chunks."""
+    receive = Receiver(Classic(), 0.0, 1.0)
+    out = []
+    for number, chunk in enumerate(chunks):
+        out += receive.feed(chunk, pause * number)
+    out += receive.take(1000)
+    return [one.data for one in out]
+
+
+def test_a_check_sum_may_be_any_control_character():
+    found = {}
+    for value in range(0x200):
+        for id_ in ('E0019', 'E000A', 'E00AB'):
+            frame = select(id_, value)
+            found.setdefault(frame[-1], frame)
+    assert set(range(0x10)) <= set(found)
+    for frame in found.values():
+        assert arrived(frame + frame) == [frame, frame]
+        assert arrived(*(bytes([byte]) for byte in frame)) == [frame]
+
+
+def test_an_eot_or_a_second_of_silence_begins_anew():
+    asked = enquiry('E00E9')
+    for rubbish in (b'\x00', b'abc', b'\x04', b'\x04!', b'\x04!E00'):
+        assert arrived(rubbish + asked) == [rubbish, asked]
+    # a SELECT that lacks nothing but its check sum takes the EOT
+    assert arrived(EXAMPLE[:-1] + asked) == [EXAMPLE[:-1] + b'\x04', asked[1:]]
+    assert arrived(EXAMPLE[:7], asked, pause=1.1) == [EXAMPLE[:7], asked]
+    assert arrived(EXAMPLE[:7], EXAMPLE[7:], pause=0.9) == [EXAMPLE]
+
+
+@given(st.lists(st.binary(max_size=20), max_size=10))
+def test_no_byte_is_lost_and_a_message_after_silence_is_found(chunks):
+    receive = Receiver(Classic(), 0.0, 1.0)
+    out = [one.data for n, chunk in enumerate(chunks) for one in receive.feed(chunk, 0.001 * n)]
+    out += [one.data for one in receive.take(100)]
+    assert b''.join(out) == b''.join(chunks)
+    assert [one.data for one in receive.feed(EXAMPLE, 200)] == [EXAMPLE]
+
+
+@given(st.binary(max_size=30), st.sampled_from([4.21, 4.38]))
+@settings(max_examples=examples(200))
+def test_whatever_comes_the_answer_is_one_of_the_three(data, sw_ver):
+    drive = simulated_drive(settings={'fieldbus.sw_ver': sw_ver})
+    answer = Classic().answer(drive, Classic.unwrap(b'\x04 ' + data))
+    assert answer in (b'', b' \x15', b'!\x15') or (len(answer) == 14 and answer[1] == 2)
+    if not answer:
+        assert drive.faults.sio_err
+
+
+# ---- which drive a message is for ----
+
+
+def test_its_own_address_address_0_and_all():
+    for bench, answers_from in zip(benches(address=7), (0, 7), strict=True):
+        assert bench.say(enquiry('E0029', 7)) == reply('E0029', 1, 7)
+        for other in (1, 6, 8, 94):
+            assert bench.say(enquiry('E0029', other)) == b''
+            assert bench.say(select('E0029', 3, other)) == b''
+        assert bench.drive.control_unit.mode == 1
+        assert bench.say(enquiry('E0029', 0)) == reply('E0029', 1, answers_from)
+        assert bench.say(select('E0029', 1, 0)) == bytes((32 + answers_from, 6))
+        assert bench.say(enquiry('EFFFF', 0)) == bytes((32 + answers_from, 0x15))
+        assert bench.say(select('E0029', 3, 95)) == b''
+        assert bench.drive.control_unit.mode == 3
+        assert bench.say(select('EFFFF', 3, 95)) == bench.say(enquiry('E0029', 95)) == b''
+        assert bench.flags & UNKNOWN
+    bench = ClassicBench(address=247)
+    assert bench.read('E0029', 0) == 1, 'an address left from Modbus cannot be reached'
+    assert all(not bench.say(enquiry('E0029', address)) for address in range(1, 95))
+
+
+def test_upper_and_lower_case():
+    new, old = benches()
+    assert new.say(b'\x04!E00AB\x05') == reply('E00AB', 0)
+    for frame in (b'\x04!E00AB\x05', b'\x04!E00ab\x05'):
+        assert old.say(frame) == b'!\x02E00ab=0000\x03' + bcc(b'E00ab=0000\x03')
+    assert (new.say(b'\x04!E00ab\x05'), new.flags) == (b'', STRUCTURE)
+
+
+# ---- values ----
+
+
+def test_a_coarse_value_is_kept_and_read_back_and_a_finer_one_is_rounded():
+    for id_, key, coarse, value in (
+        ('E0008', 'motor.p_nom', 75, 0.75),
+        ('E0011', 'motor.i_nom', 21, 2.1),
+        ('E0015', 'motor.cos_phi', 77, 0.77),
+        ('E0002', 'motor.r_stat', 1234, 12.34),
+        ('E0004', 'motor.l_main', 4321, 0.4321),
+        ('E0005', 'motor.i_magn', 123, 1.23),
+        ('E001D', 'control.accel', 123, 12.3),
+        ('E001C', 'control.retard', 5000, 500),
+        ('E0049', 'pi_reg.t_min', -100, -100),
+        ('E0052', 'pi_reg.reg_amp', -1, -1),
+        ('E000A', 'pi_reg.unit', 3, 'bar'),
+        ('E005E', 'output.f_max', 32000, 32000),
+    ):
+        bench = ClassicBench()
+        assert bench.write(id_, coarse) == ACK
+        assert bench.read(id_) == coarse & 0xFFFF
+        assert bench.drive.peek(key) == pytest.approx(value)
+        assert bench.drive.writes[key] == 1
+    for fine, coarse in ((5.004, 50), (5.05, 51), (5.149, 51), (4.951, 50)):
+        bench = ClassicBench(settings={'control.accel': fine})
+        assert bench.read('E001D') == coarse
+        assert bench.drive.peek('control.accel') == fine
+
+
+def test_every_parameter_agrees_with_the_catalog():
+    bench, wrong = ClassicBench(), []
+    for key, parameter in bench.drive.model.items():
+        if 'classic' not in parameter.addresses or parameter.access.value not in ('r', 'rw'):
+            continue
+        words = [bench.read(f'E{id_:04X}') for id_ in parameter.at('classic').numbers]
+        value, shown = bench.drive.peek(key), parameter.decode(packed(*words), 'classic')
+        if isinstance(value, float):
+            step = float(parameter.factor('classic')) + 1e-9
+            if 'modbus' in parameter.addresses:
+                step = max(step, float(parameter.factor('modbus')))
+            value = pytest.approx(value, abs=step)
+        if shown != value:
+            wrong.append((key, shown, value))
+    assert not wrong
+
+
+def test_firmware_and_what_is_measured():
+    bench = ClassicBench(settings={'motor.r_stat': 1000})
+    assert (bench.read('E0075'), bench.read('E0076')) == (438, 4018)
+    assert bench.read('E0002') == 0x7FFF, 'what does not fit is the most that does'
+    bench.drive.motor.dc_link = 543.21
+    assert bench.read('E0014') == 5432
+    assert server(bench.drive).read(0x3F8, 1) == (543,), 'Modbus is coarser'
+
+
+def test_a_counter_is_two_parameters_that_can_be_torn():
+    new, old = benches()
+    for bench in (new, old):
+        bench.drive.counters.operating_time = 0x1234567 / 10
+    assert (new.read('E0127'), old.read('E0127')) == (0x123, 0x23), '24 bits'
+    new.drive.counters.operating_time = 6553.5
+    low = new.read('E0027')
+    new.drive.advance(400)
+    assert (low, new.read('E0127')) == (0xFFFF, 1)
+    for low, high in (
+        ('E0027', 'E0127'), ('E0028', 'E0128'), ('E00DD', 'E00DE'), ('E00FA', 'E00FB')
+    ):
+        bench = ClassicBench()
+        true = bench.read(high) << 16 | bench.read(low)
+        bench.drive.servers['classic'].tears = 1
+        first, torn, second = bench.read(high), bench.read(low), bench.read(high)
+        assert (first, torn, second) == (true >> 16, 0, (true >> 16) + 1)
+        assert bench.read(high) == second, 'once was asked for'
+        bench.drive.servers['classic'].tears = 1
+        bench.read('E0029')
+        assert bench.drive.servers['classic'].tears == 1, 'only counters go on'
+
+
+def test_the_setpoint_is_that_of_the_control_mode():
+    for mode, (id_, raw) in enumerate(
+        (('E0020', 250), ('E004E', -250), ('E0021', 50), ('E0096', -1440))
+    ):
+        new, old = benches()
+        for bench, answer in ((new, ACK), (old, NAK)):
+            bench.write('E0029', 3)
+            assert bench.write('E0030', mode) == bench.write('E001E', raw) == ACK
+            assert bench.read('E001E') == bench.read(id_) == raw & 0xFFFF
+            assert bench.write(id_, 7) == answer
+        assert new.read('E001E') == 7
+        assert old.flags == UNWRITABLE
+
+
+@both
+def test_a_ride(dialect):
+    bench = ClassicBench(dialect)
+    assert bench.read('E00E9') == 24
+    bench.run(250)
+    bench.drive.advance(1)
+    assert bench.read('E00E9') == 39
+    bench.drive.advance(10)
+    assert (bench.read('E00E9'), bench.read('E00B6')) == (38, 250)
+    assert bench.write('E00AD', 0) == ACK
+    bench.drive.advance(10)
+    assert bench.read('E00E9') == 37
+    assert bench.drive.control_unit.status_text == {'2.03': 'Bus Stby', '5.0': 'Sio Stby'}[dialect]
+    assert bench.write('E0029', 1) == ACK
+    assert bench.read('E00E9') == 24
+    server(bench.drive).write(0x294, [3])
+    assert bench.read('E00E9') == {'2.03': 37, '5.0': 41}[dialect], 'over Modbus'
+
+
+def test_commands_of_newer_and_of_older_firmware():
+    for command, of_new, of_old in ((0x02, NAK, ACK), (0x100, NAK, ACK), (0x900, ACK, NAK)):
+        for bench, answer in zip(benches(lenient=True), (of_new, of_old), strict=True):
+            bench.run()
+            bench.drive.advance(1)
+            if command == 0x900:
+                bench.write('E0029', 3)
+            assert bench.write('E00AD', command) == answer
+            if command != 0x900:
+                assert bench.drive.control_unit.scmd == (RUN if answer == NAK else 0)
+
+
+def test_drive_control_acknowledges_in_spite_of_a_fault():
+    bench = ClassicBench()
+    bench.drive.trip(5)
+    bench.drive.advance(1)
+    assert bench.write('E007C', 0x4006) == bench.write('E007C', 0x4086) == ACK
+    assert bench.read('E00E9') != 5
+    assert bench.read('E007D') & 8 == 0
+
+
+@both
+def test_the_error_log(dialect):
+    bench = ClassicBench(dialect)
+    assert bench.read('E0200') == bench.read('E0201') == 0
+    for code in (7, 5):
+        bench.drive.trip(code)
+        bench.read('E00E8')
+    bench.drive.counters.operating_time = 0x1ABCD / 10
+    bench.drive.trip(8)
+    assert (bench.read('E0200'), bench.read('E0201')) == (0xABCD, 0x0801)
+    assert [bench.read(f'E{0x201 + 2 * entry:04X}') >> 8 for entry in range(4)] == [8, 5, 7, 0]
+    size = {'2.03': 32, '5.0': 128}[dialect]
+    assert bench.read(f'E{0x200 + 2 * size - 1:04X}') == 0
+    assert bench.say(enquiry(f'E{0x200 + 2 * size:04X}')) == NAK
+    assert server(bench.drive).read(0xC000, 2) == (0xABCD, 0x0801), 'over Modbus'
+
+
+# ---- refusals ----
+
+
+@both
+def test_a_refusal_has_its_reason(dialect):
+    for frame, flag in (
+        (enquiry('E0019'), UNKNOWN),
+        (select('E0019', 100), UNKNOWN),
+        (enquiry('E00AD'), UNREADABLE),
+        (select('E00E9', 0), UNWRITABLE),
+        (select('E00AC', 0), UNWRITABLE),
+        (select('E0027', 0), UNWRITABLE),
+        (select('E00DA', 0), UNWRITABLE),
+        (select('E0200', 0), UNKNOWN),
+        (select('E001D', 1), OUT_OF_RANGE),
+        (select('E001D', 5001), OUT_OF_RANGE),
+        (select('E002C', -1), OUT_OF_RANGE),
+        (select('E0030', 4), OUT_OF_RANGE),
+        (select('E0029', 0), OUT_OF_RANGE),
+        (select('E001E', 1501), OUT_OF_RANGE),
+        (select('E00A9', 96), OUT_OF_RANGE),
+        (select('E00AD', RUN), NOT_PERMITTED),
+        (b'\x04!F0029\x05', PREFIX),
+    ):
+        bench = ClassicBench(dialect)
+        if flag == OUT_OF_RANGE and dialect == '5.0' and frame != select('E0029', 0):
+            flag = NOT_PERMITTED
+        assert (bench.say(frame), bench.flags) == (NAK, flag), frame
+        assert bench.drive.control_unit.status_code == 24, 'the bus has no control, so no fault'
+        assert (bench.read('E00AC'), bench.read('E00AC')) == (flag, 0)
+        assert bench.drive.control_unit.sio_err_reads == 2
+
+
+def test_older_firmware_changes_nothing_but_mode_before_the_bus_has_control():
+    new, old = benches()
+    for frame in [select('E001D', 20), select('E001E', 0), select('E00AD', 0)]:
+        assert old.say(frame) == NAK
+        assert old.read('E00AC') == NOT_PERMITTED
+    assert old.drive.control_unit.status_code == 24
+    assert not old.drive.writes
+    for mode in (2, 1, 3):
+        for bench in (new, old):
+            assert bench.write('E0029', mode) == ACK
+            taken = bench is new or mode == 3
+            assert bench.write('E001D', 20 + mode) == (ACK if taken else NAK)
+            assert bench.read('E001D') == (20 + mode if taken else 50)
+
+
+@both
+def test_while_it_tunes_a_stop_alone_is_taken_or_is_refused(dialect):
+    for refused in (False, True):
+        bench = ClassicBench(dialect, **({'stop_in_tuning': 'refused'} if refused else {}))
+        bench.write('E0029', 3)
+        assert bench.write('E00AD', 0x201) == ACK
+        for id_, value in [('E0029', 1), ('E0029', 3), ('E00AD', RUN)]:
+            assert bench.write(id_, value) == NAK
+        assert bench.write('E001D', 20) == (NAK if dialect == '5.0' else ACK)
+        assert bench.write('E00AD', 0) == (NAK if refused else ACK)
+        assert bench.flags == NOT_PERMITTED
+        # no serial fault: the bus does not control the motor
+        assert bench.drive.control_unit.status_code == (28 if refused else 37)
+        bench.drive.advance(10)
+        assert bench.write('E00AD', 0) == ACK
+        assert bench.drive.control_unit.status_code == 37
+
+
+@both
+def test_a_damaged_message(dialect):
+    bench = ClassicBench(dialect)
+    assert bench.say(select('E0029', 3, 2)[:-1] + b'\x00') == b''
+    assert bench.flags == 0, 'it was for another'
+    assert bench.say(DAMAGED) == {'2.03': b'', '5.0': NAK}[dialect]
+    assert bench.flags == CHECK_SUM
+    assert bench.drive.control_unit.mode == 1
+    assert bench.say(b'\x04!E0029\x06') == b''
+    assert bench.flags == CHECK_SUM | STRUCTURE
+    assert bench.say(select('E0029', 3, 95)[:-1] + b'\x00') == b''
+    bench.drive.power_cycle(0.0)
+    assert bench.flags == 0
+
+
+def test_a_fault_blocks_every_select_and_no_enquiry():
+    for refused in ('all', 'scmd', 'nothing'):
+        bench = ClassicBench(refuses_in_fault=refused)
+        bench.run()
+        bench.drive.trip(5)
+        for id_, value in (('E0029', 1), ('E0029', 3), ('E00AD', 0), ('E001D', 20)):
+            assert bench.write(id_, value) == NAK
+        assert bench.flags == BLOCKED
+        assert (bench.read('E00E9'), bench.drive.control_unit.ack_reads) == (5, 0)
+        assert (bench.read('E00E8'), bench.drive.control_unit.ack_reads) == (5, 1)
+        assert bench.read('E00E9') not in (5, SIO_FAIL)
+        assert bench.write('E0029', 1) == ACK
+
+
+@both
+def test_under_bus_control_a_refusal_is_a_serial_fault(dialect):
+    for frame, flag in (
+        (select('E001E', 2000), OUT_OF_RANGE),
+        (enquiry('E0019'), UNKNOWN),
+        (select('E0019', 100), UNKNOWN),
+        (select('E0008', 100), NOT_PERMITTED),
+        (DAMAGED, CHECK_SUM),
+        (b'\x04!E0029\x06', STRUCTURE),
+    ):
+        bench = ClassicBench(dialect)
+        bench.run()
+        bench.drive.advance(1)
+        bench.say(frame)
+        assert not bench.running, 'the motor coasts'
+        assert (bench.read('E00E9'), bench.read('E0029')) == (SIO_FAIL, 1), 'MODE is Stop'
+        assert bench.read('E00E8') == SIO_FAIL
+        assert bench.read('E00E9') == SIO_FAIL, 'not to be acknowledged by InvSt'
+        assert bench.write('E00AD', 0) == NAK
+        assert bench.read('E00AC') == flag | BLOCKED
+        assert (bench.read('E00E9'), bench.read('E00AC')) == (24, 0)
+        bench.run()
+
+
+def test_a_lenient_drive_only_notes_refusals():
+    bench = ClassicBench(lenient=True)
+    bench.run()
+    for frame in (select('E001E', 2000), enquiry('E0019'), select('E00E9', 0), select('E0008', 2)):
+        assert bench.say(frame) == NAK
+        assert bench.running and bench.flags
+    assert bench.write('E001D', 20) == ACK
+    bench.say(b'\x04!E0029\x06')
+    assert bench.read('E00E9') == SIO_FAIL
+
+
+def test_stop_in_spite_of_a_serial_fault():
+    for bench, address, answers in zip(benches(), (1, 95), ((NAK, ACK), (b'', b'')), strict=True):
+        bench.run()
+        bench.write('E001E', 2000)
+        if address == 95:
+            assert bench.write('E0029', 1) == NAK, 'older firmware obeys only a stop to all'
+        assert bench.write('E0029', 3, address) == answers[0]
+        assert bench.read('E00E9') == SIO_FAIL
+        assert bench.write('E0029', 1, address) == answers[1]
+        assert (bench.read('E00E9'), bench.flags) == (24, 0)
+    bench.drive.trip(SIO_FAIL, cause_present=True)
+    for inv_st in (SIO_FAIL, 24):
+        bench.read('E00AC')
+        assert bench.read('E00E9') == inv_st
+        bench.drive.end_fault_causes()
+
+
+@both
+def test_silence_is_a_serial_fault(dialect):
+    bench = ClassicBench(dialect, settings={'serial.sio_tot': 1.0, 'serial.auto_stop': True})
+    bench.run()
+    for _ in range(4):
+        bench.drive.advance(0.6)
+        assert bench.read('E00E9') in (38, 39)
+    bench.drive.advance(1.1)
+    assert (bench.read('E00E9'), bench.read('E0029')) == (SIO_FAIL, 1)
+    assert (bench.read('E00AC'), bench.read('E00E9')) == (TIMEOUT, 24)
+    for frame, flags in [(select('E0029', 1), 0), (DAMAGED, TIMEOUT)]:
+        bench.read('E00AC')
+        bench.drive.advance(0.9)
+        bench.say(frame)
+        bench.drive.faults.take_sio_err()
+        bench.drive.advance(0.2)
+        assert bench.flags == flags, 'a damaged message does not count as heard'
+
+
+def test_the_keypad_takes_over():
+    bench = ClassicBench()
+    bench.run()
+    bench.drive.control_unit.press('stop')
+    assert bench.read('E0029') == 1
+    assert bench.write('E00AD', RUN) == NAK
+    assert bench.flags == NOT_PERMITTED
+
+
+# ---- older firmware ----
+
+
+def test_older_firmware_does_not_know_it():
+    ids = 'E0075', 'E0076', 'E007A', 'E00DC', 'E00FA', 'E00FC', 'E00F9', 'E007C', 'E007D', 'E00E1'
+    for id_ in ids:
+        new, old = benches()
+        new.read(id_)
+        assert (old.say(enquiry(id_)), old.flags) == (NAK, UNKNOWN), id_
+        old = ClassicBench('5.0')
+        old.run()
+        assert old.say(select(id_, 1)) == NAK
+        assert not old.running, 'a serial fault too'
+        assert (old.read('E00E9'), old.read('E00AC')) == (SIO_FAIL, UNKNOWN)
+    bench = ClassicBench(settings={'fieldbus.sw_ver': 4.3})
+    assert bench.read('E0075') == 430
+    assert (bench.say(enquiry('E00F9')), bench.flags) == (NAK, UNKNOWN), 'it came later'
+
+
+def test_line_settings_of_older_firmware():
+    new, old = benches(lenient=True)
+    for id_, code, of_new, of_old in [
+        ('E0029', 3, ACK, ACK),
+        ('E00A8', 256, ACK, NAK),
+        ('E00A8', 64, ACK, ACK),
+        ('E00AA', 4, ACK, NAK),
+        ('E00AA', 1, ACK, ACK),
+        ('E00A9', 95, NAK, ACK),
+        ('E00A9', 94, ACK, ACK),
+        ('E000A', 12, ACK, NAK),
+    ]:
+        assert new.say(select(id_, code, 0)) == of_new.replace(b'!', b' ')
+        assert old.say(select(id_, code, 0))[1:] == of_old[1:]
+    for bench, effective in [(new, (1, 256, 4)), (old, (94, 64, 1))]:
+        side = bench.drive.control_unit.serial
+        assert (side.address, side.baud, side.char_format) == effective
+    old = ClassicBench('5.0')
+    assert old.write('E0029', 3) == old.write('E00A9', 9) == ACK, 'the old address answers'
+    assert old.read('E0029', 9) == 3
