@@ -1,0 +1,471 @@
+# Copyright 2026 The nfo_sinus_driver authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What carries CAN frames: their length, the LAWICEL adapter, an interface of the kernel, SDO."""
+
+from collections.abc import Iterator
+import errno
+import os
+from pathlib import Path
+import select
+import socket
+import struct
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.interface import Address
+from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.sdo import Download
+from nfo_sinus_driver.link.sdo import Upload
+from nfo_sinus_driver.simulator import socketcan
+from nfo_sinus_driver.simulator.can_frames import Frame
+from nfo_sinus_driver.simulator.can_frames import bits
+from nfo_sinus_driver.simulator.lawicel import Adapter
+from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.sdo import Abort
+from nfo_sinus_driver.simulator.sdo import AbortCode
+from nfo_sinus_driver.simulator.sdo import Server
+from nfo_sinus_driver.simulator.simulator import Simulator
+from nfo_sinus_driver.simulator.socketcan import CanInterface
+from nfo_sinus_driver.simulator.socketcan import CanPort
+from nfo_sinus_driver.simulator.socketcan import is_interface
+
+# ---- frames (ISO 11898-1) ----
+
+
+def checked(frame):
+    """Return the bits of a standard frame up to its check sum, by long division."""
+    head = f'0{frame.identifier:011b}{int(frame.remote)}00{len(frame.data):04b}'
+    head += '' if frame.remote else ''.join(f'{byte:08b}' for byte in frame.data)
+    rest = int(head + 15 * '0', 2)
+    # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
+    for place in reversed(range(15, len(head) + 15)):
+        if rest >> place & 1:
+            rest ^= 0xC599 << place - 15
+    return f'{head}{rest:015b}'
+
+
+@given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans())
+def test_a_frame_has_the_bits_that_stuffing_by_another_way_gives(identifier, data, remote):
+    frame = Frame(identifier & 0x7FF, data, remote, False)
+    stuffed = ''
+    for bit in checked(frame):
+        stuffed += bit
+        if stuffed[-5:] in ('00000', '11111'):
+            stuffed += '1' if bit == '0' else '0'
+    carried = 0 if remote else 8 * len(data)
+    assert bits(frame) == len(stuffed) + 13
+    assert 47 + carried <= bits(frame) <= 47 + carried + (34 + carried - 1) // 4
+    least = 67 + 8 * len(data)
+    assert least <= bits(Frame(identifier, data, extended=True)) <= least * 5 // 4
+
+
+# ---- the LAWICEL adapter ----
+
+OK, NO = b'\r', b'\a'
+
+
+def said(adapter, line, *, sent=True):
+    """Return what an adapter answers to a line."""
+    answer = b''
+    for what in adapter.take(line + b'\r'):
+        answer += adapter.tried(what, sent=sent) if isinstance(what, Frame) else what
+    return answer
+
+
+def opened(*lines):
+    """Return an adapter that is on the bus."""
+    adapter = Adapter()
+    for line in (b'S4', *lines, b'O'):
+        assert said(adapter, line) == OK
+    return adapter
+
+
+def test_every_command_of_its_manual():
+    for line, closed, open_ in (
+        (b'S0', OK, NO),
+        (b'S8', OK, NO),
+        (b'S9', NO, NO),
+        (b'S', NO, NO),
+        (b's031C', NO, NO),
+        (b'O', OK, NO),
+        (b'L', OK, NO),
+        (b'C', NO, OK),
+        (b't10021133', NO, b'z\r'),
+        (b't1000', NO, b'z\r'),
+        (b't100211', NO, NO),
+        (b't1009112233445566778899', NO, NO),
+        (b't8000', NO, NO),
+        (b'T0000010021133', NO, b'Z\r'),
+        (b'T200000000', NO, NO),
+        (b'r1002', NO, b'z\r'),
+        (b'R000001000', NO, b'Z\r'),
+        (b'r10021133', NO, NO),
+        (b'P', NO, NO),
+        (b'F', NO, b'F00\r'),
+        (b'X1', OK, NO),
+        (b'X0', NO, NO),
+        (b'M00000000', OK, NO),
+        (b'mFFFFFFFF', OK, NO),
+        (b'm0', NO, NO),
+        (b'V', b'V1013\r', b'V1013\r'),
+        (b'N', b'NNF01\r', b'NNF01\r'),
+        (b'Z1', OK, NO),
+        (b'', b'', b''),
+        (b'nonsense', NO, NO),
+        (b'\xff', NO, NO),
+    ):
+        adapter = Adapter()
+        assert said(adapter, b'S4') == OK
+        assert (said(adapter, line), said(opened(), line)) == (closed, open_), line
+
+
+def test_it_opens_with_a_bit_rate_alone_and_sends_nothing_while_it_listens():
+    adapter = Adapter()
+    assert said(adapter, b'O') == NO
+    assert said(adapter, b'S5') + said(adapter, b'O') == OK + OK
+    assert adapter.on_bus(250_000) and not adapter.on_bus(125_000)
+    assert said(adapter, b'C') == OK
+    assert not adapter.on_bus(250_000)
+    assert said(adapter, b'S4') + said(adapter, b'L') == OK + OK
+    assert adapter.on_bus(125_000)
+    assert said(adapter, b't1000') == NO
+
+
+def test_frames_that_are_not_acknowledged_fill_its_queue():
+    adapter = opened()
+    assert [said(adapter, b't1000', sent=False) for _ in range(10)] == 8 * [b'z\r'] + 2 * [NO]
+    assert [said(adapter, b'F') for _ in range(2)] == [b'FA6\r', b'F00\r']
+    assert said(adapter, b't1000') == b'z\r'
+    assert said(adapter, b't1000', sent=False) == b'z\r', 'the queue is empty again'
+
+
+def test_frames_as_lines_and_as_structures_of_the_kernel():
+    data = bytes.fromhex('1133')
+    for frame, line, structure in (
+        (Frame(0x100, data), b't10021133\r', raw(0x100, data)),
+        (Frame(0x7FF), b't7FF0\r', raw(0x7FF)),
+        (Frame(0x701, bytes(1), remote=True), b'r7011\r', raw(0x40000701, b'', 1)),
+        (Frame(0x100, data, extended=True), b'T0000010021133\r', raw(0x80000100, data)),
+        (
+            Frame(0x100, bytes(2), remote=True, extended=True), b'R000001002\r',
+            raw(0xC0000100, b'', 2),
+        ),
+    ):  # fmt: skip
+        adapter, interface = opened(), CanInterface()
+        assert adapter.told(frame, 0.0) == line
+        assert opened(b'Z1').told(frame, 61.5) == line[:-1] + b'05DC\r'
+        assert interface.told(frame, 0.0) == structure
+        assert list(adapter.take(line)) == list(interface.take(structure)) == [frame]
+    assert interface.on_bus(125_000) and interface.tried(Frame(1), sent=False) == b''
+
+
+def test_acceptance_filters():
+    # the first filter lets 581 through, the second 701, and nothing counts of the data
+    adapter = opened(b'MB020E020', b'm001F001F')
+    heard = [n for n in range(0x800) if adapter.told(Frame(n, b'\x12'), 0.0)]
+    assert heard == [0x581, 0x701]
+    # data counts: filter 1 wants 581 with a first byte of 43h
+    adapter = opened(b'MB0240003', b'm0010FF10')
+    assert adapter.told(Frame(0x581, b'\x43\x00'), 0.0)
+    assert not adapter.told(Frame(0x581, b'\x80\x00'), 0.0)
+
+
+@given(st.data())
+def test_lines_in_any_pieces(data):
+    frame = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8))
+    frames = [Frame(*one) for one in data.draw(st.lists(frame, max_size=5))]
+    stream = b''.join(
+        f't{one.identifier:03x}{len(one.data)}{one.data.hex()}\r'.encode() for one in frames
+    )
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    adapter = opened()
+    pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
+    assert [what for piece in pieces for what in adapter.take(piece)] == frames
+
+
+@given(st.lists(st.binary(max_size=60), max_size=10))
+def test_rubbish_is_refused_and_does_no_harm(pieces):
+    adapter = opened()
+    for piece in pieces:
+        for what in adapter.take(piece):
+            assert isinstance(what, Frame) or len(what) <= 8
+    list(adapter.take(b'\rC\rS4\rO\r'))
+    assert adapter.on_bus(125_000)
+
+
+# ---- a CAN interface of the kernel: a socket made of paper, and a real vcan ----
+
+READ_VENDOR = bytes.fromhex('4018100100000000')
+VENDOR = bytes.fromhex('431810011b000000')
+
+
+def raw(identifier, data=b'', length=None):
+    """Return a struct can_frame as linux/can.h has it."""
+    size = len(data) if length is None else length
+    return struct.pack('=I', identifier) + bytes((size, 0, 0, 0)) + data.ljust(8, b'\0')
+
+
+class PaperSocket:
+    """A CAN socket whose other end is the test."""
+
+    def __init__(self) -> None:
+        self.near, self.far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.bound: tuple[str, ...] | None = None
+        self.fails: dict[str, int] = {}
+        self.setblocking, self.fileno = self.near.setblocking, self.near.fileno
+        self.close = self.near.close
+
+    def may_fail(self, method: str) -> None:
+        if method in self.fails:
+            raise OSError(self.fails[method], os.strerror(self.fails[method]))
+
+    def bind(self, address: tuple[str, ...]) -> None:
+        self.may_fail('bind')
+        self.bound = address
+
+    def recv(self, size: int) -> bytes:
+        self.may_fail('recv')
+        return self.near.recv(size)
+
+    def send(self, data: bytes) -> int:
+        self.may_fail('send')
+        return self.near.send(data)
+
+    def hear(self) -> bytes:
+        """Return the next frame that came out."""
+        ready, _, _ = select.select([self.far], [], [], 10.0)
+        return self.far.recv(16) if ready else b''
+
+
+@pytest.fixture
+def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[PaperSocket]:
+    paper = PaperSocket()
+    real = socket.socket
+
+    def make(family: int = -1, kind: int = -1, protocol: int = -1, *rest: object) -> object:
+        if family != socket.AF_CAN:
+            return real(family, kind, protocol, *rest)
+        assert (kind, protocol) == (socket.SOCK_RAW, socket.CAN_RAW)
+        paper.may_fail('socket')
+        return paper
+
+    monkeypatch.setattr(socketcan.socket, 'socket', make)
+    yield paper
+    paper.close()
+    paper.far.close()
+
+
+def test_drives_on_an_interface(paper):
+    with Simulator([1, 2], protocol='canopen', link='can0', control=None) as simulator:
+        assert paper.bound == ('can0',) and simulator.port == 'can0'
+        # an interface is there from the beginning: it hears them start
+        assert {paper.hear(), paper.hear()} == {raw(0x701, b'\0'), raw(0x702, b'\0')}
+        paper.far.send(raw(0x602, READ_VENDOR))
+        assert paper.hear() == raw(0x582, VENDOR)
+        # not for them: other lengths, error frames, extended ones
+        for other in (
+            raw(0x602, READ_VENDOR, 9), raw(0x20000602, READ_VENDOR),
+            raw(0x80000602, READ_VENDOR), b'short',
+        ):
+            paper.far.send(other)
+        paper.far.send(raw(0x40000701, b'', 1))
+        assert paper.hear() == raw(0x701, b'\x7f')
+
+
+def test_an_interface_that_goes_down_and_comes_back(paper):
+    port = CanPort('can0')
+    paper.fails = {'send': errno.ENETDOWN, 'recv': errno.ENETDOWN}
+    port.send(raw(1))
+    assert port.receive() == b''
+    paper.fails = {}
+    paper.far.send(raw(2))
+    paper.far.send(raw(3))
+    assert port.receive() == raw(2) + raw(3)
+    port.hang_up()
+    assert port.filenos() == [] and port.receive() == b''
+    port.send(raw(1))
+    port.hang_up()
+
+
+def test_why_there_is_no_interface(paper, monkeypatch):
+    for method, number, problem in (
+        ('socket', errno.EAFNOSUPPORT, 'this kernel has no SocketCAN .*: serve a pseudo-terminal'),
+        ('bind', errno.ENODEV, 'cannot use the CAN interface can0 .*: see "ip link"'),
+    ):
+        paper.fails = {method: number}
+        with pytest.raises(PortError, match=problem):
+            CanPort('can0')
+    monkeypatch.delattr(socketcan.socket, 'AF_CAN')
+    with pytest.raises(PortError, match='no SocketCAN'):
+        CanPort('can0')
+    names = 'can0', 'vcan12', '/tmp/nfo0', './nfo0', None
+    assert [is_interface(name) for name in names] == [True, True, False, False, False]
+
+
+def test_a_virtual_interface_of_the_kernel():
+    for name in sorted(one.name for one in Path('/sys/class/net').glob('vcan*')):
+        try:
+            CanPort(name).close()
+        except PortError:
+            continue
+        with Simulator([1], protocol='canopen', link=name, control=None):
+            link = CanopenLink.on_port(name, LineSettings(baud_rate=125_000, response_timeout=5.0))
+            link.open()
+            assert link.read(1, Address('object', 0x1018, 1, 4)).data == VENDOR[4:]
+            link.close()
+        return
+    pytest.skip('this kernel has no vcan interface: ip link add vcan0 type vcan, and set it up')
+
+
+# ---- the SDO server ----
+
+PLACE = (0x2013, 1)
+
+
+class Objects:
+    """One object that is bytes and keeps its length."""
+
+    def __init__(self, value=b'', refusal=AbortCode.NO_OBJECT):
+        self.value, self.refusal, self.writes = value, refusal, []
+
+    def read(self, index, sub_index):
+        if (index, sub_index) != PLACE:
+            raise Abort(self.refusal)
+        return self.value
+
+    def admit(self, index, sub_index, size):
+        usual = len(self.read(index, sub_index))
+        if size not in (None, usual):
+            raise Abort(AbortCode.TOO_LONG if size > usual else AbortCode.TOO_SHORT)
+        return usual
+
+    def write(self, index, sub_index, data):
+        self.value = data
+        self.writes.append(data)
+
+
+#: CiA 301 §7.2.4.3, figures of the protocols: the object, what is asked, and what is answered.
+GOLDEN = (
+    # expedited, one to four bytes
+    ('11', '4013200100000000', '4f13200111000000'),
+    ('1122', '4013200100000000', '4b13200111220000'),
+    ('112233', '4013200100000000', '4713200111223300'),
+    ('11223344', '4013200100000000', '4313200111223344'),
+    # five bytes and more in segments
+    ('1122334455', '4013200100000000 6000000000000000', '4113200105000000 0511223344550000'),
+    (
+        '1122334455667788', '4013200100000000 6000000000000000 7000000000000000',
+        '4113200108000000 0011223344556677 1d88000000000000',
+    ),
+    # nothing, which is a segment too
+    ('', '4013200100000000 6000000000000000', '4113200100000000 0f00000000000000'),
+    # no such object
+    ('', '4014200000000000', '8014200000000206'),
+    # the wrong toggle bit; after it there is no transfer
+    (
+        '1122334455', '4013200100000000 7000000000000000 6000000000000000',
+        '4113200105000000 8013200100000305 8013200101000405',
+    ),
+    # a segment of no transfer, a block transfer, a command that there is not
+    *(('', f'{code}000000000000', '8000000001000405') for code in ('6000', '0000')),
+    *(('', f'{code}13200100000000', '8000000001000405') for code in ('a0', 'e0')),
+    # the client ends a transfer: no answer
+    (
+        '1122334455', '4013200100000000 8013200100000405 6000000000000000',
+        '4113200105000000  8013200101000405',
+    ),
+    # not eight bytes: no answer
+    ('11', '40132001 ', ' '),
+    # expedited writes, with a size and without
+    *(
+        ('1122', f'{write} 4013200100000000', '6013200100000000 4b13200133440000')
+        for write in ('2b13200133440000', '2213200133445566')
+    ),
+    ('1122', '2313200133445566', '8013200112000706'),
+    ('1122', '2f13200133000000', '8013200113000706'),
+    # in segments
+    (
+        '0000000000000000', '2113200108000000 0011223344556677 1d88000000000000 4013200100000000',
+        '6013200100000000 2000000000000000 3000000000000000 4113200108000000',
+    ),
+    # too many bytes, too few, the wrong toggle bit
+    ('0000000000', '2113200105000000 0011223344556677', '6013200100000000 8013200112000706'),
+    ('0000000000', '2113200105000000 0911223300000000', '6013200100000000 8013200113000706'),
+    (
+        '0000000000', '2113200105000000 1511223344550000 0511223344550000',
+        '6013200100000000 8013200100000305 8013200101000405',
+    ),
+)  # fmt: skip
+
+
+def test_golden_frames_of_the_standard():
+    for value, requests, expected in GOLDEN:
+        server = Server(Objects(bytes.fromhex(value)))
+        answers = [server.answer(bytes.fromhex(one)).hex() for one in requests.split(' ')]
+        assert answers == expected.split(' '), requests
+
+
+def uploaded(node):
+    """Return the object as the driver reads it."""
+    upload = Upload(5, *PLACE)
+    while upload.request is not None:
+        assert upload.take(node.answer(upload.request))
+    return upload.value
+
+
+@given(st.binary(max_size=200))
+def test_the_driver_reads_and_writes_any_value(value):
+    objects = Objects(bytes(len(value)))
+    node = Server(objects)
+    if value:
+        download = Download(5, *PLACE, value)
+        while download.request is not None:
+            assert not objects.writes, 'written before it was whole'
+            assert download.take(node.answer(download.request))
+        assert objects.writes == [value]
+    assert uploaded(node) == value
+
+
+def test_the_driver_understands_each_refusal():
+    for code in AbortCode:
+        upload = Upload(5, 0x2014, 0)
+        answer = Server(Objects(refusal=code)).answer(upload.request)
+        with pytest.raises(Refused, match=f'{code:08X}h'):
+            upload.take(answer)
+
+
+MESSAGES = st.one_of(
+    st.binary(min_size=8, max_size=8),
+    st.builds(
+        lambda command, rest: bytes((command,)) + b'\x13\x20\x01' + rest,
+        st.integers(0, 255),
+        st.binary(min_size=4, max_size=4),
+    ),
+)
+
+
+@given(st.binary(max_size=30), st.lists(MESSAGES, max_size=20))
+def test_whatever_comes_it_answers_and_begins_anew(value, messages):
+    objects = Objects(value)
+    node = Server(objects)
+    for message in messages:
+        assert len(node.answer(message)) == (0 if message[0] >> 5 == 4 else 8)
+    # whatever was written has the length of the object
+    assert {len(one) for one in objects.writes} <= {len(value)}
+    assert uploaded(node) == objects.value
