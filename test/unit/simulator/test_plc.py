@@ -386,6 +386,8 @@ def test_served_to_a_foreign_master():
         state = simulator.state()
         assert state['plc']['block'][8:] == [0x0477, 0, 77]
         assert state['plc']['ros_alive'] is True
+        # some versions of its client leave the socket without blocking
+        client.socket.settimeout(TIMEOUT)
         client.socket.sendall(bytes.fromhex('000100000006090300000005'))
         assert client.socket.recv(64)[7:] == b'\x83\x0a', 'no such unit'
 
