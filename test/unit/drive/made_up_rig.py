@@ -42,7 +42,7 @@ class FarEnd:
     protocol = PROTOCOLS['modbus_rtu']
     remarks = Remarks()
     supervision = None
-    write_and_read = None
+    write_and_read = read_then_write = None
     rig: MadeUpRig
 
     def __init__(self, registers: dict[int, int]) -> None:

@@ -101,10 +101,12 @@ def test_every_row_is_visited(visited: Visited) -> None:
             state.break_line('gone', wait=1.0)
             state.mend_line(wait=2.5)
     with history() as state:
-        # a fault that keeps the drive from taking the stop: over, lost, and the end
-        for end in ('', 'lost', 'shut down'):
+        # a fault that keeps the drive from taking the stop: over, lost, and the end, long after the
+        # stop was tried or right behind
+        soon = [('shut down', 0.05 * number) for number in range(1, 8)]
+        for end, wait in (('', 1.0), ('lost', 1.0), *soon):
             state.ride(wait=1.0)
-            state.fault(5, standing=True, wait=1.0)
+            state.fault(5, standing=True, wait=wait)
             if end == 'lost':
                 state.break_line('silent', wait=9.0)
                 state.mend_line(wait=5.0)

@@ -348,7 +348,7 @@ def test_4_a_ride_writes_no_setting_but_what_control_needs(way: str) -> None:
 @every_way
 def test_6_the_control_method_of_a_session_never_changes(way: str) -> None:
     with Rig(way) as rig:
-        for changed in ({'control_method': 'monitor'}, {'address': 2}):
+        for changed in ({'control_method': 'monitor', 'telegram_words': ''}, {'address': 2}):
             with pytest.raises(ValueError, match='cannot change within a session'):
                 rig.drive.settings = dataclasses.replace(rig.drive.settings, **changed)
 
