@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""What matters most, over every way into a drive: the same node, and the same motor at the end."""
+"""
+Over every way into a drive: the same node, one whole ride, and the same motor at the end.
+
+The laws over every way are in test/unit/drive/test_laws.py, in virtual time.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,6 @@ from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import wait_until
-from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
 from parameter_bench import refused
 from parameter_bench import set_one
@@ -103,11 +106,6 @@ def _stays_still(drive: Simulated) -> None:
 # --- connected ----------------------------------------------------------------------------------
 
 
-def test_the_drive_is_known(rig: Rig) -> None:
-    (line,) = [line for line in rig.driver.text.splitlines() if 'connected: ' in line]
-    print(line)
-
-
 @needs('parameters')
 def test_every_parameter_that_there_is_over_this_way_is_there(rig: Rig) -> None:
     has = rig.client.parameter_names() & _NAMES
@@ -145,6 +143,7 @@ def test_a_drive_without_parameters_refuses_them(rig: Rig) -> None:
 @EITHER_WAY
 def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
     client = rig.client
+    assert rig.driver.text.count('connected: ') == 1
     with client.run_at(frequency):
         state = rig.drive.state()
         assert state['frequency'] == pytest.approx(frequency, abs=1)
@@ -166,116 +165,6 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
         assert answer.message.startswith(('stopping: it ramps down', 'stopped')), answer.message
         rig.stays_still()
     assert not rig.drives.commanded(rig.drive.state())
-
-
-@pytest.mark.shared
-@EITHER_WAY
-def test_a_quick_stop_lets_go_where_there_is_one(rig: Rig, frequency: float) -> None:
-    with rig.client.run_at(frequency):
-        answer = rig.client.call('quick_stop')
-        assert answer.success
-        if rig.drives.coasts:
-            assert answer.message == rig.drives.quick_stopped()
-            assert not rig.drive.state()['driven']
-        else:
-            # so short a ramp may be over by then
-            assert answer.message.startswith(('stopping: it ramps down', 'stopped'))
-            assert answer.message.endswith('(this drive has no quick stop)')
-        rig.stays_still()
-
-
-def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(rig: Rig) -> None:
-    assert rig.client.set_parameters(setpoint_timeout=0.5).successful
-    try:
-        with rig.client.run_at(_SPEED):
-            pass
-        rig.drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
-        assert rig.drives.commanded(rig.drive.state()), 'it is still enabled'
-        with rig.client.setpoints(6.0):
-            rig.client.wait_for('status', lambda status: status.actual > 5, 'it moves again')
-    finally:
-        assert rig.client.set_parameters(setpoint_timeout=2.5).successful
-
-
-# --- stopped by something else ------------------------------------------------------------------
-
-
-def _disarmed(rig: Rig) -> None:
-    rig.client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
-
-
-def _back(rig: Rig) -> None:
-    rig.client.wait_for('status', lambda status: not status.connected, 'it is lost')
-    rig.client.wait_for('status', lambda status: status.connected, 'it is back')
-
-
-def _fault(rig: Rig) -> None:
-    overload = rig.drives.overload
-    rig.drive.inject('fault', overload.code)
-    rig.client.wait_for('status', lambda status: status.fault and not status.enabled, 'the fault')
-    # a stop may not be confirmed yet
-    wait_until(lambda: overload.text in rig.client.enable().message, 'it is refused, and why')
-    assert rig.client.call('fault_ack').message == f'acknowledged {overload}'
-    assert rig.drive.state()['fault'] == 0
-
-
-def _run_input(rig: Rig) -> None:
-    rig.drive.inject('run', False)
-    _disarmed(rig)
-    rig.drive.inject('run', True)
-
-
-def _keypad_stop(rig: Rig) -> None:
-    rig.drives.stop_at_keypad(rig.drive, lambda: _disarmed(rig))
-
-
-def _dead_line(rig: Rig) -> None:
-    rig.drive.inject('line-dead', 2.0)
-    _back(rig)
-    _disarmed(rig)
-
-
-def _lost_port(rig: Rig) -> None:
-    rig.drive.inject('hangup')
-    _back(rig)
-    _disarmed(rig)
-
-
-def _power_cycle(rig: Rig) -> None:
-    rig.drive.inject('power-cycle', 2.0)
-    _back(rig)
-    _disarmed(rig)
-
-
-def _deactivate_and_clean_up(rig: Rig) -> None:
-    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-        assert rig.client.change_state(transition)
-    assert rig.drives.left(rig.drive.wait_for(_stands, timeout=PATIENCE))
-    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-        assert rig.client.change_state(transition)
-
-
-@pytest.mark.shared
-@pytest.mark.parametrize(
-    'event',
-    [
-        _fault,
-        pytest.param(_run_input, marks=needs('direct')),
-        pytest.param(_keypad_stop, marks=needs('keypad')),
-        _dead_line,
-        _lost_port,
-        _power_cycle,
-        _deactivate_and_clean_up,
-    ],
-    ids=lambda event: event.__name__.strip('_'),
-)
-def test_nothing_turns_again_until_enable(rig: Rig, event) -> None:
-    with rig.client.run_at(_SPEED):
-        event(rig)
-        rig.stays_still()
-        wait_until(lambda: rig.client.enable().success, 'it can be enabled again', period=0.2)
-        rig.drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
-    assert not rig.drive.state().get('mode_ext_writes')
 
 
 # --- the way out --------------------------------------------------------------------------------
@@ -317,21 +206,3 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
         assert client.call('fault_ack').success
         wait_until(lambda: client.enable().success, 'it can be enabled', period=0.2)
         drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
-
-
-@needs('watched')
-def test_monitor_writes_nothing(bench: Bench) -> None:
-    drive = _simulator(bench)
-    bench.driver(*_MODEST, '-p', 'control_method:=monitor')
-    client = bench.client().connected()
-    with client.setpoints(_SPEED):
-        for service in ('stop', 'quick_stop', 'fault_ack'):
-            assert 'monitor' in client.call(service).message
-        assert 'monitor' in client.enable().message
-        client.wait_for('telemetry', lambda message: True, 'telemetry flows')
-        for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-            assert client.change_state(transition)
-    state = drive.state()
-    assert not state['writes']
-    assert not state['command_writes']
-    assert not state.get('ack_reads') and not state.get('sio_err_reads')
