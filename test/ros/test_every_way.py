@@ -29,6 +29,7 @@ from bench import PATIENCE
 from bench import Bench
 from bench import Client
 from bench import wait_until
+from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
 from parameter_bench import refused
 from parameter_bench import set_one
@@ -206,3 +207,21 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
         assert client.call('fault_ack').success
         wait_until(lambda: client.enable().success, 'it can be enabled', period=0.2)
         drive.wait_for(lambda state: state['frequency'] > _SPEED - 1, timeout=PATIENCE)
+
+
+@needs('watched')
+def test_monitor_writes_nothing(bench: Bench) -> None:
+    drive = _simulator(bench)
+    bench.driver(*_MODEST, '-p', 'control_method:=monitor')
+    client = bench.client().connected()
+    with client.setpoints(_SPEED):
+        for service in ('stop', 'quick_stop', 'fault_ack'):
+            assert 'monitor' in client.call(service).message
+        assert 'monitor' in client.enable().message
+        client.wait_for('telemetry', lambda message: True, 'telemetry flows')
+        for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+            assert client.change_state(transition)
+    state = drive.state()
+    assert not state['writes']
+    assert not state['command_writes']
+    assert not state.get('ack_reads') and not state.get('sio_err_reads')
