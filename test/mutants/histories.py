@@ -154,6 +154,14 @@ HISTORIES = (
         '        while task is not None and not await',
         '        while False and not await',
         G2_SCMD,
+        # which must not wait instead, in the only thread
+        (
+            (
+                SEQUENCE,
+                'task is not None and task.future.e',
+                'task is not None and task.future.done() and task.future.e',
+            ),
+        ),
     ),
     Mutant(
         3,
