@@ -25,6 +25,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
 import itertools
+from pathlib import Path
 import threading
 import time
 from typing import Any
@@ -93,9 +94,12 @@ class Real:
 
 
 @pytest.fixture
-def real() -> Iterator[Real]:
+def real(tmp_path: Path) -> Iterator[Real]:
     settings = ramps('sinus_g2', 0.2, 0.2)
-    with Simulator(baud=57600, boot_time=0.2, settings=settings) as simulator:
+    # by a name of its own: what is unplugged comes back as another device, and the number of the
+    # one before may be that of another test by then
+    link = str(tmp_path / 'port')
+    with Simulator(link=link, baud=57600, boot_time=0.2, settings=settings) as simulator:
         real = Real(simulator)
         try:
             yield real
